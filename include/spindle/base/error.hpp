@@ -1,0 +1,116 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+namespace spindle {
+
+/// What the process returns (contract, section 4). The only numbers a user ever sees.
+enum class ExitStatus : std::uint8_t {
+  ok = 0,
+  negative = 1,
+  usage = 2,
+  bad_file = 3,
+  unreachable = 4,
+  no_answer = 5,
+  refused = 6,
+  malformed = 7,
+  mismatch = 8,
+  partial = 9,
+  internal = 70,
+  interrupted = 130,
+  terminated = 143,
+};
+
+/// Every way in which something can fail. Each belongs to one exit status.
+enum class Errc : std::uint8_t {
+  negative,
+  usage,
+  unknown_name,
+  bad_value,
+  out_of_range,
+  read_only,
+  not_confirmed,
+  unverified,
+  bad_file,
+  bad_target,
+  name_not_found,
+  connection_refused,
+  no_route,
+  connect_timeout,
+  port_missing,
+  port_busy,
+  port_unusable,
+  no_answer,
+  incomplete_answer,
+  closed,
+  reset,
+  exception_response,
+  malformed_answer,
+  bad_checksum,
+  local_echo,
+  mismatch,
+  wrong_generation,
+  wrong_model,
+  partial,
+  internal,
+  interrupted,
+  terminated,
+  closed_pipe,
+};
+
+/// One row of the table of exit statuses; code, JSON and man page all use it.
+struct StatusInfo {
+  ExitStatus status;
+  std::string_view name;     ///< snake_case, the `code` of a JSON error
+  std::string_view meaning;  ///< one line for the manual
+};
+
+/// One row of the table of errors.
+struct ErrcInfo {
+  Errc code;
+  ExitStatus status;
+  /// The sentence used when an error brings no message of its own. `{tried}` and `{waited}` are
+  /// replaced by the error's members.
+  std::string_view text;
+  std::string_view hint;  ///< the next step used when an error brings none; may be empty
+};
+
+std::span<const StatusInfo> status_table();
+std::span<const ErrcInfo> errc_table();
+const StatusInfo& info(ExitStatus status);
+const ErrcInfo& info(Errc code);
+
+/// The one error type. Carries what was tried; `describe()` is the only place that makes it text.
+struct Error {
+  Errc code = Errc::internal;
+  std::string message = {};  ///< lower case, one line, no full stop; empty: the table's text
+  std::string hint = {};     ///< what would help; empty: the table's hint
+  std::string target = {};   ///< endpoint or tool as the user knows it
+  std::string name = {};     ///< parameter, action, option or file that it is about
+  std::string tried = {};    ///< operation under way, such as "report server id"
+  std::optional<std::chrono::nanoseconds> waited = std::nullopt;
+  std::optional<std::uint16_t> register_address = std::nullopt;
+  std::optional<std::uint8_t> exception = std::nullopt;  ///< exception code as received
+
+  [[nodiscard]] ExitStatus status() const { return info(code).status; }
+};
+
+template <typename T>
+using Result = tl::expected<T, Error>;
+
+/// The sentence without target, name and hint.
+std::string message_of(const Error& error);
+
+/// The next step: the error's own or its table row's; may be empty.
+std::string hint_of(const Error& error);
+
+/// "target: name: message; hint", one line, as printed on stderr behind "spindle: ".
+std::string describe(const Error& error);
+
+}  // namespace spindle

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <atomic>
+
+#include "spindle/base/error.hpp"
+
+namespace spindle {
+
+/// Whether a signal asked the program to end. Set once by the signal handler, seen by every wait.
+/// Setting it is async-signal-safe. `posix` makes the descriptor readable when it is set, so that
+/// all threads that poll it wake at once.
+class Interrupt {
+ public:
+  /// `wake_descriptor` is included in every poll; -1 where nothing polls (tests).
+  explicit Interrupt(int wake_descriptor = -1) : wake_descriptor_(wake_descriptor) {}
+
+  /// Remembers the first signal (SIGINT = 2, SIGTERM = 15, as numbered by POSIX systems).
+  void raise(int signal_number) noexcept;
+
+  [[nodiscard]] bool raised() const noexcept { return signal_.load() != 0; }
+  [[nodiscard]] int descriptor() const noexcept { return wake_descriptor_; }
+
+  /// `Errc::interrupted` for SIGINT, `Errc::terminated` for anything else. Requires raised().
+  [[nodiscard]] Error error() const;
+
+ private:
+  std::atomic<int> signal_{0};
+  int wake_descriptor_;
+};
+
+}  // namespace spindle

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace spindle {
+
+/// Shell-style matching of a whole name: `*` any run of characters, `?` one, `[abc]`, `[a-z]`,
+/// `[!x]`. A malformed bracket matches itself literally. Linear in practice, never exponential.
+bool glob_match(std::string_view pattern, std::string_view text);
+
+/// Whether the text has a character that glob_match() treats as special.
+bool is_pattern(std::string_view text);
+
+/// The candidate nearest to a misspelt word by Damerau-Levenshtein distance, when it is near enough
+/// to be worth suggesting (distance at most a third of the word's length, at least 1). The first of
+/// equals.
+std::optional<std::string> closest(std::string_view word,
+                                   const std::vector<std::string>& candidates);
+
+/// ", did you mean 'x'?"-style hint for errors: "did you mean 'x'?" or an empty string.
+std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
+
+/// Reads decimal digits, or hexadecimal ones behind "0x", completely. Empty when anything else is
+/// there or the number is above `maximum`. A leading zero ("010") is decimal ten, never octal.
+std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t maximum);
+
+std::vector<std::string_view> split(std::string_view text, char separator);
+
+}  // namespace spindle

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/base/decimal.hpp"
+#include "spindle/modbus/types.hpp"
+
+namespace spindle::catalogue {
+
+/// Where a fact comes from, strongest first (contract, section 5, Evidence).
+enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
+enum class Access : std::uint8_t { read_only, read_write };
+enum class Kind : std::uint8_t { u16, i16, u32, i32 };
+
+/// How registers become a number: an integer of `kind` (32-bit kinds: high word first) times
+/// `scale`.
+struct Encoding {
+  Kind kind = Kind::u16;
+  Decimal scale = Decimal(1);
+};
+
+/// Number of 16-bit registers of one value: 1 or 2.
+std::uint16_t register_count(Kind kind);
+/// Smallest and largest integer of the kind.
+std::int64_t lowest(Kind kind);
+std::int64_t highest(Kind kind);
+std::string_view to_text(Kind kind);  ///< "u16", as written in profiles and raw registers
+std::optional<Kind> parse_kind(std::string_view text);
+
+/// Meaning of one number of an enumeration.
+struct Label {
+  std::int64_t number = 0;
+  std::string text;
+};
+
+/// Allowed values in units of the parameter (already scaled), inclusive. Either side may be
+/// unknown.
+struct Range {
+  std::optional<Decimal> minimum;
+  std::optional<Decimal> maximum;
+};
+
+/// One entry of the catalogue.
+struct Parameter {
+  std::string name;   ///< "preset.1.target-torque", "p242", "@holding:2"
+  std::string title;  ///< what it is, for people
+  modbus::RegisterTable table = modbus::RegisterTable::holding;
+  modbus::RegisterAddress address = {};
+  Encoding encoding = {};
+  std::string unit;  ///< "%", "rpm", "deg"; "torque" stands for the tool's own torque unit
+  Range range = {};
+  std::optional<Decimal> default_value = std::nullopt;
+  std::vector<Label> labels = {};
+  Access access = Access::read_only;
+  Evidence evidence = Evidence::inferred;
+  std::string source;  ///< document and section
+  std::string note;  ///< what a user should know, such as when a change takes effect; may be empty
+};
+
+std::string_view to_text(Evidence evidence);
+std::optional<Evidence> parse_evidence(std::string_view text);
+std::string_view to_text(Access access);                ///< "r" or "rw"
+std::string_view to_text(modbus::RegisterTable table);  ///< "holding" or "input"
+
+}  // namespace spindle::catalogue

@@ -1,0 +1,191 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/base/clock.hpp"
+#include "spindle/base/error.hpp"
+#include "spindle/catalogue/identity.hpp"
+#include "spindle/catalogue/parameter.hpp"
+#include "spindle/modbus/adu.hpp"
+
+namespace spindle::catalogue {
+
+/// Registers from `from` to `to`, inclusive, of one table.
+struct Area {
+  modbus::RegisterTable table = modbus::RegisterTable::holding;
+  std::uint16_t from = 0;
+  std::uint16_t to = 0;
+  std::string note = {};
+};
+
+/// Silence that a serial server needs before a frame at rates up to `up_to_baud` (0: any rate above
+/// the others).
+struct GapRule {
+  unsigned up_to_baud = 0;
+  Duration gap = {};
+};
+
+struct SerialFacts {
+  unsigned baud = 9600;
+  char parity = 'E';  ///< 'N', 'E' or 'O'
+  unsigned stop_bits = 1;
+  std::vector<GapRule> gaps = {};
+  Duration broadcast_pause = {};  ///< on top of the gap
+};
+
+/// How to talk to this product. Values come from the profile, each with its evidence there.
+struct LinkFacts {
+  modbus::Framing framing = modbus::Framing::tcp;
+  std::uint16_t port = 502;
+  std::uint8_t unit = 0;
+  std::uint16_t max_read = 125;
+  std::uint16_t max_write = 1;  ///< registers per write; 1: only FC 06
+  Duration keep_alive = {};     ///< zero: none needed
+  Duration answer = std::chrono::seconds(1);
+  Duration connect = std::chrono::seconds(5);
+  unsigned retries = 1;   ///< repetitions of a read that got no answer
+  bool loopback = false;  ///< FC 08 00 is answered
+  SerialFacts serial = {};
+  std::vector<Area> contiguous = {};  ///< registers may be read along here
+  std::vector<Area> absent = {};      ///< registers said not to exist
+};
+
+/// Frames that the tool sends unasked once armed (or always).
+struct EventFacts {
+  std::uint16_t arm_register = 0;
+  std::uint16_t arm_value = 1;
+  std::uint16_t disarm_value = 0;
+  Duration arm_every = {};
+  Duration arm_expires = {};
+  std::uint8_t function = 0;  ///< 3 or 4
+  std::uint16_t first = 0;    ///< first register of the block
+  std::uint16_t count = 0;    ///< registers in the block; the frame has 2 × count data bytes
+  std::string number;         ///< parameter that counts events up
+  std::string kind;           ///< parameter whose value names the kind
+  std::map<std::int64_t, std::string> kinds = {};  ///< value to the contract's event kind
+};
+
+/// The tool's own limits of parameter n: registers n + offset.
+struct LimitFacts {
+  std::uint16_t minimum_offset = 0;
+  std::uint16_t maximum_offset = 0;
+  std::uint16_t from = 0;
+  std::uint16_t to = 0;
+};
+
+/// Parameters that exist by number only.
+struct NumberedFacts {
+  std::string prefix;
+  modbus::RegisterTable table = modbus::RegisterTable::holding;
+  std::uint16_t from = 0;
+  std::uint16_t to = 0;
+  Access access = Access::read_only;
+  Evidence evidence = Evidence::inferred;
+  std::string source;
+};
+
+enum class Hazard : std::uint8_t {
+  none,
+  moves,    ///< starts or changes a motion
+  locks,    ///< takes the tool away from its operator
+  unclear,  ///< the register's meaning is not certain: it may move or lock
+  erases,   ///< overwrites stored settings
+};
+
+/// A deed, as opposed to a stored value: a write that makes the tool do something.
+struct Action {
+  std::string name;
+  std::string title;
+  modbus::RegisterAddress address = {};
+  std::optional<std::uint16_t> value = std::nullopt;  ///< fixed value; empty: the user gives one
+  std::optional<std::uint16_t> stop_value = std::nullopt;  ///< ends what the action began
+  std::uint16_t minimum = 0;                               ///< of a given value
+  std::uint16_t maximum = 0;
+  std::vector<Label> labels = {};
+  Hazard hazard = Hazard::none;
+  Evidence evidence = Evidence::inferred;
+  std::string source;
+  std::string check;    ///< how to verify the assignment on the tool; one sentence
+  std::string confirm;  ///< parameter whose reading proves the effect; empty: nothing can
+  /// Reading that proves it; empty: the value written.
+  std::optional<std::int64_t> confirm_value = std::nullopt;
+};
+
+/// Meaning of one code: alarm, error, exception.
+struct CodeText {
+  std::string text;
+  std::string remedy;
+  Evidence evidence = Evidence::inferred;
+  std::string source;
+};
+
+/// A start state for the simulated tool. Patterns are globs over parameter names; later entries
+/// win.
+struct SimulationFacts {
+  Bytes identity = {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
+  struct Value {
+    std::string pattern;
+    std::int64_t raw = 0;
+  };
+  struct Limits {
+    std::string pattern;
+    std::int64_t minimum = 0;  ///< raw
+    std::int64_t maximum = 0;  ///< raw
+  };
+  std::vector<Value> values = {};
+  std::vector<Limits> limits = {};
+  std::vector<Area> absent = {};  ///< registers that answer exception 02
+};
+
+/// The catalogue of one product: how to talk to it and what its registers mean.
+class Profile {
+ public:
+  std::string id;
+  std::string title;
+  std::string maker;
+  std::string series;
+  std::string path;  ///< file it came from
+  LinkFacts link;
+  std::optional<IdentityFacts> identity;
+  std::optional<EventFacts> events;
+  std::optional<LimitFacts> limits;
+  std::optional<NumberedFacts> numbered;
+  std::vector<Parameter> parameters;
+  std::vector<Action> actions;
+  std::map<std::uint8_t, CodeText> exceptions;
+  std::map<std::int64_t, CodeText> error_codes;
+
+  /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
+  /// ("@holding:2", "@input:3204/i16"). Error `unknown_name` with a suggestion.
+  [[nodiscard]] Result<Parameter> find(std::string_view name) const;
+
+  /// All parameters meant, in the order asked for, each once; a pattern gives catalogue order. No
+  /// names: every named parameter. Error `unknown_name` for a name that does not exist or a pattern
+  /// that matches nothing.
+  [[nodiscard]] Result<std::vector<Parameter>> select(const std::vector<std::string>& names) const;
+
+  /// Error `unknown_name` with a suggestion.
+  [[nodiscard]] Result<Action> find_action(std::string_view name) const;
+
+  /// Whether a raw write to this holding register is allowed: it belongs to a writable parameter,
+  /// named or numbered.
+  [[nodiscard]] bool writable(modbus::RegisterAddress address) const;
+
+  /// Registers with the tool's own minimum and maximum of a parameter; empty when it has none.
+  struct LimitRegisters {
+    modbus::RegisterAddress minimum;
+    modbus::RegisterAddress maximum;
+  };
+  [[nodiscard]] std::optional<LimitRegisters> limit_registers(const Parameter& parameter) const;
+};
+
+/// Parses "@holding:2", "@input:3204/i16" (default u16), without any profile. Empty when the text
+/// does not begin with '@'.
+std::optional<Result<Parameter>> parse_raw_register(std::string_view text);
+
+}  // namespace spindle::catalogue

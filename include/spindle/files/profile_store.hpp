@@ -1,0 +1,58 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/base/error.hpp"
+#include "spindle/catalogue/profile.hpp"
+
+namespace spindle::files {
+
+/// One fault in a file.
+struct Finding {
+  std::string file;
+  int line = 0;    ///< from 1
+  int column = 0;  ///< from 1
+  std::string message;
+
+  /// "file:line:column: message"
+  [[nodiscard]] std::string to_string() const;
+};
+
+/// A profile that can be named.
+struct ProfileEntry {
+  std::string id;
+  std::string path;
+};
+
+/// Where profiles are found. The first folder that has ID.yaml wins.
+class ProfileStore {
+ public:
+  explicit ProfileStore(std::vector<std::string> folders) : folders_(std::move(folders)) {}
+
+  /// By id, or by path when the text has a '/' or ends in ".yaml". Follows `extends`. Error
+  /// `bad_file` (status 3) with the first finding as message and how many there are, or
+  /// `unknown_name` with a suggestion. Reads the simulation part not at all.
+  [[nodiscard]] Result<catalogue::Profile> load(std::string_view name_or_file) const;
+
+  /// The start state for the simulated tool (the file's second YAML document; its own or the
+  /// nearest one it extends). `bad_file` when there is none.
+  [[nodiscard]] Result<catalogue::SimulationFacts> load_simulation(
+      std::string_view name_or_file) const;
+
+  /// Every fault of a file, both documents; empty when it is valid. Error only when the file can
+  /// not be read or found.
+  [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;
+
+  /// All profiles in all folders, sorted by id, shadowed ones left out. Base profiles that say
+  /// `abstract: true` are left out.
+  [[nodiscard]] std::vector<ProfileEntry> list() const;
+
+ private:
+  [[nodiscard]] Result<std::string> locate(std::string_view name_or_file) const;
+
+  std::vector<std::string> folders_;
+};
+
+}  // namespace spindle::files

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "spindle/link/session.hpp"
+
+namespace spindle::link {
+
+/// A run of registers of one table. `count` >= 1.
+struct RegisterRange {
+  modbus::RegisterTable table = modbus::RegisterTable::holding;
+  std::uint16_t first = 0;
+  std::uint16_t count = 1;
+  friend auto operator<=>(const RegisterRange&, const RegisterRange&) = default;
+};
+
+/// What a server allows, from the profile.
+struct ReadLimits {
+  std::uint16_t max_read = modbus::max_read_count;
+  /// Areas in which registers that nobody asked for may be read along to save a request.
+  std::vector<RegisterRange> contiguous = {};
+  /// A read whose answer would look like a spontaneous frame; never issued.
+  std::optional<RegisterRange> forbidden_shape =
+      std::nullopt;  // table and count; `first` is ignored
+};
+
+/// Requests that cover all wanted ranges: none longer than the limit, none of the forbidden shape,
+/// no wanted range split (a 32-bit pair stays in one answer), gaps bridged only inside contiguous
+/// areas and never across `absent` registers. Pure. A wanted range longer than max_read is split.
+std::vector<RegisterRange> plan_reads(std::vector<RegisterRange> wanted, const ReadLimits& limits,
+                                      const std::set<std::uint32_t>& absent = {});
+
+/// Key of one register in sets and maps.
+constexpr std::uint32_t register_key(modbus::RegisterTable table, std::uint16_t address) {
+  return (table == modbus::RegisterTable::input ? 0x10000U : 0U) | address;
+}
+
+/// What reading many registers gave: a value, "absent" or an error for each.
+class RegisterImage {
+ public:
+  void store(const RegisterRange& range, RegisterView values);
+  void fail(const RegisterRange& range, const Error& error);
+  /// All registers of the range, or the first error among them.
+  [[nodiscard]] Result<Registers> get(const RegisterRange& range) const;
+
+ private:
+  std::map<std::uint32_t, std::uint16_t> values_;
+  std::map<std::uint32_t, Error> errors_;
+};
+
+/// Reads and writes within what the server allows. Only reads are repeated, and only when no answer
+/// came.
+class Client {
+ public:
+  Client(Session& session, ReadLimits limits, unsigned retries);
+
+  /// One request (FC 03/04). An exception response becomes `exception_response` with its code.
+  Result<Registers> read(const RegisterRange& range);
+
+  /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
+  /// bisected and the registers that do not exist are remembered for later calls. A broken link or
+  /// an interrupt ends it at once and is the result; any other trouble stands in the image at the
+  /// registers concerned.
+  Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted);
+
+  /// FC 06, sent once. Its answer is the echo, which proves nothing about the device's state.
+  Result<void> write(modbus::RegisterAddress address, std::uint16_t value);
+  /// FC 10h, sent once.
+  Result<void> write(modbus::RegisterAddress first, RegisterView values);
+
+  /// FC 11h; the device-specific bytes.
+  Result<Bytes> report_server_id();
+  /// FC 08 00 with `word`.
+  Result<void> loopback(std::uint16_t word);
+
+  [[nodiscard]] Session& session() { return *session_; }
+
+ private:
+  Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
+  Result<void> read_or_bisect(const RegisterRange& range, const std::set<std::uint32_t>& wanted,
+                              RegisterImage& image);
+
+  Session* session_;
+  ReadLimits limits_;
+  unsigned retries_;
+  std::set<std::uint32_t> absent_ = {};
+};
+
+}  // namespace spindle::link

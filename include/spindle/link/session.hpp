@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "spindle/link/demux.hpp"
+#include "spindle/link/trace.hpp"
+#include "spindle/link/transport.hpp"
+
+namespace spindle::link {
+
+struct SessionOptions {
+  DemuxRules rules = {};
+  modbus::UnitId unit = {};
+  Duration answer_timeout = std::chrono::seconds(1);
+  /// RTU: silence kept before each request, from the last byte in either direction.
+  Duration gap = Duration::zero();
+  /// RTU: silence after a broadcast before the next request.
+  Duration broadcast_gap = Duration::zero();
+  /// RTU: time that one character needs on the line; a lower bound where the port cannot tell when
+  /// sending ended.
+  Duration character_time = Duration::zero();
+  /// RTU: whether the line is proved with FC 08 after a quarantine.
+  enum class Proof : std::uint8_t { none, loopback } proof = Proof::none;
+};
+
+/// A frame that nobody asked for, with the time when its last byte arrived.
+struct Spontaneous {
+  modbus::Pdu pdu;
+  TimePoint arrival;
+  WallTime wall;
+};
+
+struct SessionCounters {
+  std::uint64_t requests = 0;
+  std::uint64_t strays = 0;  ///< late answers included
+  std::uint64_t spontaneous = 0;
+  std::uint64_t overflowed = 0;   ///< spontaneous frames dropped because nobody took them
+  std::uint64_t noise_bytes = 0;  ///< skipped before RTU frames
+};
+
+/// The dialogue on one connection: one outstanding request, everything else sorted by judge(). What
+/// arrives while somebody waits for something else is kept, not dropped and not mistaken; a late
+/// answer never becomes the next value.
+class Session {
+ public:
+  Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
+          Trace trace = {});
+
+  /// Sends the request and waits for its answer. An exception response is returned as a PDU, not as
+  /// an error. Errors: those of Transport; `no_answer`; `incomplete_answer` (part of a frame);
+  /// `malformed_answer` (a frame with our id that is no answer, or a stream without frame
+  /// boundaries); `bad_checksum` (RTU). All within the answer timeout.
+  Result<modbus::Pdu> transact(const modbus::Pdu& request);
+
+  /// RTU: sends to unit 0. Nobody answers, so success means "sent", never "done".
+  Result<void> broadcast(const modbus::Pdu& request);
+
+  /// The oldest spontaneous frame, waiting for one until the deadline; empty at the deadline.
+  Result<std::optional<Spontaneous>> next_spontaneous(TimePoint deadline);
+
+  /// After this, interrupts no longer end waits on this connection.
+  void shield() { transport_->shield(); }
+
+  void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
+  [[nodiscard]] const SessionOptions& options() const { return options_; }
+  [[nodiscard]] const SessionCounters& counters() const { return counters_; }
+  [[nodiscard]] Clock& clock() const { return *clock_; }
+  /// Time between sending the last request and having its answer.
+  [[nodiscard]] Duration last_round_trip() const { return last_round_trip_; }
+
+ private:
+  struct Outstanding;
+
+  Result<void> send(const modbus::Adu& adu);
+  Result<modbus::Pdu> await(Outstanding& outstanding);
+  Result<bool> fill(TimePoint deadline);
+  Result<std::optional<modbus::Adu>> take_frame();
+  void sort(const modbus::Adu& received, Outstanding* outstanding);
+  Result<void> keep_gap();
+  Result<void> leave_quarantine();
+  Error timeout_error(const Outstanding& outstanding) const;
+  void decide(Decision decision, const modbus::Adu& adu) const;
+
+  std::unique_ptr<Transport> transport_;
+  Clock* clock_;
+  SessionOptions options_;
+  Trace trace_;
+  SessionCounters counters_ = {};
+  Bytes buffer_ = {};
+  std::deque<Spontaneous> queue_ = {};
+  std::uint16_t next_transaction_ = 0x8000;
+  TimePoint last_activity_ = {};
+  TimePoint quiet_until_ = {};
+  bool quarantined_ = false;
+  bool lost_boundaries_ = false;
+  Duration last_round_trip_ = {};
+};
+
+}  // namespace spindle::link

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+#include "spindle/base/bytes.hpp"
+#include "spindle/base/clock.hpp"
+
+namespace spindle::link {
+
+enum class Direction : std::uint8_t { sent, received };
+
+/// What a session did with a frame, or decided on its own.
+enum class Decision : std::uint8_t {
+  request,
+  answer,
+  exception_response,
+  spontaneous,
+  broken,
+  stray,
+  late,
+  junk,
+  retry,
+  quarantine
+};
+
+/// Hears every frame and every decision of one connection, for --verbose. Either function may be
+/// empty.
+struct Trace {
+  std::function<void(Direction, ByteView bytes)> bytes;
+  std::function<void(Decision, std::string_view text)> decision;
+};
+
+}  // namespace spindle::link

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "spindle/base/clock.hpp"
+#include "spindle/base/interrupt.hpp"
+
+namespace spindle::posix {
+
+/// CLOCK_MONOTONIC and CLOCK_REALTIME. Sleeping polls the interrupt's descriptor.
+class SteadyClock final : public Clock {
+ public:
+  explicit SteadyClock(const Interrupt& interrupt) : interrupt_(&interrupt) {}
+  [[nodiscard]] TimePoint now() const override;
+  [[nodiscard]] WallTime wall() const override;
+  Result<void> sleep_until(TimePoint deadline) override;
+
+ private:
+  const Interrupt* interrupt_;
+};
+
+}  // namespace spindle::posix

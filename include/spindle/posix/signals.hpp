@@ -1,0 +1,22 @@
+#pragma once
+
+#include "spindle/base/interrupt.hpp"
+
+namespace spindle::posix {
+
+/// Owns the process's Interrupt while it lives: SIGINT and SIGTERM raise it and make its eventfd
+/// readable (it stays readable); a second signal ends the process at once with 128 + its number.
+/// SIGPIPE is ignored. At most one may exist.
+class SignalWatch {
+ public:
+  SignalWatch();
+  ~SignalWatch();
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+  [[nodiscard]] const Interrupt& interrupt() const { return interrupt_; }
+
+ private:
+  Interrupt interrupt_;
+};
+
+}  // namespace spindle::posix

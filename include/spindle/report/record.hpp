@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "spindle/base/clock.hpp"
+#include "spindle/base/decimal.hpp"
+
+namespace spindle::report {
+
+using Words = std::vector<std::uint16_t>;
+using Texts = std::vector<std::string>;
+using Pairs = std::vector<std::pair<std::string, std::string>>;
+
+/// One fact of a record: null, number, text, truth, words, texts, or an object of texts.
+using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Texts, Pairs>;
+
+struct Field {
+  std::string key;  ///< snake_case, as in the contract's table of record types
+  Cell cell;
+  std::string shown = {};  ///< what people see instead, in tables and CSV; empty: the cell itself
+};
+
+/// What commands produce. Renderers decide how it looks.
+struct Record {
+  std::string type;    ///< "value", "identity", "summary", …
+  std::string target;  ///< empty: null in JSON
+  WallTime time;
+  std::vector<Field> fields;
+
+  [[nodiscard]] const Field* find(std::string_view key) const;
+};
+
+/// "2026-11-22T10:15:30.123Z".
+std::string to_text(WallTime time);
+
+/// Plain text of a cell, as in CSV: null is empty, words are separated by single spaces.
+std::string to_text(const Cell& cell);
+
+}  // namespace spindle::report

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "spindle/base/error.hpp"
+#include "spindle/report/record.hpp"
+#include "spindle/report/streams.hpp"
+
+namespace spindle::report {
+
+enum class Format : std::uint8_t { table, json, csv };
+enum class Align : std::uint8_t { left, right };
+
+/// A column of a table or CSV file, filled from the field with this key ("target" is the record's
+/// target).
+struct Column {
+  std::string title;
+  std::string key;
+  Align align = Align::left;
+};
+
+/// Draws records. Every function fails only with `closed_pipe` or `internal` (the stream cannot be
+/// written). Not thread-safe: commands with several tools put a mutex around it.
+class Renderer {
+ public:
+  Renderer() = default;
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+  virtual ~Renderer() = default;
+
+  /// Announces the columns of the records to come. JSON ignores it.
+  virtual Result<void> begin(std::span<const Column> columns) = 0;
+  virtual Result<void> record(const Record& record) = 0;
+  /// Draws what was held back to align it. CSV without records still has its header line.
+  virtual Result<void> end() = 0;
+  /// The closing counts: a JSON line on stdout, or `sentence` on stderr.
+  virtual Result<void> summary(const Record& record, std::string_view sentence) = 0;
+  /// The sentence on stderr, and for JSON also an `error` line on stdout.
+  virtual Result<void> error(const Error& error, WallTime time) = 0;
+};
+
+/// Whether summaries and hints for people are wanted (--quiet).
+enum class Talk : std::uint8_t { normal, quiet };
+
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk);
+
+/// The `error` record of the contract.
+Record error_record(const Error& error, WallTime time);
+
+}  // namespace spindle::report

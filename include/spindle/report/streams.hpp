@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "spindle/base/error.hpp"
+
+namespace spindle::report {
+
+enum class Color : std::uint8_t { off, on };
+
+/// The three standard streams, as functions so that tests can catch them.
+struct Streams {
+  /// Writes and flushes; `closed_pipe` when nobody reads any more.
+  std::function<Result<void>(std::string_view)> out;
+  /// Never fails: there is nobody left to tell.
+  std::function<void(std::string_view)> err;
+  /// One line from the user without its end; empty at end of input.
+  std::function<std::optional<std::string>()> read_line;
+  bool in_is_terminal = false;
+  bool out_is_terminal = false;
+  bool err_is_terminal = false;
+  Color color = Color::off;
+};
+
+}  // namespace spindle::report

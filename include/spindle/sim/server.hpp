@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "spindle/base/clock.hpp"
+#include "spindle/modbus/types.hpp"
+
+namespace spindle::sim {
+
+/// Tells the clients of one simulated server apart.
+struct ConnectionId {
+  std::uint32_t value = 0;
+  friend auto operator<=>(const ConnectionId&, const ConnectionId&) = default;
+};
+
+/// A PDU that the tool sends unasked to one client.
+struct Push {
+  ConnectionId connection;
+  modbus::Pdu pdu;
+};
+
+/// A simulated tool as a state machine over time: PDU in, PDU out. It never waits and never reads a
+/// clock; whoever drives it says what time it is. Not thread-safe.
+class Server {
+ public:
+  Server() = default;
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  virtual ~Server() = default;
+
+  /// The response to one request (normal or exception), or nothing when the tool stays silent.
+  /// Calls advance(now) itself.
+  virtual std::optional<modbus::Pdu> answer(ConnectionId connection, modbus::UnitId unit,
+                                            const modbus::Pdu& request, TimePoint now) = 0;
+
+  /// Lets time pass: motion, torque, expiring output, operators.
+  virtual void advance(TimePoint now) = 0;
+
+  /// When something will next happen by itself; empty when nothing is due.
+  [[nodiscard]] virtual std::optional<TimePoint> next_change() const = 0;
+
+  /// Frames that became due since the last call, oldest first.
+  virtual std::vector<Push> take_pushes() = 0;
+
+  virtual void connected(ConnectionId connection) = 0;
+  virtual void disconnected(ConnectionId connection) = 0;
+};
+
+}  // namespace spindle::sim
