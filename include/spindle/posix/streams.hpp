@@ -1,11 +1,24 @@
 #pragma once
 
-#include "spindle/report/streams.hpp"
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "spindle/base/error.hpp"
 
 namespace spindle::posix {
 
-/// The process's standard streams, unbuffered beyond one call. Colour is left off; the command line
-/// decides.
-report::Streams standard_streams();
+/// Writes everything to standard output; `closed_pipe` when its reader is gone, `internal` (with
+/// the system's words) on any other failure, such as a full disk. Restarts after signals.
+Result<void> write_out(std::string_view text);
+
+/// Writes everything to standard error; failures are ignored, there is nobody left to tell.
+void write_err(std::string_view text);
+
+/// One line from standard input without its end; empty at end of input.
+std::optional<std::string> read_line();
+
+enum class Stream : std::uint8_t { in, out, err };
+bool is_terminal(Stream stream);
 
 }  // namespace spindle::posix

@@ -4,6 +4,7 @@
 
 #include "spindle/base/interrupt.hpp"
 #include "spindle/link/transport.hpp"
+#include "spindle/modbus/adu.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/sim/server.hpp"
 
