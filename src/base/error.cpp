@@ -1,0 +1,177 @@
+#include "spindle/base/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "spindle/base/duration.hpp"
+
+namespace spindle {
+namespace {
+
+constexpr std::array statuses = {
+    StatusInfo{ExitStatus::ok, "ok", "everything asked for was done"},
+    StatusInfo{ExitStatus::negative, "negative",
+               "done, and the answer is no: diff found differences, a remote start ended NG, a "
+               "condition was not met in time"},
+    StatusInfo{ExitStatus::usage, "usage",
+               "the request is wrong: option, name, value outside the range, read-only, not "
+               "confirmed, unverified action not accepted"},
+    StatusInfo{ExitStatus::bad_file, "bad_file", "a profile, backup or tools file cannot be used"},
+    StatusInfo{ExitStatus::unreachable, "unreachable",
+               "no connection (name not found, refused, no route, connect timeout, port missing or "
+               "busy)"},
+    StatusInfo{ExitStatus::no_answer, "no_answer",
+               "connected, but no answer in time, or the link broke"},
+    StatusInfo{ExitStatus::refused, "refused", "the tool answered with a Modbus exception"},
+    StatusInfo{ExitStatus::malformed, "malformed", "an answer that breaks the protocol"},
+    StatusInfo{ExitStatus::mismatch, "mismatch",
+               "a read-back, a restore check or the tool's identity differs from what was "
+               "expected"},
+    StatusInfo{ExitStatus::partial, "partial", "several targets or parameters, and some failed"},
+    StatusInfo{ExitStatus::internal, "internal", "a bug in spindle"},
+    StatusInfo{ExitStatus::interrupted, "interrupted", "SIGINT, after the tool was left safe"},
+    StatusInfo{ExitStatus::terminated, "interrupted", "SIGTERM, after the tool was left safe"},
+};
+
+constexpr std::array errors = {
+    ErrcInfo{Errc::negative, ExitStatus::negative, "done, and the answer is no", ""},
+    ErrcInfo{Errc::usage, ExitStatus::usage, "the request is wrong",
+             "see 'spindle COMMAND --help'"},
+    ErrcInfo{Errc::unknown_name, ExitStatus::usage, "unknown name",
+             "'spindle list' shows the names that the profile knows"},
+    ErrcInfo{Errc::bad_value, ExitStatus::usage, "the value does not fit its type",
+             "'spindle list' shows type, labels and unit"},
+    ErrcInfo{Errc::out_of_range, ExitStatus::usage, "the value is outside the range",
+             "'spindle list' shows the range"},
+    ErrcInfo{Errc::read_only, ExitStatus::usage, "read-only, it cannot be written",
+             "'spindle list' shows what can be written"},
+    ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed",
+             "answer the question, or give --yes"},
+    ErrcInfo{Errc::unverified, ExitStatus::usage,
+             "nobody has verified this action on this product, nothing was sent",
+             "check it on the tool, then give --accept-unverified or list it under 'verified' in "
+             "the tools file"},
+    ErrcInfo{Errc::bad_file, ExitStatus::bad_file, "the file cannot be used", ""},
+    ErrcInfo{Errc::bad_target, ExitStatus::usage, "this is not a target",
+             "give a name from the tools file, tcp://HOST[:PORT], rtu:///dev/ttyUSB0?unit=1 or "
+             "sim:PROFILE"},
+    ErrcInfo{Errc::name_not_found, ExitStatus::unreachable, "the host name was not found",
+             "check the spelling, or use the tool's IP address"},
+    ErrcInfo{Errc::connection_refused, ExitStatus::unreachable, "connection refused",
+             "is this the tool's address and port? another client may hold its only session"},
+    ErrcInfo{Errc::no_route, ExitStatus::unreachable, "no route to the tool",
+             "is this computer in the tool's network? check cable, Wi-Fi and address"},
+    ErrcInfo{Errc::connect_timeout, ExitStatus::unreachable, "no connection within {waited}",
+             "the tool may be asleep, switched off or out of Wi-Fi range"},
+    ErrcInfo{Errc::port_missing, ExitStatus::unreachable, "there is no such serial port",
+             "is the adapter plugged in? 'ls /dev/serial/by-id' shows the ones that are"},
+    ErrcInfo{Errc::port_busy, ExitStatus::unreachable,
+             "the serial port is in use by another program",
+             "close the other program; 'fuser -v' and the port's path show which it is"},
+    ErrcInfo{Errc::port_unusable, ExitStatus::unreachable,
+             "the serial port cannot be used with these settings",
+             "check your permission (group dialout), and that the adapter supports baud rate and "
+             "parity"},
+    ErrcInfo{Errc::no_answer, ExitStatus::no_answer,
+             "connected, but no answer to '{tried}' within {waited}",
+             "the tool may be asleep, or another client holds its session"},
+    ErrcInfo{Errc::incomplete_answer, ExitStatus::no_answer,
+             "the answer to '{tried}' began but was not complete within {waited}",
+             "the link is weak or slow: try again, or a longer --timeout"},
+    ErrcInfo{Errc::closed, ExitStatus::no_answer, "the tool closed the connection during '{tried}'",
+             "another client may have taken its session, or the tool went to sleep; try again"},
+    ErrcInfo{Errc::reset, ExitStatus::no_answer, "the connection was reset during '{tried}'",
+             "the tool may have restarted or lost the Wi-Fi; try again"},
+    ErrcInfo{Errc::exception_response, ExitStatus::refused,
+             "the tool refused '{tried}' with {exception}", ""},
+    ErrcInfo{Errc::malformed_answer, ExitStatus::malformed,
+             "the answer to '{tried}' breaks the protocol",
+             "is this a Modbus tool of this kind? --verbose shows the bytes"},
+    ErrcInfo{Errc::bad_checksum, ExitStatus::malformed,
+             "the answer to '{tried}' has a wrong checksum",
+             "check wiring, termination, baud rate and parity; is another client on the line?"},
+    ErrcInfo{Errc::local_echo, ExitStatus::malformed,
+             "only the echo of '{tried}' came back, no tool answered",
+             "the adapter echoes what it sends: check the wiring and the unit address"},
+    ErrcInfo{Errc::mismatch, ExitStatus::mismatch, "differs from what was expected", ""},
+    ErrcInfo{Errc::wrong_generation, ExitStatus::mismatch,
+             "the tool is of another generation than this profile",
+             "its registers mean other things: only raw registers can be read"},
+    ErrcInfo{Errc::wrong_model, ExitStatus::mismatch, "the tool is another model than expected",
+             "check the target, or give the profile that fits"},
+    ErrcInfo{Errc::partial, ExitStatus::partial, "some of it failed", ""},
+    ErrcInfo{Errc::internal, ExitStatus::internal, "internal error",
+             "this is a bug in spindle: please report it with the output of --verbose"},
+    ErrcInfo{Errc::interrupted, ExitStatus::interrupted, "interrupted", ""},
+    ErrcInfo{Errc::terminated, ExitStatus::terminated, "terminated", ""},
+    ErrcInfo{Errc::closed_pipe, ExitStatus::ok, "nobody reads the output any more", ""},
+};
+
+// info() finds a row by its place.
+constexpr bool rows_are_in_order() {
+  for (std::size_t row = 0; row < errors.size(); ++row) {
+    if (errors[row].code != static_cast<Errc>(row)) return false;
+  }
+  return errors.back().code == Errc::closed_pipe;
+}
+static_assert(rows_are_in_order());
+
+void replace(std::string& text, std::string_view what, std::string_view by) {
+  const std::size_t at = text.find(what);
+  if (at != std::string::npos) text.replace(at, what.size(), by);
+}
+
+// A measured time has digits that nobody wants to read.
+std::string waited_text(Duration waited) {
+  using std::chrono::milliseconds;
+  if (waited < milliseconds(1)) return to_text(waited);
+  return to_text(std::chrono::duration_cast<milliseconds>(waited));
+}
+
+std::string expand(std::string_view sentence, const Error& error) {
+  std::string text(sentence);
+  replace(text, "'{tried}'", error.tried.empty() ? "the request" : "'" + error.tried + "'");
+  replace(text, "{waited}", error.waited ? waited_text(*error.waited) : "the time allowed");
+  replace(text, "{exception}",
+          error.exception ? fmt::format("exception 0x{:02X}", *error.exception) : "an exception");
+  return text;
+}
+
+}  // namespace
+
+std::span<const StatusInfo> status_table() { return statuses; }
+
+std::span<const ErrcInfo> errc_table() { return errors; }
+
+const StatusInfo& info(ExitStatus status) {
+  const auto* row = std::ranges::find(statuses, status, &StatusInfo::status);
+  return row != statuses.end() ? *row : info(ExitStatus::internal);
+}
+
+const ErrcInfo& info(Errc code) { return errors[static_cast<std::size_t>(code)]; }
+
+std::string message_of(const Error& error) {
+  return error.message.empty() ? expand(info(error.code).text, error) : error.message;
+}
+
+std::string hint_of(const Error& error) {
+  return error.hint.empty() ? std::string(info(error.code).hint) : error.hint;
+}
+
+std::string describe(const Error& error) {
+  std::string text;
+  for (const std::string* part : {&error.target, &error.name}) {
+    if (!part->empty()) text += *part + ": ";
+  }
+  text += message_of(error);
+  const std::string hint = hint_of(error);
+  if (!hint.empty()) text += "; " + hint;
+  // Names and messages may quote foreign text; it must break neither the line nor the terminal.
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
+  return text;
+}
+
+}  // namespace spindle

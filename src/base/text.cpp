@@ -1,0 +1,144 @@
+#include "spindle/base/text.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace spindle {
+namespace {
+
+// The set of a bracket expression such as "[!a-z]".
+struct Bracket {
+  std::string_view members;
+  std::size_t length = 0;  // of the whole expression in the pattern
+  bool negated = false;
+};
+
+// `pattern` begins with '['. Empty when the bracket is never closed.
+std::optional<Bracket> read_bracket(std::string_view pattern) {
+  Bracket bracket;
+  std::size_t first = 1;
+  if (pattern.substr(first).starts_with('!')) {
+    bracket.negated = true;
+    ++first;
+  }
+  const std::size_t close = pattern.find(']', first + 1);  // a ']' in the first place is a member
+  if (close == std::string_view::npos) return std::nullopt;
+  bracket.members = pattern.substr(first, close - first);
+  bracket.length = close + 1;
+  return bracket;
+}
+
+bool contains(std::string_view members, char c) {
+  const auto code = [](char member) { return static_cast<unsigned char>(member); };
+  while (!members.empty()) {
+    const bool is_range = members.size() >= 3 && members[1] == '-';
+    const char last = is_range ? members[2] : members[0];
+    if (code(members[0]) <= code(c) && code(c) <= code(last)) return true;
+    members.remove_prefix(is_range ? 3 : 1);
+  }
+  return false;
+}
+
+// How much of the pattern matches one character `c`; 0 when it does not match.
+std::size_t match_one(std::string_view pattern, char c) {
+  if (pattern.empty()) return 0;
+  if (pattern.front() == '?') return 1;
+  if (pattern.front() == '[') {
+    if (const auto bracket = read_bracket(pattern)) {
+      return contains(bracket->members, c) != bracket->negated ? bracket->length : 0;
+    }
+  }
+  return pattern.front() == c ? 1 : 0;
+}
+
+// Damerau-Levenshtein in its restricted form: no part is edited twice.
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before_previous(b.size() + 1);
+  std::vector<std::size_t> previous(b.size() + 1);
+  std::vector<std::size_t> current(b.size() + 1);
+  std::iota(previous.begin(), previous.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    current[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = previous[j - 1] + (a[i - 1] == b[j - 1] ? 0U : 1U);
+      current[j] = std::min({previous[j] + 1, current[j - 1] + 1, replaced});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) current[j] = std::min(current[j], before_previous[j - 2] + 1);
+    }
+    std::swap(before_previous, previous);
+    std::swap(previous, current);
+  }
+  return previous[b.size()];
+}
+
+}  // namespace
+
+bool glob_match(std::string_view pattern, std::string_view text) {
+  // On a mismatch only the last star needs to take one character more: whatever an earlier one
+  // took, the later one can make up for.
+  std::optional<std::pair<std::string_view, std::string_view>> after_star;
+  while (!text.empty()) {
+    if (pattern.starts_with('*')) {
+      pattern.remove_prefix(1);
+      after_star = {pattern, text};
+    } else if (const std::size_t matched = match_one(pattern, text.front()); matched > 0) {
+      pattern.remove_prefix(matched);
+      text.remove_prefix(1);
+    } else if (after_star) {
+      after_star->second.remove_prefix(1);
+      std::tie(pattern, text) = *after_star;
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*') == std::string_view::npos;
+}
+
+bool is_pattern(std::string_view text) {
+  return text.find_first_of("*?[") != std::string_view::npos;
+}
+
+std::optional<std::string> closest(std::string_view word,
+                                   const std::vector<std::string>& candidates) {
+  const std::string* nearest = nullptr;
+  std::size_t limit = std::max<std::size_t>(1, word.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    const std::size_t far = distance(word, candidate);
+    if (far < limit) {
+      nearest = &candidate;
+      limit = far;
+    }
+  }
+  if (nearest == nullptr) return std::nullopt;
+  return *nearest;
+}
+
+std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {
+  const auto nearest = closest(word, candidates);
+  return nearest ? "did you mean '" + *nearest + "'?" : std::string{};
+}
+
+std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t maximum) {
+  const bool hexadecimal = text.starts_with("0x");
+  if (hexadecimal) text.remove_prefix(2);
+  std::uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stopped, problem] = std::from_chars(text.data(), end, number, hexadecimal ? 16 : 10);
+  if (problem != std::errc{} || stopped != end || number > maximum) return std::nullopt;
+  return number;
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t at = text.find(separator);
+    parts.push_back(text.substr(0, at));
+    if (at == std::string_view::npos) return parts;
+    text.remove_prefix(at + 1);
+  }
+}
+
+}  // namespace spindle
