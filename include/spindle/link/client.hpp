@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -29,11 +30,18 @@ struct ReadLimits {
       std::nullopt;  // table and count; `first` is ignored
 };
 
+/// One request of a plan, and the wanted ranges whose registers its answer brings.
+struct PlannedRead {
+  RegisterRange range;
+  std::vector<RegisterRange> wanted;  ///< ascending; the first begins and the last ends the range
+};
+
 /// Requests that cover all wanted ranges: none longer than the limit, none of the forbidden shape,
-/// no wanted range split (a 32-bit pair stays in one answer), gaps bridged only inside contiguous
-/// areas and never across `absent` registers. Pure. A wanted range longer than max_read is split.
-std::vector<RegisterRange> plan_reads(std::vector<RegisterRange> wanted, const ReadLimits& limits,
-                                      const std::set<std::uint32_t>& absent = {});
+/// no wanted range split (a 32-bit pair stays in one answer) unless it alone is too long or
+/// forbidden, gaps bridged only inside contiguous areas and never across `absent` registers. Pure.
+std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
+                                    const ReadLimits& limits,
+                                    const std::set<std::uint32_t>& absent = {});
 
 /// Key of one register in sets and maps.
 constexpr std::uint32_t register_key(modbus::RegisterTable table, std::uint16_t address) {
@@ -53,6 +61,9 @@ class RegisterImage {
   std::map<std::uint32_t, Error> errors_;
 };
 
+/// Hears how much of a long job is done.
+using Progress = std::function<void(std::size_t done, std::size_t total)>;
+
 /// Reads and writes within what the server allows. Only reads are repeated, and only when no answer
 /// came.
 class Client {
@@ -63,10 +74,11 @@ class Client {
   Result<Registers> read(const RegisterRange& range);
 
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
-  /// bisected and the registers that do not exist are remembered for later calls. A broken link or
-  /// an interrupt ends it at once and is the result; any other trouble stands in the image at the
-  /// registers concerned.
-  Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted);
+  /// bisected, and the registers that do not exist are remembered for later calls. Other exception
+  /// responses stand in the image at the registers concerned; anything else ends it at once and is
+  /// the result. `progress` hears how many of how many requests of the plan are done.
+  Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted,
+                                  const Progress& progress = {});
 
   /// FC 06, sent once. Its answer is the echo, which proves nothing about the device's state.
   Result<void> write(modbus::RegisterAddress address, std::uint16_t value);
@@ -82,8 +94,8 @@ class Client {
 
  private:
   Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
-  Result<void> read_or_bisect(const RegisterRange& range, const std::set<std::uint32_t>& wanted,
-                              RegisterImage& image);
+  Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image);
+  void remember(const PlannedRead& refused, const Error& error, RegisterImage& image);
 
   Session* session_;
   ReadLimits limits_;

@@ -75,11 +75,13 @@ class Session {
  private:
   struct Outstanding;
 
+  Result<modbus::Pdu> exchange(const modbus::Pdu& request);
   Result<void> send(const modbus::Adu& adu);
   Result<modbus::Pdu> await(Outstanding& outstanding);
   Result<bool> fill(TimePoint deadline);
   Result<std::optional<modbus::Adu>> take_frame();
   void sort(const modbus::Adu& received, Outstanding* outstanding);
+  void keep(const modbus::Pdu& pdu);
   Result<void> keep_gap();
   Result<void> leave_quarantine();
   Error timeout_error(const Outstanding& outstanding) const;
@@ -94,9 +96,7 @@ class Session {
   std::deque<Spontaneous> queue_ = {};
   std::uint16_t next_transaction_ = 0x8000;
   TimePoint last_activity_ = {};
-  TimePoint quiet_until_ = {};
   bool quarantined_ = false;
-  bool lost_boundaries_ = false;
   Duration last_round_trip_ = {};
 };
 

@@ -1,0 +1,237 @@
+#include "spindle/link/client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace spindle::link {
+namespace {
+
+std::uint32_t end_of(const RegisterRange& range) {
+  return std::uint32_t{range.first} + range.count;
+}
+
+RegisterRange span_of(const RegisterRange& front, std::uint32_t end) {
+  return {front.table, front.first, static_cast<std::uint16_t>(end - front.first)};
+}
+
+bool is_forbidden(const RegisterRange& range, const ReadLimits& limits) {
+  return limits.forbidden_shape && limits.forbidden_shape->table == range.table &&
+         limits.forbidden_shape->count == range.count;
+}
+
+/// Cuts what alone is too long for one request or has the forbidden shape.
+void append_pieces(RegisterRange range, const ReadLimits& limits,
+                   std::vector<RegisterRange>& pieces) {
+  while (range.count > limits.max_read || is_forbidden(range, limits)) {
+    std::uint16_t size = std::min(range.count, limits.max_read);
+    if (size == range.count || is_forbidden({range.table, range.first, size}, limits)) --size;
+    pieces.push_back({range.table, range.first, size});
+    range = {range.table, static_cast<std::uint16_t>(range.first + size),
+             static_cast<std::uint16_t>(range.count - size)};
+  }
+  pieces.push_back(range);
+}
+
+bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t to,
+                const ReadLimits& limits, const std::set<std::uint32_t>& absent) {
+  if (from >= to) return true;
+  const auto first = register_key(table, static_cast<std::uint16_t>(from));
+  const auto last = register_key(table, static_cast<std::uint16_t>(to - 1));
+  const auto hole = absent.lower_bound(first);
+  if (hole != absent.end() && *hole <= last) return false;
+  return std::any_of(limits.contiguous.begin(), limits.contiguous.end(),
+                     [&](const RegisterRange& area) {
+                       return area.table == table && area.first <= from && to <= end_of(area);
+                     });
+}
+
+void add(std::vector<PlannedRead>& plan, const RegisterRange& piece, const ReadLimits& limits,
+         const std::set<std::uint32_t>& absent) {
+  if (!plan.empty() && plan.back().range.table == piece.table) {
+    PlannedRead& last = plan.back();
+    const std::uint32_t end = std::max(end_of(last.range), end_of(piece));
+    if (end - last.range.first <= limits.max_read &&
+        may_bridge(piece.table, end_of(last.range), piece.first, limits, absent)) {
+      last.range = span_of(last.range, end);
+      last.wanted.push_back(piece);
+      return;
+    }
+  }
+  plan.push_back({piece, {piece}});
+}
+
+/// Splits so that `head` keeps all but the last `keep` wanted ranges.
+std::pair<PlannedRead, PlannedRead> split_at(const PlannedRead& planned, std::size_t at) {
+  const auto middle = planned.wanted.begin() + static_cast<std::ptrdiff_t>(at);
+  PlannedRead head{.range = {}, .wanted = {planned.wanted.begin(), middle}};
+  PlannedRead tail{.range = {}, .wanted = {middle, planned.wanted.end()}};
+  for (PlannedRead* part : {&head, &tail}) {
+    std::uint32_t end = 0;
+    for (const RegisterRange& range : part->wanted) end = std::max(end, end_of(range));
+    part->range = span_of(part->wanted.front(), end);
+  }
+  return {std::move(head), std::move(tail)};
+}
+
+void append_allowed(PlannedRead planned, const ReadLimits& limits, std::vector<PlannedRead>& plan) {
+  if (!is_forbidden(planned.range, limits)) {
+    plan.push_back(std::move(planned));
+    return;
+  }
+  auto [head, tail] = split_at(planned, planned.wanted.size() - 1);
+  append_allowed(std::move(head), limits, plan);
+  append_allowed(std::move(tail), limits, plan);
+}
+
+Error exception_error(const modbus::Pdu& request, std::uint8_t code) {
+  const std::string tried = modbus::describe_request(request);
+  const std::string_view name = modbus::exception_name(code);
+  return {.code = Errc::exception_response,
+          .message = name.empty()
+                         ? fmt::format("the tool refused '{}' with exception {:02X}", tried, code)
+                         : fmt::format("the tool refused '{}' with exception {:02X} ({})", tried,
+                                       code, name),
+          .tried = tried,
+          .exception = code};
+}
+
+bool is_missing_register(const Error& error) {
+  return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
+}
+
+}  // namespace
+
+std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
+                                    const ReadLimits& limits,
+                                    const std::set<std::uint32_t>& absent) {
+  std::vector<RegisterRange> pieces;
+  for (const RegisterRange& range : wanted) append_pieces(range, limits, pieces);
+  std::sort(pieces.begin(), pieces.end());
+  pieces.erase(std::unique(pieces.begin(), pieces.end()), pieces.end());
+  std::vector<PlannedRead> merged;
+  for (const RegisterRange& piece : pieces) add(merged, piece, limits, absent);
+  std::vector<PlannedRead> plan;
+  for (PlannedRead& planned : merged) append_allowed(std::move(planned), limits, plan);
+  return plan;
+}
+
+void RegisterImage::store(const RegisterRange& range, RegisterView values) {
+  std::uint32_t key = register_key(range.table, range.first);
+  for (const std::uint16_t value : values) values_.insert_or_assign(values_.end(), key++, value);
+}
+
+void RegisterImage::fail(const RegisterRange& range, const Error& error) {
+  const std::uint32_t first = register_key(range.table, range.first);
+  for (std::uint32_t key = first; key < first + range.count; ++key) {
+    errors_.insert_or_assign(key, error);
+  }
+}
+
+Result<Registers> RegisterImage::get(const RegisterRange& range) const {
+  Registers registers;
+  registers.reserve(range.count);
+  const std::uint32_t first = register_key(range.table, range.first);
+  for (std::uint32_t key = first; key < first + range.count; ++key) {
+    if (const auto value = values_.find(key); value != values_.end()) {
+      registers.push_back(value->second);
+      continue;
+    }
+    if (const auto error = errors_.find(key); error != errors_.end()) {
+      return tl::unexpected(error->second);
+    }
+    return tl::unexpected(Error{.code = Errc::internal,
+                                .message = "a register was asked for that had not been read",
+                                .register_address = static_cast<std::uint16_t>(key)});
+  }
+  return registers;
+}
+
+Client::Client(Session& session, ReadLimits limits, unsigned retries)
+    : session_(&session), limits_(std::move(limits)), retries_(retries) {}
+
+Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries) {
+  auto response = session_->transact(request);
+  for (unsigned retry = 0; retry < retries && !response && response.error().code == Errc::no_answer;
+       ++retry) {
+    response = session_->transact(request);
+  }
+  if (!response) return response;
+  if (const auto code = modbus::exception_of(*response)) {
+    return tl::unexpected(exception_error(request, *code));
+  }
+  return response;
+}
+
+Result<Registers> Client::read(const RegisterRange& range) {
+  const auto request = modbus::read_request(range.table, {range.first}, range.count);
+  return ask(request, retries_).map(modbus::registers_of);
+}
+
+Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
+                                        const Progress& progress) {
+  RegisterImage image;
+  const auto plan = plan_reads(wanted, limits_, absent_);
+  std::size_t done = 0;
+  for (const PlannedRead& planned : plan) {
+    if (auto read = read_or_bisect(planned, image); !read) return tl::unexpected(read.error());
+    if (progress) progress(++done, plan.size());
+  }
+  return image;
+}
+
+Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& image) {
+  std::vector<PlannedRead> allowed;  // a half may have the shape that the whole had not
+  append_allowed(planned, limits_, allowed);
+  for (const PlannedRead& part : allowed) {
+    auto registers = read(part.range);
+    if (registers) {
+      image.store(part.range, *registers);
+      continue;
+    }
+    if (registers.error().code != Errc::exception_response) {
+      return tl::unexpected(std::move(registers.error()));
+    }
+    if (!is_missing_register(registers.error()) || part.wanted.size() == 1) {
+      remember(part, registers.error(), image);
+      continue;
+    }
+    const auto [head, tail] = split_at(part, part.wanted.size() / 2);
+    if (auto read_head = read_or_bisect(head, image); !read_head) return read_head;
+    if (auto read_tail = read_or_bisect(tail, image); !read_tail) return read_tail;
+  }
+  return {};
+}
+
+void Client::remember(const PlannedRead& refused, const Error& error, RegisterImage& image) {
+  for (const RegisterRange& range : refused.wanted) {
+    Error located = error;
+    located.register_address = range.first;
+    image.fail(range, located);
+    if (!is_missing_register(error)) continue;
+    const std::uint32_t first = register_key(range.table, range.first);
+    for (std::uint32_t key = first; key < first + range.count; ++key) absent_.insert(key);
+  }
+}
+
+Result<void> Client::write(modbus::RegisterAddress address, std::uint16_t value) {
+  return ask(modbus::write_request(address, value), 0).map([](const modbus::Pdu&) {});
+}
+
+Result<void> Client::write(modbus::RegisterAddress first, RegisterView values) {
+  return ask(modbus::write_request(first, values), 0).map([](const modbus::Pdu&) {});
+}
+
+Result<Bytes> Client::report_server_id() {
+  return ask(modbus::report_server_id_request(), retries_).map([](const modbus::Pdu& response) {
+    const ByteView data = modbus::server_id_of(response);
+    return Bytes(data.begin(), data.end());
+  });
+}
+
+Result<void> Client::loopback(std::uint16_t word) {
+  return ask(modbus::loopback_request(word), retries_).map([](const modbus::Pdu&) {});
+}
+
+}  // namespace spindle::link

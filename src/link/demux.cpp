@@ -1,0 +1,39 @@
+#include "spindle/link/demux.hpp"
+
+#include <algorithm>
+
+namespace spindle::link {
+namespace {
+
+bool is_spontaneous(const modbus::Pdu& pdu, const DemuxRules& rules) {
+  return std::any_of(rules.spontaneous.begin(), rules.spontaneous.end(),
+                     [&](const SpontaneousShape& shape) {
+                       return pdu.function == shape.function && !pdu.data.empty() &&
+                              pdu.data.front() == shape.byte_count &&
+                              pdu.data.size() == std::size_t{1} + shape.byte_count;
+                     });
+}
+
+bool is_addressed(const modbus::Adu& outstanding, const modbus::Adu& received,
+                  modbus::Framing framing) {
+  return framing == modbus::Framing::tcp ? outstanding.transaction == received.transaction
+                                         : outstanding.unit == received.unit;
+}
+
+}  // namespace
+
+Verdict judge(const modbus::Adu* outstanding, const modbus::Adu& received,
+              const DemuxRules& rules) {
+  using modbus::Fit;
+  const bool addressed =
+      outstanding != nullptr && is_addressed(*outstanding, received, rules.framing);
+  const Fit fit = addressed ? modbus::fit(outstanding->pdu, received.pdu) : Fit::foreign;
+  if (fit == Fit::answer) return Verdict::answer;
+  if (fit == Fit::exception_response) return Verdict::exception_response;
+  if (is_spontaneous(received.pdu, rules)) return Verdict::spontaneous;
+  // On a serial line other functions from our unit are late answers; on TCP the id is ours alone.
+  const bool ours = addressed && (fit == Fit::wrong_shape || rules.framing == modbus::Framing::tcp);
+  return ours ? Verdict::broken : Verdict::stray;
+}
+
+}  // namespace spindle::link

@@ -1,0 +1,286 @@
+#include "spindle/link/endpoint.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cctype>
+#include <functional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::link {
+namespace {
+
+constexpr std::uint8_t max_serial_unit = 247;  // Modbus over Serial Line 1.02, 2.2
+
+Error bad_target(std::string_view url, std::string message, std::string hint = {}) {
+  return Error{.code = Errc::bad_target,
+               .message = std::move(message),
+               .hint = std::move(hint),
+               .target = std::string(url)};
+}
+
+struct Scheme {
+  std::string_view name;
+  Medium medium;
+  std::string_view form;
+};
+
+constexpr std::array<Scheme, 4> schemes = {{
+    {"tcp", Medium::tcp, "tcp://HOST[:PORT][?unit=N]"},
+    {"rtu", Medium::serial, "rtu:///dev/ttyUSB0?unit=1"},
+    {"rtu+tcp", Medium::rtu_over_tcp, "rtu+tcp://HOST:PORT?unit=1"},
+    {"sim", Medium::simulated, "sim:PROFILE"},
+}};
+
+std::vector<std::string> scheme_names() {
+  std::vector<std::string> names;
+  for (const Scheme& scheme : schemes) names.emplace_back(scheme.name);
+  return names;
+}
+
+struct Parts {
+  const Scheme* scheme;
+  std::string_view body;   ///< between "scheme:" and '?'
+  std::string_view query;  ///< behind '?'
+};
+
+Result<Parts> take_apart(std::string_view url) {
+  const auto colon = url.find(':');
+  const std::string_view name = url.substr(0, colon);
+  for (const Scheme& scheme : schemes) {
+    if (scheme.name != name) continue;
+    const std::string_view rest = url.substr(colon + 1);
+    const auto question = rest.find('?');
+    return Parts{
+        &scheme, rest.substr(0, question),
+        question == std::string_view::npos ? std::string_view() : rest.substr(question + 1)};
+  }
+  std::string hint = suggestion(name, scheme_names());
+  if (hint.empty())
+    hint = "a target is tcp://HOST, rtu:///DEVICE, rtu+tcp://HOST:PORT or sim:PROFILE";
+  return tl::unexpected(bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint));
+}
+
+Result<void> parse_port(Endpoint& endpoint, std::string_view text) {
+  const auto port = parse_unsigned(text, 65535);
+  if (!port || *port == 0) {
+    return tl::unexpected(
+        bad_target(endpoint.text, fmt::format("'{}' is not a port (1 to 65535)", text)));
+  }
+  endpoint.port = static_cast<std::uint16_t>(*port);
+  return {};
+}
+
+bool is_host_character(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '_';
+}
+
+Result<void> parse_bracketed_host(Endpoint& endpoint, std::string_view authority) {
+  const auto bracket = authority.find(']');
+  if (bracket == std::string_view::npos) {
+    return tl::unexpected(
+        bad_target(endpoint.text, "the bracket of the IPv6 address is not closed"));
+  }
+  endpoint.host = authority.substr(1, bracket - 1);
+  for (const char c : endpoint.host) {
+    if (std::isxdigit(static_cast<unsigned char>(c)) != 0 || c == ':' || c == '.' || c == '%')
+      continue;
+    if (endpoint.host.find('%') != std::string::npos && is_host_character(c)) continue;
+    return tl::unexpected(
+        bad_target(endpoint.text, fmt::format("'{}' is not an IPv6 address", endpoint.host)));
+  }
+  const std::string_view rest = authority.substr(bracket + 1);
+  if (rest.empty()) return {};
+  if (rest.front() != ':') {
+    return tl::unexpected(
+        bad_target(endpoint.text, fmt::format("'{}' behind the IPv6 address is not a port", rest)));
+  }
+  return parse_port(endpoint, rest.substr(1));
+}
+
+Result<void> parse_plain_host(Endpoint& endpoint, std::string_view authority) {
+  const auto colon = authority.find(':');
+  endpoint.host = authority.substr(0, colon);
+  if (authority.find(':', colon + 1) != std::string_view::npos && colon != std::string_view::npos) {
+    return tl::unexpected(
+        bad_target(endpoint.text, "more than one ':' in the host",
+                   "an IPv6 address stands in brackets, such as tcp://[::1]:5000"));
+  }
+  for (const char c : endpoint.host) {
+    if (!is_host_character(c)) {
+      return tl::unexpected(bad_target(
+          endpoint.text, fmt::format("'{}' is not a host name or address", endpoint.host)));
+    }
+  }
+  return colon == std::string_view::npos ? Result<void>()
+                                         : parse_port(endpoint, authority.substr(colon + 1));
+}
+
+Result<void> parse_network(Endpoint& endpoint, std::string_view body, const Scheme& scheme) {
+  if (!body.starts_with("//")) {
+    return tl::unexpected(
+        bad_target(endpoint.text, "'//' is missing", fmt::format("write {}", scheme.form)));
+  }
+  std::string_view authority = body.substr(2);
+  if (authority.ends_with('/')) authority.remove_suffix(1);
+  const bool bracketed = authority.starts_with('[');
+  auto parsed =
+      bracketed ? parse_bracketed_host(endpoint, authority) : parse_plain_host(endpoint, authority);
+  if (!parsed) return parsed;
+  if (endpoint.host.empty()) {
+    return tl::unexpected(
+        bad_target(endpoint.text, "the host is missing", fmt::format("write {}", scheme.form)));
+  }
+  if (endpoint.medium == Medium::rtu_over_tcp && !endpoint.port) {
+    return tl::unexpected(bad_target(endpoint.text, "the port of the device server is missing",
+                                     fmt::format("write {}", scheme.form)));
+  }
+  return {};
+}
+
+Result<void> parse_serial(Endpoint& endpoint, std::string_view body, const Scheme& scheme) {
+  if (body.starts_with("//")) body.remove_prefix(2);
+  if (!body.starts_with('/') || body.size() == 1) {
+    return tl::unexpected(bad_target(endpoint.text, "the path of the serial line is missing",
+                                     fmt::format("write {}", scheme.form)));
+  }
+  endpoint.device = body;
+  return {};
+}
+
+Result<void> parse_simulated(Endpoint& endpoint, std::string_view body) {
+  if (body.starts_with("//")) body.remove_prefix(2);
+  if (body.empty()) {
+    return tl::unexpected(bad_target(endpoint.text, "the profile of the simulated tool is missing",
+                                     "write sim:doga-bm; 'spindle profile list' shows all"));
+  }
+  endpoint.profile = body;
+  return {};
+}
+
+Result<void> parse_body(Endpoint& endpoint, const Parts& parts) {
+  switch (endpoint.medium) {
+    case Medium::serial:
+      return parse_serial(endpoint, parts.body, *parts.scheme);
+    case Medium::simulated:
+      return parse_simulated(endpoint, parts.body);
+    case Medium::tcp:
+    case Medium::rtu_over_tcp:
+      break;
+  }
+  return parse_network(endpoint, parts.body, *parts.scheme);
+}
+
+using Setter = std::function<Result<void>(Endpoint&, std::string_view)>;
+
+struct UrlOption {
+  std::string_view name;
+  bool serial_only;
+  Setter set;
+};
+
+Error bad_option(const Endpoint& endpoint, std::string_view name, std::string_view value,
+                 std::string_view allowed) {
+  return bad_target(endpoint.text, fmt::format("{}={}: {} is {}", name, value, name, allowed));
+}
+
+Result<void> set_unit(Endpoint& endpoint, std::string_view value) {
+  const std::uint8_t maximum = endpoint.medium == Medium::tcp ? 255 : max_serial_unit;
+  const auto unit = parse_unsigned(value, maximum);
+  if (!unit) {
+    return tl::unexpected(
+        bad_option(endpoint, "unit", value, fmt::format("a number from 0 to {}", maximum)));
+  }
+  endpoint.unit = modbus::UnitId{static_cast<std::uint8_t>(*unit)};
+  return {};
+}
+
+Result<void> set_baud(Endpoint& endpoint, std::string_view value) {
+  const auto baud = parse_unsigned(value, 4'000'000);
+  if (!baud || *baud == 0) {
+    return tl::unexpected(bad_option(endpoint, "baud", value, "a rate such as 9600 or 115200"));
+  }
+  endpoint.baud = static_cast<unsigned>(*baud);
+  return {};
+}
+
+Result<void> set_parity(Endpoint& endpoint, std::string_view value) {
+  if (value == "none") endpoint.parity = Parity::none;
+  if (value == "even") endpoint.parity = Parity::even;
+  if (value == "odd") endpoint.parity = Parity::odd;
+  if (!endpoint.parity) {
+    return tl::unexpected(bad_option(endpoint, "parity", value, "none, even or odd"));
+  }
+  return {};
+}
+
+Result<void> set_stop(Endpoint& endpoint, std::string_view value) {
+  const auto bits = parse_unsigned(value, 2);
+  if (!bits || *bits == 0) return tl::unexpected(bad_option(endpoint, "stop", value, "1 or 2"));
+  endpoint.stop_bits = static_cast<unsigned>(*bits);
+  return {};
+}
+
+const std::vector<UrlOption>& url_options() {
+  static const std::vector<UrlOption> options = {{"unit", false, set_unit},
+                                                 {"baud", true, set_baud},
+                                                 {"parity", true, set_parity},
+                                                 {"stop", true, set_stop}};
+  return options;
+}
+
+Result<void> apply_option(Endpoint& endpoint, std::string_view item,
+                          std::set<std::string_view>& seen) {
+  const auto equals = item.find('=');
+  const std::string_view name = item.substr(0, equals);
+  std::vector<std::string> names;
+  for (const UrlOption& option : url_options()) {
+    if (option.serial_only && endpoint.medium != Medium::serial) continue;
+    names.emplace_back(option.name);
+    if (option.name != name) continue;
+    if (equals == std::string_view::npos) {
+      return tl::unexpected(bad_target(endpoint.text, fmt::format("'{}' has no value", name)));
+    }
+    if (!seen.insert(option.name).second) {
+      return tl::unexpected(bad_target(endpoint.text, fmt::format("'{}' is given twice", name)));
+    }
+    return option.set(endpoint, item.substr(equals + 1));
+  }
+  std::string hint = suggestion(name, names);
+  if (hint.empty()) hint = fmt::format("here there is {}", fmt::join(names, ", "));
+  return tl::unexpected(bad_target(endpoint.text, fmt::format("unknown option '{}'", name), hint));
+}
+
+}  // namespace
+
+bool looks_like_url(std::string_view text) {
+  const auto colon = text.find(':');
+  if (colon == std::string_view::npos || colon == 0) return false;
+  for (const char c : text.substr(0, colon)) {
+    if (std::isalpha(static_cast<unsigned char>(c)) == 0 && c != '+') return false;
+  }
+  return true;
+}
+
+Result<Endpoint> parse_endpoint(std::string_view url) {
+  const auto parts = take_apart(url);
+  if (!parts) return tl::unexpected(parts.error());
+  Endpoint endpoint;
+  endpoint.text = url;
+  endpoint.medium = parts->scheme->medium;
+  if (auto parsed = parse_body(endpoint, *parts); !parsed) return tl::unexpected(parsed.error());
+  std::set<std::string_view> seen;
+  if (parts->query.empty()) return endpoint;
+  for (const std::string_view item : split(parts->query, '&')) {
+    if (auto applied = apply_option(endpoint, item, seen); !applied) {
+      return tl::unexpected(applied.error());
+    }
+  }
+  return endpoint;
+}
+
+}  // namespace spindle::link
