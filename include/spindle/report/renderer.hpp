@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "spindle/base/error.hpp"
 #include "spindle/report/record.hpp"
@@ -13,12 +16,15 @@ namespace spindle::report {
 enum class Format : std::uint8_t { table, json, csv };
 enum class Align : std::uint8_t { left, right };
 
-/// A column of a table or CSV file, filled from the field with this key ("target" is the record's
-/// target).
+/// A column of a table or CSV file, filled from the field with this key ("target", "time" and
+/// "type" are the record's own). CSV uses the key as its header.
 struct Column {
   std::string title;
   std::string key;
   Align align = Align::left;
+  /// Terminal cells kept for it, 0: measured. A table all of whose columns have a width is drawn
+  /// row by row instead of at end(), as a stream of events needs.
+  std::size_t width = 0;
 };
 
 /// Draws records. Every function fails only with `closed_pipe` or `internal` (the stream cannot be

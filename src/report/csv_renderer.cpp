@@ -1,0 +1,78 @@
+#include <algorithm>
+
+#include "display.hpp"
+#include "renderers.hpp"
+
+namespace spindle::report {
+namespace {
+
+/// RFC 4180, section 2: rules 5 to 7.
+void append_csv_field(std::string& out, std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
+    out += text;
+    return;
+  }
+  out += '"';
+  for (const char character : text) {
+    if (character == '"') out += '"';
+    out += character;
+  }
+  out += '"';
+}
+
+class CsvRenderer final : public Renderer {
+ public:
+  CsvRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
+
+  Result<void> begin(std::span<const Column> columns) override {
+    std::vector<std::string> keys;
+    keys.reserve(columns.size());
+    for (const Column& column : columns) keys.push_back(column.key);
+    if (keys == keys_) return {};
+    keys_ = std::move(keys);
+    return write_line([](std::string_view key) { return std::string(key); });
+  }
+
+  Result<void> record(const Record& record) override {
+    return write_line([&record](std::string_view key) {
+      return printable(shown_text(record, key), LineBreaks::keep);
+    });
+  }
+
+  Result<void> end() override { return {}; }
+
+  Result<void> summary(const Record& /*counts*/, std::string_view sentence) override {
+    say_summary(streams_, talk_, sentence);
+    return {};
+  }
+
+  Result<void> error(const Error& error, WallTime /*time*/) override {
+    say_error(streams_, error);
+    return {};
+  }
+
+ private:
+  template <typename TextOfKey>
+  Result<void> write_line(TextOfKey text_of) {
+    line_.clear();
+    for (const std::string& key : keys_) {
+      if (&key != &keys_.front()) line_ += ',';
+      append_csv_field(line_, text_of(key));
+    }
+    line_ += "\r\n";
+    return streams_.out(line_);
+  }
+
+  Streams& streams_;
+  Talk talk_;
+  std::vector<std::string> keys_;
+  std::string line_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Talk talk) {
+  return std::make_unique<CsvRenderer>(streams, talk);
+}
+
+}  // namespace spindle::report

@@ -1,0 +1,52 @@
+#include "spindle/report/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace spindle::report {
+namespace {
+
+struct CellText {
+  std::string operator()(std::monostate /*null*/) const { return {}; }
+  std::string operator()(const Decimal& number) const { return number.to_string(); }
+  std::string operator()(const std::string& text) const { return text; }
+  std::string operator()(bool truth) const { return truth ? "true" : "false"; }
+  std::string operator()(const Words& words) const {
+    return fmt::format("{}", fmt::join(words, " "));
+  }
+  std::string operator()(const Texts& texts) const {
+    return fmt::format("{}", fmt::join(texts, ", "));
+  }
+  std::string operator()(const Pairs& pairs) const {
+    std::string text;
+    for (const auto& [key, value] : pairs) {
+      if (!text.empty()) text += ", ";
+      text.append(key).append("=").append(value);
+    }
+    return text;
+  }
+};
+
+}  // namespace
+
+const Field* Record::find(std::string_view key) const {
+  const auto found =
+      std::find_if(fields.begin(), fields.end(), [key](const Field& f) { return f.key == key; });
+  return found == fields.end() ? nullptr : &*found;
+}
+
+std::string to_text(WallTime time) {
+  const auto day = std::chrono::floor<std::chrono::days>(time);
+  const std::chrono::year_month_day date(day);
+  const std::chrono::hh_mm_ss clock(time - day);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03}Z", static_cast<int>(date.year()),
+                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                     clock.hours().count(), clock.minutes().count(), clock.seconds().count(),
+                     clock.subseconds().count());
+}
+
+std::string to_text(const Cell& cell) { return std::visit(CellText{}, cell); }
+
+}  // namespace spindle::report

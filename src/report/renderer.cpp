@@ -1,0 +1,57 @@
+#include "spindle/report/renderer.hpp"
+
+#include "display.hpp"
+#include "renderers.hpp"
+
+namespace spindle::report {
+namespace {
+
+Cell text_or_null(std::string text) {
+  return text.empty() ? Cell(std::monostate{}) : Cell(std::move(text));
+}
+
+Cell number(std::int64_t value) { return Decimal(value); }
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk) {
+  switch (format) {
+    case Format::json:
+      return make_json_renderer(streams);
+    case Format::csv:
+      return make_csv_renderer(streams, talk);
+    case Format::table:
+      break;
+  }
+  return make_table_renderer(streams, talk);
+}
+
+Record error_record(const Error& error, WallTime time) {
+  const StatusInfo& status = info(error.status());
+  Record record{
+      .type = "error",
+      .target = error.target,
+      .time = time,
+      .fields = {{"code", std::string(status.name)},
+                 {"exit_status", number(static_cast<std::int64_t>(status.status))},
+                 {"message", message_of(error)},
+                 {"hint", text_or_null(hint_of(error))}},
+  };
+  if (!error.name.empty()) record.fields.push_back({"name", error.name});
+  if (error.register_address) {
+    record.fields.push_back({"register", number(*error.register_address)});
+  }
+  if (error.exception) record.fields.push_back({"exception", number(*error.exception)});
+  return record;
+}
+
+void say_error(const Streams& streams, const Error& error) {
+  streams.err("spindle: " + printable(describe(error), LineBreaks::fold) + "\n");
+}
+
+void say_summary(const Streams& streams, Talk talk, std::string_view sentence) {
+  if (talk == Talk::quiet || sentence.empty()) return;
+  streams.err(printable(sentence, LineBreaks::fold) + "\n");
+}
+
+}  // namespace spindle::report
