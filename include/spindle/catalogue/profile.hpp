@@ -48,8 +48,9 @@ struct LinkFacts {
   Duration keep_alive = {};     ///< zero: none needed
   Duration answer = std::chrono::seconds(1);
   Duration connect = std::chrono::seconds(5);
-  unsigned retries = 1;   ///< repetitions of a read that got no answer
-  bool loopback = false;  ///< FC 08 00 is answered
+  unsigned retries = 1;     ///< repetitions of a read that got no answer
+  bool loopback = false;    ///< FC 08 00 is answered
+  bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
   SerialFacts serial = {};
   std::vector<Area> contiguous = {};  ///< registers may be read along here
   std::vector<Area> absent = {};      ///< registers said not to exist
@@ -124,10 +125,13 @@ struct CodeText {
   std::string source;
 };
 
-/// A start state for the simulated tool. Patterns are globs over parameter names; later entries
-/// win.
+using CodeTexts = std::map<std::int64_t, CodeText>;
+
+/// A start state for the simulated tool. Patterns are globs over the names of named and numbered
+/// parameters; later entries win.
 struct SimulationFacts {
   Bytes identity = {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
+  std::size_t identity_bytes = 0;  ///< how many of them the tool sends unless told otherwise
   struct Value {
     std::string pattern;
     std::int64_t raw = 0;
@@ -157,8 +161,7 @@ class Profile {
   std::optional<NumberedFacts> numbered;
   std::vector<Parameter> parameters;
   std::vector<Action> actions;
-  std::map<std::uint8_t, CodeText> exceptions;
-  std::map<std::int64_t, CodeText> error_codes;
+  CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Error `unknown_name` with a suggestion.

@@ -36,13 +36,18 @@ class ProfileStore {
   /// `unknown_name` with a suggestion. Reads the simulation part not at all.
   [[nodiscard]] Result<catalogue::Profile> load(std::string_view name_or_file) const;
 
-  /// The start state for the simulated tool (the file's second YAML document; its own or the
-  /// nearest one it extends). `bad_file` when there is none.
+  /// The start state for the simulated tool (the file's YAML document `part: simulation`, or that
+  /// of the nearest file it extends). `bad_file` when there is none.
   [[nodiscard]] Result<catalogue::SimulationFacts> load_simulation(
       std::string_view name_or_file) const;
 
-  /// Every fault of a file, both documents; empty when it is valid. Error only when the file can
-  /// not be read or found.
+  /// Meanings and remedies of the product's error and alarm codes (the file's `part: texts`, over
+  /// those of the files it extends). Apart from load(), so that only commands that show a code pay
+  /// for them. Empty when the profile has none.
+  [[nodiscard]] Result<catalogue::CodeTexts> load_error_codes(std::string_view name_or_file) const;
+
+  /// Every fault of a file and of those it extends, all documents; empty when it is valid. Error
+  /// only when the file can not be read or found.
   [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;
 
   /// All profiles in all folders, sorted by id, shadowed ones left out. Base profiles that say

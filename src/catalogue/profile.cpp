@@ -1,0 +1,230 @@
+#include "spindle/catalogue/profile.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <unordered_set>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::catalogue {
+namespace {
+
+using modbus::RegisterAddress;
+using modbus::RegisterTable;
+
+constexpr std::uint16_t last_register = std::numeric_limits<std::uint16_t>::max();
+
+Error unknown(std::string_view name, std::string message, std::string hint) {
+  return {.code = Errc::unknown_name,
+          .message = std::move(message),
+          .hint = std::move(hint),
+          .name = std::string(name)};
+}
+
+template <typename Entries>
+std::vector<std::string> names_of(const Entries& entries) {
+  std::vector<std::string> names;
+  names.reserve(entries.size());
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
+Parameter numbered_parameter(const NumberedFacts& facts, std::uint16_t number) {
+  return {.name = fmt::format("{}{}", facts.prefix, number),
+          .title = fmt::format("Parameter {}", number),
+          .table = facts.table,
+          .address = {number},
+          .encoding = {},
+          .unit = {},
+          .access = facts.access,
+          .evidence = facts.evidence,
+          .source = facts.source,
+          .note = {}};
+}
+
+bool all_digits(std::string_view text) {
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+std::optional<Parameter> find_numbered(const NumberedFacts& facts, std::string_view name) {
+  if (!name.starts_with(facts.prefix)) return std::nullopt;
+  const std::string_view digits = name.substr(facts.prefix.size());
+  if (!all_digits(digits)) return std::nullopt;
+  const auto number = parse_unsigned(digits, facts.to);
+  if (!number || *number < facts.from) return std::nullopt;
+  return numbered_parameter(facts, static_cast<std::uint16_t>(*number));
+}
+
+/// "p900" deserves the numbers that exist rather than a similar name.
+std::string hint_for(const Profile& profile, std::string_view name) {
+  if (profile.numbered && name.starts_with(profile.numbered->prefix) &&
+      all_digits(name.substr(profile.numbered->prefix.size()))) {
+    return fmt::format("numbers go from {0}{1} to {0}{2}", profile.numbered->prefix,
+                       profile.numbered->from, profile.numbered->to);
+  }
+  return suggestion(name, names_of(profile.parameters));
+}
+
+bool covers(const Parameter& parameter, RegisterTable table, std::uint16_t address) {
+  const std::uint16_t first = parameter.address.value;
+  return parameter.table == table && address >= first &&
+         address - first < register_count(parameter.encoding.kind);
+}
+
+bool every_register_writable(const Profile& profile, const Parameter& raw) {
+  const std::uint16_t count = register_count(raw.encoding.kind);
+  for (std::uint16_t i = 0; i < count; ++i) {
+    const auto address = static_cast<std::uint16_t>(raw.address.value + i);
+    if (!profile.writable(RegisterAddress{address})) return false;
+  }
+  return true;
+}
+
+Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
+  if (raw && raw->table == RegisterTable::holding && every_register_writable(profile, *raw)) {
+    raw->access = Access::read_write;
+  }
+  return raw;
+}
+
+std::vector<Parameter> match_named(const Profile& profile, std::string_view pattern) {
+  std::vector<Parameter> found;
+  for (const Parameter& parameter : profile.parameters) {
+    if (glob_match(pattern, parameter.name)) found.push_back(parameter);
+  }
+  return found;
+}
+
+std::vector<Parameter> match_numbered(const NumberedFacts& facts, std::string_view pattern) {
+  std::vector<Parameter> found;
+  for (unsigned number = facts.from; number <= facts.to; ++number) {
+    Parameter parameter = numbered_parameter(facts, static_cast<std::uint16_t>(number));
+    if (glob_match(pattern, parameter.name)) found.push_back(std::move(parameter));
+  }
+  return found;
+}
+
+Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view name) {
+  if (!is_pattern(name)) {
+    auto one = profile.find(name);
+    if (!one) return tl::unexpected(std::move(one.error()));
+    return std::vector<Parameter>{std::move(*one)};
+  }
+  auto found = match_named(profile, name);
+  if (found.empty() && profile.numbered) found = match_numbered(*profile.numbered, name);
+  if (found.empty()) {
+    return tl::unexpected(unknown(name,
+                                  fmt::format("matches no parameter of profile {}", profile.id),
+                                  "'spindle list' shows all names"));
+  }
+  return found;
+}
+
+Error bad_raw_register(std::string_view text) {
+  return unknown(text, "not a raw register",
+                 "write @holding:2 or @input:3204/i16, with u16, i16, u32 or i32 behind the slash");
+}
+
+std::optional<RegisterTable> parse_table(std::string_view text) {
+  for (const auto table : {RegisterTable::holding, RegisterTable::input}) {
+    if (to_text(table) == text) return table;
+  }
+  return std::nullopt;
+}
+
+Result<Parameter> parse_raw(std::string_view text) {
+  const std::string_view body = text.substr(1);
+  const std::size_t colon = body.find(':');
+  if (colon == std::string_view::npos) return tl::unexpected(bad_raw_register(text));
+  const auto table = parse_table(body.substr(0, colon));
+  const std::string_view rest = body.substr(colon + 1);
+  const std::size_t slash = rest.find('/');
+  const auto address = parse_unsigned(rest.substr(0, slash), last_register);
+  const auto kind = slash == std::string_view::npos ? std::optional(Kind::u16)
+                                                    : parse_kind(rest.substr(slash + 1));
+  if (!table || !address || !kind) return tl::unexpected(bad_raw_register(text));
+  if (*address + register_count(*kind) - 1 > last_register) {
+    return tl::unexpected(
+        unknown(text, "a 32-bit value does not fit behind the last register", {}));
+  }
+  std::string name = fmt::format("@{}:{}", to_text(*table), *address);
+  if (*kind != Kind::u16) name += fmt::format("/{}", to_text(*kind));
+  return Parameter{.name = std::move(name),
+                   .title = "Raw register",
+                   .table = *table,
+                   .address = {static_cast<std::uint16_t>(*address)},
+                   .encoding = {.kind = *kind},
+                   .unit = {},
+                   .source = "register given by the user",
+                   .note = {}};
+}
+
+}  // namespace
+
+Result<Parameter> Profile::find(std::string_view name) const {
+  if (auto raw = parse_raw_register(name)) return find_raw(*this, std::move(*raw));
+  for (const Parameter& parameter : parameters) {
+    if (parameter.name == name) return parameter;
+  }
+  if (numbered) {
+    if (auto found = find_numbered(*numbered, name)) return *std::move(found);
+  }
+  return tl::unexpected(
+      unknown(name, fmt::format("no such parameter in profile {}", id), hint_for(*this, name)));
+}
+
+Result<std::vector<Parameter>> Profile::select(const std::vector<std::string>& names) const {
+  if (names.empty()) return parameters;
+  std::vector<Parameter> selected;
+  std::unordered_set<std::string> seen;
+  for (const std::string& name : names) {
+    auto found = expand(*this, name);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    for (Parameter& parameter : *found) {
+      if (seen.insert(parameter.name).second) selected.push_back(std::move(parameter));
+    }
+  }
+  return selected;
+}
+
+Result<Action> Profile::find_action(std::string_view name) const {
+  for (const Action& action : actions) {
+    if (action.name == name) return action;
+  }
+  return tl::unexpected(unknown(name, fmt::format("no such action in profile {}", id),
+                                suggestion(name, names_of(actions))));
+}
+
+bool Profile::writable(RegisterAddress address) const {
+  const std::uint16_t wanted = address.value;
+  const bool by_number = numbered && numbered->table == RegisterTable::holding &&
+                         numbered->access == Access::read_write && wanted >= numbered->from &&
+                         wanted <= numbered->to;
+  return by_number ||
+         std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& parameter) {
+           return parameter.access == Access::read_write &&
+                  covers(parameter, RegisterTable::holding, wanted);
+         });
+}
+
+std::optional<Profile::LimitRegisters> Profile::limit_registers(const Parameter& parameter) const {
+  const std::uint16_t number = parameter.address.value;
+  const bool has_limits = limits && parameter.table == RegisterTable::holding &&
+                          register_count(parameter.encoding.kind) == 1 && number >= limits->from &&
+                          number <= limits->to;
+  if (!has_limits) return std::nullopt;
+  const auto mirror = [number](std::uint16_t offset) {
+    return RegisterAddress{static_cast<std::uint16_t>(number + offset)};
+  };
+  return LimitRegisters{mirror(limits->minimum_offset), mirror(limits->maximum_offset)};
+}
+
+std::optional<Result<Parameter>> parse_raw_register(std::string_view text) {
+  if (!text.starts_with('@')) return std::nullopt;
+  return parse_raw(text);
+}
+
+}  // namespace spindle::catalogue

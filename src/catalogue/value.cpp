@@ -1,0 +1,183 @@
+#include "spindle/catalogue/value.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::catalogue {
+namespace {
+
+constexpr unsigned bits_per_register = 16;
+
+Error fault(Errc code, const Parameter& parameter, std::string message, std::string hint = {}) {
+  return {
+      .code = code, .message = std::move(message), .hint = std::move(hint), .name = parameter.name};
+}
+
+std::int64_t to_integer(Kind kind, RegisterView registers) {
+  std::uint32_t word = 0;
+  for (const std::uint16_t item : registers) word = (word << bits_per_register) | item;
+  switch (kind) {
+    case Kind::i16:
+      return static_cast<std::int16_t>(word);
+    case Kind::i32:
+      return static_cast<std::int32_t>(word);
+    case Kind::u16:
+    case Kind::u32:
+      break;
+  }
+  return word;
+}
+
+const Label* label_of(const Parameter& parameter, std::int64_t number) {
+  for (const Label& label : parameter.labels) {
+    if (label.number == number) return &label;
+  }
+  return nullptr;
+}
+
+char lower(char character) {
+  return character >= 'A' && character <= 'Z' ? static_cast<char>(character - 'A' + 'a')
+                                              : character;
+}
+
+bool same_ignoring_case(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](char x, char y) { return lower(x) == lower(y); });
+}
+
+const Label* label_named(const Parameter& parameter, std::string_view text) {
+  for (const Label& label : parameter.labels) {
+    if (same_ignoring_case(label.text, text)) return &label;
+  }
+  return nullptr;
+}
+
+std::string list_labels(const Parameter& parameter) {
+  std::string list;
+  for (const Label& label : parameter.labels) {
+    fmt::format_to(std::back_inserter(list), "{}{} ({})", list.empty() ? "" : ", ", label.text,
+                   label.number);
+  }
+  return list;
+}
+
+Error not_a_label(const Parameter& parameter, std::string_view text) {
+  std::vector<std::string> names;
+  for (const Label& label : parameter.labels) names.push_back(label.text);
+  return fault(Errc::bad_value, parameter,
+               fmt::format("'{}' is none of its labels; it has {}", text, list_labels(parameter)),
+               suggestion(text, names));
+}
+
+/// Hexadecimal only makes sense for what is stored as it is typed.
+std::optional<Decimal> parse_number(const Parameter& parameter, std::string_view text) {
+  if (auto number = Decimal::parse(text)) return number;
+  if (parameter.encoding.scale != Decimal(1)) return std::nullopt;
+  const auto integer =
+      parse_unsigned(text, static_cast<std::uint64_t>(highest(parameter.encoding.kind)));
+  if (!integer) return std::nullopt;
+  return Decimal(static_cast<std::int64_t>(*integer));
+}
+
+/// An enumeration without a range of its own has no other values than its labels.
+bool closed_enumeration(const Parameter& parameter) {
+  return !parameter.labels.empty() && !parameter.range.minimum && !parameter.range.maximum;
+}
+
+Result<std::int64_t> to_steps(const Parameter& parameter, const Decimal& number) {
+  const Kind kind = parameter.encoding.kind;
+  const Decimal& scale = parameter.encoding.scale;
+  const auto smallest = Decimal(lowest(kind)).times(scale);
+  const auto largest = Decimal(highest(kind)).times(scale);
+  if (!smallest || !largest) {
+    return tl::unexpected(fault(Errc::internal, parameter, "its scale does not fit its encoding"));
+  }
+  if (number < *smallest) {
+    return tl::unexpected(
+        fault(Errc::out_of_range, parameter,
+              fmt::format("{} is below {}, the least that {} can hold", number.to_string(),
+                          smallest->to_string(), to_text(kind))));
+  }
+  if (number > *largest) {
+    return tl::unexpected(
+        fault(Errc::out_of_range, parameter,
+              fmt::format("{} is above {}, the most that {} can hold", number.to_string(),
+                          largest->to_string(), to_text(kind))));
+  }
+  const auto steps = number.divided_by(scale);
+  if (!steps) {
+    return tl::unexpected(
+        fault(Errc::bad_value, parameter,
+              fmt::format("{} is between two steps of {}", number.to_string(), scale.to_string())));
+  }
+  return *steps;
+}
+
+}  // namespace
+
+Result<Value> decode(const Parameter& parameter, RegisterView registers) {
+  const Kind kind = parameter.encoding.kind;
+  if (registers.size() != register_count(kind)) {
+    return tl::unexpected(fault(
+        Errc::internal, parameter,
+        fmt::format("{} registers cannot be decoded as {}", registers.size(), to_text(kind))));
+  }
+  const std::int64_t integer = to_integer(kind, registers);
+  const auto number = Decimal(integer).times(parameter.encoding.scale);
+  if (!number) {
+    return tl::unexpected(fault(Errc::internal, parameter, "its scale does not fit its encoding"));
+  }
+  const Label* label = label_of(parameter, integer);
+  return Value{*number, label != nullptr ? label->text : std::string()};
+}
+
+Result<Registers> encode(const Parameter& parameter, const Decimal& number) {
+  const auto steps = to_steps(parameter, number);
+  if (!steps) return tl::unexpected(steps.error());
+  const auto word = static_cast<std::uint32_t>(*steps);
+  const auto low = static_cast<std::uint16_t>(word);
+  if (register_count(parameter.encoding.kind) == 1) return Registers{low};
+  return Registers{static_cast<std::uint16_t>(word >> bits_per_register), low};
+}
+
+Result<void> check_range(const Parameter& parameter, const Decimal& number) {
+  const Range& range = parameter.range;
+  const auto refuse = [&](std::string_view side, const Decimal& limit, std::string_view which) {
+    return tl::unexpected(fault(Errc::out_of_range, parameter,
+                                fmt::format("{} is {} {}, the {} of the profile",
+                                            number.to_string(), side, limit.to_string(), which)));
+  };
+  if (range.minimum && number < *range.minimum) return refuse("below", *range.minimum, "minimum");
+  if (range.maximum && number > *range.maximum) return refuse("above", *range.maximum, "maximum");
+  return {};
+}
+
+Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
+  Decimal number;
+  if (const Label* label = label_named(parameter, text)) {
+    const auto scaled = Decimal(label->number).times(parameter.encoding.scale);
+    number = scaled.value_or(Decimal(label->number));
+  } else if (const auto typed = parse_number(parameter, text)) {
+    number = *typed;
+  } else if (!parameter.labels.empty()) {
+    return tl::unexpected(not_a_label(parameter, text));
+  } else {
+    return tl::unexpected(
+        fault(Errc::bad_value, parameter, fmt::format("'{}' is not a number", text)));
+  }
+  if (auto inside = check_range(parameter, number); !inside) {
+    return tl::unexpected(std::move(inside.error()));
+  }
+  const auto registers = encode(parameter, number);
+  if (!registers) return tl::unexpected(registers.error());
+  auto value = decode(parameter, *registers);
+  if (value && value->label.empty() && closed_enumeration(parameter)) {
+    return tl::unexpected(not_a_label(parameter, text));
+  }
+  return value;
+}
+
+}  // namespace spindle::catalogue
