@@ -1,0 +1,139 @@
+#include "spindle/base/text.hpp"
+
+#include <doctest/doctest.h>
+
+using namespace spindle;
+
+TEST_CASE("a pattern matches the whole name") {
+  struct Case {
+    std::string_view pattern;
+    std::string_view text;
+    bool matches;
+  };
+  for (const auto& row : {
+           Case{"", "", true},
+           Case{"", "a", false},
+           Case{"a", "", false},
+           Case{"*", "", true},
+           Case{"**", "abc", true},
+           Case{"?", "", false},
+           Case{"?", "a", true},
+           Case{"a?c", "abc", true},
+           Case{"preset.1.*torque*", "preset.1.target-torque", true},
+           Case{"preset.1.*torque*", "preset.1.torque-limit", true},
+           Case{"preset.1.*torque*", "preset.11.torque-limit", false},
+           Case{"preset.*.speed", "preset.3.free-speed", false},
+           Case{"preset.*.speed", "preset.15.speed", true},
+           Case{"*.speed", "a.speed.speed", true},
+           Case{"a*b*c", "a-b-b-c", true},
+           Case{"a*b*c", "a-c-b", false},
+           Case{"p[1-3]", "p2", true},
+           Case{"p[1-3]", "p4", false},
+           Case{"p[13]", "p2", false},
+           Case{"p[!13]", "p2", true},
+           Case{"p[!1-3]", "p2", false},
+           Case{"*[0-9]", "alarm.1", true},
+           Case{"*[ab]*[cd]", "xaxbxd", true},
+           Case{"[]]", "]", true},
+           Case{"[!]]", "]", false},
+           Case{"[a-]", "-", true},
+           Case{"[a*", "[a-z", true},
+           Case{"[", "[", true},
+           Case{"[]", "[]", true},
+           Case{"[!]", "[!]", true},
+           Case{"[z-a]", "m", false},
+           Case{"A", "a", false},
+       }) {
+    const auto& [pattern, text, matches] = row;
+    CAPTURE(row.pattern);
+    CAPTURE(row.text);
+    CHECK(glob_match(pattern, text) == matches);
+  }
+}
+
+TEST_CASE("many stars do not take exponential time") {
+  const std::string text(5000, 'a');
+  std::string pattern;
+  for (int star = 0; star < 50; ++star) pattern += "*a";
+  CHECK(glob_match(pattern, text));
+  CHECK_FALSE(glob_match(pattern + "b", text));
+}
+
+TEST_CASE("special characters make a pattern") {
+  CHECK(is_pattern("*"));
+  CHECK(is_pattern("preset.?"));
+  CHECK(is_pattern("p[12]"));
+  CHECK_FALSE(is_pattern("preset.1.target-torque"));
+  CHECK_FALSE(is_pattern(""));
+}
+
+TEST_CASE("a misspelt word finds its neighbour") {
+  const std::vector<std::string> commands = {"identify", "list",   "get",    "set",
+                                             "watch",    "backup", "restore"};
+  struct Case {
+    std::string_view word;
+    std::string_view nearest;  // empty: none
+  };
+  for (const auto& row : {
+           Case{"identfy", "identify"},
+           Case{"idnetify", "identify"},  // a swap counts once
+           Case{"identifiy", "identify"},
+           Case{"bakcup", "backup"},
+           Case{"restoer", "restore"},
+           Case{"gets", "get"},
+           Case{"wach", "watch"},
+           Case{"et", "get"},  // get and set are equally near: the first
+           Case{"zzzzzz", ""},
+           Case{"x", ""},
+           Case{"", ""},
+       }) {
+    const auto& [word, nearest] = row;
+    CAPTURE(row.word);
+    CHECK(closest(word, commands).value_or("") == nearest);
+    const std::string sentence =
+        nearest.empty() ? "" : "did you mean '" + std::string(nearest) + "'?";
+    CHECK(suggestion(word, commands) == sentence);
+  }
+  CHECK_FALSE(closest("word", {}));
+}
+
+TEST_CASE("unsigned numbers are read completely or not at all") {
+  struct Case {
+    std::string_view text;
+    std::optional<std::uint64_t> number;
+  };
+  for (const auto& row : {
+           Case{"0", 0},
+           Case{"42", 42},
+           Case{"010", 10},
+           Case{"0x10", 16},
+           Case{"0xFfFf", 65535},
+           Case{"65535", 65535},
+           Case{"65536", std::nullopt},
+           Case{"0x10000", std::nullopt},
+           Case{"99999999999999999999999", std::nullopt},
+           Case{"", std::nullopt},
+           Case{"0x", std::nullopt},
+           Case{"-1", std::nullopt},
+           Case{"+1", std::nullopt},
+           Case{" 1", std::nullopt},
+           Case{"1 ", std::nullopt},
+           Case{"1a", std::nullopt},
+           Case{"0x-1", std::nullopt},
+           Case{"0x0x1", std::nullopt},
+       }) {
+    const auto& [text, number] = row;
+    CAPTURE(row.text);
+    CHECK(parse_unsigned(text, 0xFFFF) == number);
+  }
+  CHECK(parse_unsigned("18446744073709551615", UINT64_MAX) == UINT64_MAX);
+  CHECK_FALSE(parse_unsigned("18446744073709551616", UINT64_MAX));
+}
+
+TEST_CASE("splitting keeps empty parts") {
+  using Parts = std::vector<std::string_view>;
+  CHECK(split("a,b,c", ',') == Parts{"a", "b", "c"});
+  CHECK(split("a", ',') == Parts{"a"});
+  CHECK(split("", ',') == Parts{""});
+  CHECK(split(",a,", ',') == Parts{"", "a", ""});
+}
