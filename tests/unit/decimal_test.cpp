@@ -148,6 +148,7 @@ TEST_CASE("a quotient is the whole number of steps, or absent") {
       {Decimal(16, -1), Decimal(5, -1), std::nullopt},
       {Decimal(1), Decimal(3), std::nullopt},
       {Decimal(1), Decimal(3, -1), std::nullopt},
+      {Decimal(10, -1), Decimal(3), std::nullopt},
       {Decimal(1), Decimal(25, -2), 4},
       {Decimal(-1), Decimal(25, -2), -4},
       {Decimal(-6), Decimal(-2), 3},

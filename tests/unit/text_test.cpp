@@ -83,6 +83,8 @@ TEST_CASE("a misspelt word finds its neighbour") {
            Case{"gets", "get"},
            Case{"wach", "watch"},
            Case{"et", "get"},  // get and set are equally near: the first
+           Case{"wacth", "watch"},
+           Case{"wxxch", ""},  // two of five letters are too many
            Case{"zzzzzz", ""},
            Case{"x", ""},
            Case{"", ""},
