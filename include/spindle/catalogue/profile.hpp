@@ -132,6 +132,10 @@ using CodeTexts = std::map<std::int64_t, CodeText>;
 struct SimulationFacts {
   Bytes identity = {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
   std::size_t identity_bytes = 0;  ///< how many of them the tool sends unless told otherwise
+  /// Exception code that answers a write outside the limits.
+  std::uint8_t limit_exception =
+      static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_value);
+  std::uint16_t stopped_error = 0;  ///< error code of a run that was stopped before its target
   struct Value {
     std::string pattern;
     std::int64_t raw = 0;

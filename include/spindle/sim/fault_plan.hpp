@@ -13,7 +13,7 @@ namespace spindle::sim {
 /// Ways in which an answer (or a tool) misbehaves. Each was seen on real devices, gateways or
 /// servers, or is what a hostile test wants. The text form is the enumerator with '-' for '_'.
 enum class FaultKind : std::uint8_t {
-  latency,              ///< DURATION before the answer
+  latency,              ///< DURATION before the answer; of several the longest counts
   lost,                 ///< no answer at all
   late,                 ///< the answer comes after DURATION; later answers do not wait for it
   repeated,             ///< the answer comes twice
@@ -24,7 +24,7 @@ enum class FaultKind : std::uint8_t {
   wrong_transaction,    ///< transaction id plus N (default 1)
   wrong_protocol,       ///< MBAP protocol identifier N (default 1)
   wrong_echo,           ///< a write's echo names another value; a read's data is untouched
-  wrong_length,         ///< byte count and data one register (N) too long, header consistent
+  wrong_length,         ///< byte count and data N (default 1) registers too long, header consistent
   wrong_header_length,  ///< MBAP length N (default 2) larger than the frame, with N extra bytes
   wrong_function,       ///< another function code: N (default 0x65)
   garbage,              ///< N (default 16) bytes that are no frame instead of the answer
@@ -32,7 +32,7 @@ enum class FaultKind : std::uint8_t {
   bad_crc,              ///< RTU: one bit of the checksum flipped
   exception,            ///< exception response N instead of the answer
   push_before,  ///< an event frame with transaction id N just before the answer; "pending" = the
-                ///< request's own
+                ///< request's own; neither = the tool's own count
   push_inside,  ///< first half of an event frame, then after 1 ms its rest together with the answer
   push_after,   ///< an event frame just after the answer
   close,        ///< connection closed instead of the answer
@@ -56,6 +56,12 @@ struct Fault {
 };
 
 using FaultPlan = std::vector<Fault>;
+
+/// "wrong-unit": the kind as parse_fault() reads it.
+std::string_view to_text(FaultKind kind);
+
+/// The fault's number, else the default of its kind (0 where it has none).
+std::uint16_t number_of(const Fault& fault);
 
 /// Reads "KIND[=ARGUMENT][@K|@every:N]", such as "late=1500ms@3", "lost@every:5",
 /// "push-before=0x0001", "push-before=pending", "split". Error `bad_value` with a suggestion; a

@@ -17,33 +17,50 @@ struct AnswerCounter {
 };
 
 /// The server's end of one connection: bytes in, bytes out at their time, with the faults of a
-/// plan. Pure; sockets, ptys and the in-process transport are thin shells around it.
+/// plan. Pure; sockets, ptys and the in-process transport are thin shells around it. Tells the
+/// server that the client has come and, when destroyed, gone.
 class Peer {
  public:
+  /// `server`, `faults` and `counter` must outlive the peer.
   Peer(Server& server, ConnectionId connection, modbus::Framing framing, const FaultPlan& faults,
        AnswerCounter& counter);
   ~Peer();
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  /// Bytes from the client. Complete requests are answered into the outbox.
+  /// Bytes from the client. Complete requests are answered into the outbox. Bytes that can not be a
+  /// frame close the connection on TCP and are dropped on RTU.
   void receive(ByteView bytes, TimePoint now);
   /// An event frame for this client (transaction id counts up from 1 as in the manual's example).
   void push(const modbus::Pdu& pdu, TimePoint now);
-  /// When take() will next have bytes; empty when nothing is waiting.
+  /// When take() will next have bytes, or the connection ends; empty when nothing is waiting.
   [[nodiscard]] std::optional<TimePoint> next_due() const;
   /// The next piece that is due, as one segment; empty when there is none.
   Bytes take(TimePoint now);
-  /// The plan closed the connection, and everything before that was taken.
+  /// The connection has ended, and everything before that was taken.
   [[nodiscard]] bool closed(TimePoint now) const;
 
  private:
-  struct Piece {
-    TimePoint due;
-    Bytes bytes;
+  enum class Ending : std::uint8_t { stay, close };
+  enum class Holding : std::uint8_t { none, until_next };
+
+  /// Bytes that no other frame may come between, in pieces 1 ms apart from `due` on.
+  struct Message {
+    TimePoint due = {};
+    std::deque<Bytes> pieces = {};
+    Ending ending = Ending::stay;
+    Holding holding = Holding::none;
+    bool begun = false;
   };
+
+  bool take_request(TimePoint now);
   void answer(const modbus::Adu& request, TimePoint now);
-  void send(Bytes bytes, TimePoint due);
+  std::optional<modbus::Pdu> respond(const modbus::Adu& request, const Fault* exception,
+                                     TimePoint now);
+  Bytes event_bytes(const Fault* fault, modbus::TransactionId pending);
+  void hang_up(TimePoint now);
+  void enqueue(Message message);
+  void join_held(Message& message);
 
   Server* server_;
   ConnectionId connection_;
@@ -51,10 +68,11 @@ class Peer {
   const FaultPlan* faults_;
   AnswerCounter* counter_;
   Bytes inbox_ = {};
-  std::deque<Piece> outbox_ = {};
-  Bytes glued_ = {};
+  std::deque<Message> outbox_ = {};
+  TimePoint in_order_from_ = TimePoint::min();
   std::uint16_t push_transaction_ = 1;
-  std::optional<TimePoint> close_at_ = std::nullopt;
+  modbus::UnitId unit_ = {};
+  bool deaf_ = false;
 };
 
 }  // namespace spindle::sim

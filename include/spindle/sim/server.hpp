@@ -35,14 +35,31 @@ class Server {
   virtual std::optional<modbus::Pdu> answer(ConnectionId connection, modbus::UnitId unit,
                                             const modbus::Pdu& request, TimePoint now) = 0;
 
+  /// Whether requests to this unit get answers at all; on a serial line, those to other units and
+  /// broadcasts do not.
+  [[nodiscard]] virtual bool answers_to(modbus::UnitId unit) const {
+    static_cast<void>(unit);
+    return true;
+  }
+
   /// Lets time pass: motion, torque, expiring output, operators.
   virtual void advance(TimePoint now) = 0;
 
-  /// When something will next happen by itself; empty when nothing is due.
+  /// When something will next happen by itself, always later than the last advance(); empty when
+  /// nothing is due.
   [[nodiscard]] virtual std::optional<TimePoint> next_change() const = 0;
 
   /// Frames that became due since the last call, oldest first.
   virtual std::vector<Push> take_pushes() = 0;
+
+  /// The same for one client only; those of others stay.
+  virtual std::vector<Push> take_pushes(ConnectionId connection) {
+    static_cast<void>(connection);
+    return {};
+  }
+
+  /// What the tool would push now: the last event. Empty when it is of a kind that never pushes.
+  [[nodiscard]] virtual std::optional<modbus::Pdu> event_frame() const { return std::nullopt; }
 
   virtual void connected(ConnectionId connection) = 0;
   virtual void disconnected(ConnectionId connection) = 0;

@@ -6,6 +6,7 @@
 #include "spindle/link/transport.hpp"
 #include "spindle/modbus/adu.hpp"
 #include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/peer.hpp"
 #include "spindle/sim/server.hpp"
 
 namespace spindle::sim {
@@ -16,9 +17,11 @@ std::unique_ptr<link::Transport> make_sim_transport(std::unique_ptr<Server> serv
                                                     modbus::Framing framing, FaultPlan faults,
                                                     Clock& clock, const Interrupt& interrupt);
 
-/// The same on a tool that others hold too (several transports, one tool, one thread).
+/// The same on a tool that others hold too (several transports, one after another or side by side,
+/// one tool, one thread). `server` and `counter` must outlive it.
 std::unique_ptr<link::Transport> make_sim_transport(Server& server, ConnectionId connection,
                                                     modbus::Framing framing, FaultPlan faults,
-                                                    Clock& clock, const Interrupt& interrupt);
+                                                    AnswerCounter& counter, Clock& clock,
+                                                    const Interrupt& interrupt);
 
 }  // namespace spindle::sim

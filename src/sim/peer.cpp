@@ -1,0 +1,334 @@
+#include "spindle/sim/peer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "spindle/modbus/pdu.hpp"
+
+namespace spindle::sim {
+namespace {
+
+using modbus::Framing;
+using modbus::FunctionCode;
+using std::chrono::milliseconds;
+
+constexpr Duration piece_distance = milliseconds(1);
+constexpr Duration longest_hold = milliseconds(50);
+
+// Can not begin a frame: no protocol identifier, length or function of that kind exists.
+constexpr std::uint8_t noise_byte = 0xFF;
+
+constexpr std::size_t mbap_protocol_at = 2;
+constexpr std::size_t mbap_length_at = 4;
+
+// The faults that strike one answer.
+class Strikes {
+ public:
+  Strikes(const FaultPlan& plan, std::uint32_t answer_number) {
+    for (const Fault& fault : plan) {
+      if (fault.strikes(answer_number)) faults_.push_back(&fault);
+    }
+  }
+
+  [[nodiscard]] const Fault* find(FaultKind kind) const {
+    const auto found = std::find_if(faults_.begin(), faults_.end(),
+                                    [kind](const Fault* fault) { return fault->kind == kind; });
+    return found == faults_.end() ? nullptr : *found;
+  }
+
+  [[nodiscard]] bool has(FaultKind kind) const { return find(kind) != nullptr; }
+
+  [[nodiscard]] Duration longest(FaultKind kind) const {
+    Duration longest = Duration::zero();
+    for (const Fault* fault : faults_) {
+      if (fault->kind == kind) longest = std::max(longest, fault->duration.value_or(longest));
+    }
+    return longest;
+  }
+
+ private:
+  std::vector<const Fault*> faults_;
+};
+
+void set_u16(Bytes& bytes, std::size_t offset, std::uint16_t value) {
+  bytes[offset] = static_cast<std::uint8_t>(value >> 8U);
+  bytes[offset + 1] = static_cast<std::uint8_t>(value & 0xFFU);
+}
+
+bool is_echo(std::uint8_t function) {
+  switch (static_cast<FunctionCode>(function)) {
+    case FunctionCode::write_single_register:
+    case FunctionCode::write_multiple_registers:
+    case FunctionCode::diagnostics:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool has_byte_count(std::uint8_t function) {
+  switch (static_cast<FunctionCode>(function)) {
+    case FunctionCode::read_holding_registers:
+    case FunctionCode::read_input_registers:
+    case FunctionCode::report_server_id:
+      return true;
+    default:
+      return false;
+  }
+}
+
+void lengthen(modbus::Pdu& pdu, std::uint16_t registers) {
+  const auto extra = static_cast<std::uint8_t>(2 * registers);
+  if (has_byte_count(pdu.function)) pdu.data[0] = static_cast<std::uint8_t>(pdu.data[0] + extra);
+  pdu.data.insert(pdu.data.end(), extra, 0);
+}
+
+void spoil_pdu(modbus::Pdu& pdu, const Strikes& strikes) {
+  if (strikes.has(FaultKind::wrong_echo) && is_echo(pdu.function)) {
+    const std::size_t value_at = pdu.data.size() - 2;
+    set_u16(pdu.data, value_at, static_cast<std::uint16_t>(get_u16(pdu.data, value_at) + 1));
+  }
+  if (const Fault* fault = strikes.find(FaultKind::wrong_length)) lengthen(pdu, number_of(*fault));
+  if (const Fault* fault = strikes.find(FaultKind::wrong_function)) {
+    pdu.function = static_cast<std::uint8_t>(number_of(*fault));
+  }
+}
+
+void spoil_addressing(modbus::Adu& adu, const Strikes& strikes) {
+  if (const Fault* fault = strikes.find(FaultKind::wrong_unit)) {
+    adu.unit.value = static_cast<std::uint8_t>(number_of(*fault));
+  }
+  if (const Fault* fault = strikes.find(FaultKind::wrong_transaction)) {
+    adu.transaction.value = static_cast<std::uint16_t>(adu.transaction.value + number_of(*fault));
+  }
+}
+
+void spoil_header(Bytes& bytes, const Strikes& strikes) {
+  if (const Fault* fault = strikes.find(FaultKind::wrong_protocol)) {
+    set_u16(bytes, mbap_protocol_at, number_of(*fault));
+  }
+  if (const Fault* fault = strikes.find(FaultKind::wrong_header_length)) {
+    const std::uint16_t extra = number_of(*fault);
+    const std::uint16_t length = get_u16(bytes, mbap_length_at);
+    set_u16(bytes, mbap_length_at, static_cast<std::uint16_t>(length + extra));
+    bytes.insert(bytes.end(), extra, 0);
+  }
+}
+
+// Everything that replaces, cuts or repeats the finished frame.
+Bytes spoil_frame(Bytes bytes, const Strikes& strikes) {
+  if (strikes.has(FaultKind::lost) || strikes.has(FaultKind::close)) return {};
+  if (const Fault* fault = strikes.find(FaultKind::garbage)) {
+    bytes.assign(number_of(*fault), noise_byte);
+  }
+  if (strikes.has(FaultKind::half) || strikes.has(FaultKind::close_inside)) {
+    bytes.resize(bytes.size() / 2);
+  }
+  if (strikes.has(FaultKind::repeated)) {
+    const Bytes once = bytes;
+    bytes.insert(bytes.end(), once.begin(), once.end());
+  }
+  if (const Fault* fault = strikes.find(FaultKind::noise)) {
+    bytes.insert(bytes.begin(), number_of(*fault), noise_byte);
+  }
+  return bytes;
+}
+
+Bytes spoiled(Framing framing, modbus::Adu adu, const Strikes& strikes) {
+  spoil_pdu(adu.pdu, strikes);
+  spoil_addressing(adu, strikes);
+  Bytes bytes = modbus::frame(framing, adu);
+  if (framing == Framing::tcp) spoil_header(bytes, strikes);
+  if (framing == Framing::rtu && strikes.has(FaultKind::bad_crc)) bytes.back() ^= 1U;
+  return spoil_frame(std::move(bytes), strikes);
+}
+
+bool closes(const Strikes& strikes) {
+  return strikes.has(FaultKind::close) || strikes.has(FaultKind::close_inside) ||
+         strikes.has(FaultKind::close_after);
+}
+
+void append(Bytes& to, const Bytes& bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); }
+
+std::deque<Bytes> pieces_of(const Bytes& bytes, std::size_t size) {
+  std::deque<Bytes> pieces;
+  for (std::size_t at = 0; at < bytes.size(); at += size) {
+    const std::size_t end = std::min(at + size, bytes.size());
+    pieces.emplace_back(bytes.begin() + static_cast<std::ptrdiff_t>(at),
+                        bytes.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  return pieces;
+}
+
+// One piece, or two where a pushed frame is cut by the answer.
+std::deque<Bytes> cut_at(const Bytes& bytes, std::size_t cut) {
+  if (cut == 0) return pieces_of(bytes, std::max<std::size_t>(bytes.size(), 1));
+  const auto middle = bytes.begin() + static_cast<std::ptrdiff_t>(cut);
+  return {Bytes(bytes.begin(), middle), Bytes(middle, bytes.end())};
+}
+
+Duration time_of(std::size_t pieces) {
+  return pieces < 2 ? Duration::zero() : (static_cast<std::int64_t>(pieces) - 1) * piece_distance;
+}
+
+}  // namespace
+
+Peer::Peer(Server& server, ConnectionId connection, Framing framing, const FaultPlan& faults,
+           AnswerCounter& counter)
+    : server_(&server),
+      connection_(connection),
+      framing_(framing),
+      faults_(&faults),
+      counter_(&counter) {
+  server_->connected(connection_);
+}
+
+Peer::~Peer() { server_->disconnected(connection_); }
+
+void Peer::receive(ByteView bytes, TimePoint now) {
+  if (deaf_) return;
+  inbox_.insert(inbox_.end(), bytes.begin(), bytes.end());
+  while (!deaf_ && take_request(now)) {
+  }
+}
+
+// True when there may be another one behind it.
+bool Peer::take_request(TimePoint now) {
+  const modbus::Deframing found = modbus::deframe(framing_, modbus::Role::server, inbox_);
+  if (const auto* request = std::get_if<modbus::Deframed>(&found)) {
+    inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(request->consumed));
+    answer(request->adu, now);
+    return true;
+  }
+  const auto* junk = std::get_if<modbus::Junk>(&found);
+  if (junk == nullptr) return false;
+  if (framing_ == Framing::tcp) {
+    hang_up(now);
+    return false;
+  }
+  const std::size_t dropped = std::clamp<std::size_t>(junk->size, 1, inbox_.size());
+  inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(dropped));
+  return !inbox_.empty();
+}
+
+std::optional<modbus::Pdu> Peer::respond(const modbus::Adu& request, const Fault* exception,
+                                         TimePoint now) {
+  if (exception == nullptr || !server_->answers_to(request.unit)) {
+    return server_->answer(connection_, request.unit, request.pdu, now);
+  }
+  server_->advance(now);
+  return modbus::exception_response(request.pdu.function,
+                                    static_cast<std::uint8_t>(number_of(*exception)));
+}
+
+void Peer::answer(const modbus::Adu& request, TimePoint now) {
+  const Strikes strikes(*faults_, counter_->value + 1);
+  unit_ = request.unit;
+  const auto response = respond(request, strikes.find(FaultKind::exception), now);
+  if (!response) return;
+  ++counter_->value;
+
+  Bytes bytes = event_bytes(strikes.find(FaultKind::push_before), request.transaction);
+  const Bytes inside = event_bytes(strikes.find(FaultKind::push_inside), request.transaction);
+  const std::size_t cut = inside.empty() ? 0 : bytes.size() + inside.size() / 2;
+  append(bytes, inside);
+  append(bytes, spoiled(framing_, {request.transaction, request.unit, *response}, strikes));
+  append(bytes, event_bytes(strikes.find(FaultKind::push_after), request.transaction));
+
+  const Fault* split = strikes.find(FaultKind::split);
+  Message message{
+      .due = now + strikes.longest(FaultKind::latency),
+      .pieces = split != nullptr ? pieces_of(bytes, number_of(*split)) : cut_at(bytes, cut)};
+  if (strikes.has(FaultKind::late)) {
+    message.due = std::max(message.due, now + strikes.longest(FaultKind::late));
+  } else {
+    message.due = std::max(message.due, in_order_from_);
+    in_order_from_ = message.due + time_of(message.pieces.size());
+  }
+  if (closes(strikes)) {
+    message.ending = Ending::close;
+    deaf_ = true;
+  } else if (strikes.has(FaultKind::glued) && !message.pieces.empty()) {
+    message.holding = Holding::until_next;
+    message.due += longest_hold;
+  }
+  enqueue(std::move(message));
+}
+
+Bytes Peer::event_bytes(const Fault* fault, modbus::TransactionId pending) {
+  if (fault == nullptr) return {};
+  const auto event = server_->event_frame();
+  if (!event) return {};
+  modbus::TransactionId id = pending;
+  if (!fault->pending_transaction) id = {fault->number ? *fault->number : push_transaction_++};
+  return modbus::frame(framing_, {id, unit_, *event});
+}
+
+void Peer::push(const modbus::Pdu& pdu, TimePoint now) {
+  if (deaf_) return;
+  enqueue({.due = now, .pieces = {modbus::frame(framing_, {{push_transaction_++}, unit_, pdu})}});
+}
+
+void Peer::hang_up(TimePoint now) {
+  deaf_ = true;
+  inbox_.clear();
+  enqueue({.due = std::max(now, in_order_from_), .ending = Ending::close});
+}
+
+void Peer::enqueue(Message message) {
+  join_held(message);
+  if (message.pieces.empty() && message.ending == Ending::stay) return;
+  auto place = outbox_.begin();
+  while (place != outbox_.end() && (place->begun || place->due <= message.due)) ++place;
+  outbox_.insert(place, std::move(message));
+}
+
+// A frame that was kept back leaves in one piece with this one, unless this one comes too late.
+void Peer::join_held(Message& message) {
+  const auto held = std::find_if(outbox_.begin(), outbox_.end(), [](const Message& waiting) {
+    return waiting.holding == Holding::until_next && !waiting.begun;
+  });
+  const bool carries = !message.pieces.empty() || message.ending == Ending::close;
+  if (held == outbox_.end() || !carries) return;
+  const TimePoint limit = held->due;
+  const TimePoint ready =
+      message.holding == Holding::until_next ? message.due - longest_hold : message.due;
+  if (ready > limit) return;
+
+  Bytes& last = held->pieces.back();
+  if (!message.pieces.empty()) {
+    append(last, message.pieces.front());
+    message.pieces.pop_front();
+  }
+  message.pieces.insert(message.pieces.begin(), held->pieces.begin(), held->pieces.end());
+  message.due = std::min(message.due, limit);
+  outbox_.erase(held);
+}
+
+std::optional<TimePoint> Peer::next_due() const {
+  if (outbox_.empty()) return std::nullopt;
+  return outbox_.front().due;
+}
+
+Bytes Peer::take(TimePoint now) {
+  if (outbox_.empty()) return {};
+  Message& front = outbox_.front();
+  if (front.pieces.empty() || now < front.due) return {};
+  Bytes piece = std::move(front.pieces.front());
+  front.pieces.pop_front();
+  front.begun = true;
+  if (!front.pieces.empty()) {
+    front.due += piece_distance;
+  } else if (front.ending == Ending::stay) {
+    outbox_.pop_front();
+  }
+  return piece;
+}
+
+bool Peer::closed(TimePoint now) const {
+  if (outbox_.empty()) return false;
+  const Message& front = outbox_.front();
+  return front.ending == Ending::close && front.pieces.empty() && now >= front.due;
+}
+
+}  // namespace spindle::sim
