@@ -85,7 +85,7 @@ class TableRenderer final : public Renderer {
   [[nodiscard]] std::string header() const {
     Row titles;
     for (const Column& column : columns_) titles.push_back(column.title);
-    const std::string line = draw(titles, columns_, widths_);
+    std::string line = draw(titles, columns_, widths_);
     if (streams_.color == Color::off) return line;
     return std::string(bold).append(line).append(plain);
   }
