@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# A short tour of spindle against a simulated tool on a loopback port: tour.sh SPINDLE
+# Fails when a step does not end as it should.
+set -euo pipefail
+
+if (($# != 1)) || [[ ! -x $1 ]]; then
+  printf 'usage: tour.sh SPINDLE, the program to show\n' >&2
+  exit 2
+fi
+program=$(realpath "$1")
+
+# The tour leaves no trace in the user's home and does not depend on what is configured there.
+scratch=$(mktemp -d)
+export XDG_STATE_HOME=$scratch/state XDG_CONFIG_HOME=$scratch/config
+unset SPINDLE_TOOLS
+cd "$scratch"
+
+simulator=
+cleanup() {
+  if [[ -n $simulator ]]; then
+    stop "$simulator"
+  fi
+  rm -rf "$scratch"
+}
+trap cleanup EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+# Ends a process that this script started: politely, and after two seconds for certain.
+stop() {
+  local tries
+  kill -TERM "$1" 2>/dev/null || return 0
+  for ((tries = 0; tries < 20; ++tries)); do
+    kill -0 "$1" 2>/dev/null || return 0
+    sleep 0.1
+  done
+  kill -KILL "$1" 2>/dev/null || true
+}
+
+fail() {
+  printf 'tour: %s\n' "$*" >&2
+  if [[ -s $scratch/simulator.log ]]; then
+    printf 'the simulator said:\n' >&2
+    cat "$scratch/simulator.log" >&2
+  fi
+  exit 1
+}
+
+say() { printf '\n# %s\n' "$*"; }
+
+# The command line as one would type it.
+typed() {
+  local word line=
+  for word in "$@"; do
+    case $word in
+      *[\*\?\[\ ]*) line+=" '$word'" ;;
+      *) line+=" $word" ;;
+    esac
+  done
+  printf '$ spindle%s\n' "$line"
+}
+
+# Runs spindle with the arguments behind the first one, shows it, and insists on the exit status.
+run() {
+  local expected=$1 status=0
+  shift
+  typed "$@"
+  "$program" "$@" </dev/null >"$scratch/output" 2>&1 || status=$?
+  cat "$scratch/output"
+  if ((status != 0)); then
+    printf '(exit status %d)\n' "$status"
+  fi
+  if ((status != expected)); then
+    fail "expected exit status $expected, not $status"
+  fi
+}
+
+# Insists that the last command printed what a pattern of grep describes.
+shown() {
+  grep -Eq -- "$1" "$scratch/output" || fail "the output lacks '$1'"
+}
+
+say "a simulated DOGA BM screwdriver on a free port of this machine"
+typed simulate doga-bm --listen tcp://127.0.0.1:0
+mkfifo answers
+"$program" simulate doga-bm --listen tcp://127.0.0.1:0 >answers 2>simulator.log &
+simulator=$!
+disown
+exec {answers}<answers
+read -r -t 5 url <&"$answers" || fail "the simulator did not say where it listens"
+[[ $url =~ ^tcp://127\.0\.0\.1:[1-9][0-9]*$ ]] || fail "'$url' is not where a simulator listens"
+printf '%s\n' "$url"
+
+say "who is there?"
+run 0 identify "$url"
+shown doga-bm
+
+say "what can be read and set, without any tool"
+run 0 list --profile doga-bm 'preset.1.*'
+shown 'preset\.1\.target-torque'
+
+say "what is set"
+run 0 get "$url" --profile doga-bm 'preset.1.*torque*'
+shown 'preset\.1\.target-torque'
+
+say "more than the tool allows is refused before anything is written"
+run 2 set "$url" --profile doga-bm preset.1.target-torque=9.99
+shown '9\.99'
+
+say "what it allows is written and read back"
+run 0 set "$url" --profile doga-bm preset.1.target-torque=3.10
+run 0 get "$url" --profile doga-bm 'preset.1.*torque*'
+shown 'preset\.1\.target-torque +3\.10'
+
+say "that was the tour; 'spindle --help' shows the rest, and so does ./check"
