@@ -20,7 +20,8 @@ struct ServeOptions {
   sim::FaultPlan faults = {};
   /// Called once with the port that is listened on, before the first connection is accepted.
   std::function<Result<void>(std::uint16_t port)> listening = {};
-  /// Hears every frame: connection number, true direction as seen by the server.
+  /// Hears every connection and all bytes as they come and go (usually a frame at a time):
+  /// connection number, true direction as seen by the server.
   enum class Heard : std::uint8_t { connected, request, response, disconnected };
   std::function<void(Heard, std::uint32_t connection, ByteView bytes)> log = {};
 };

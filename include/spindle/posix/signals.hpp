@@ -1,12 +1,14 @@
 #pragma once
 
+#include <memory>
+
 #include "spindle/base/interrupt.hpp"
 
 namespace spindle::posix {
 
 /// Owns the process's Interrupt while it lives: SIGINT and SIGTERM raise it and make its eventfd
 /// readable (it stays readable); a second signal ends the process at once with 128 + its number.
-/// SIGPIPE is ignored. At most one may exist.
+/// SIGPIPE is ignored. The handlers before it come back at its end. At most one may exist.
 class SignalWatch {
  public:
   SignalWatch();
@@ -16,7 +18,10 @@ class SignalWatch {
   [[nodiscard]] const Interrupt& interrupt() const { return interrupt_; }
 
  private:
+  struct Previous;
+
   Interrupt interrupt_;
+  std::unique_ptr<Previous> previous_;
 };
 
 }  // namespace spindle::posix

@@ -1,0 +1,69 @@
+#include "spindle/posix/signals.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdint>
+
+namespace spindle::posix {
+namespace {
+
+// A shell reads 128 + n as "ended by signal n".
+constexpr int signal_status_base = 128;
+
+constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGPIPE};
+
+// The one mutable global of the program: a signal handler gets nothing but the signal's number, so
+// the way to the Interrupt has to be static.
+std::atomic<Interrupt*> watched{nullptr};
+static_assert(std::atomic<Interrupt*>::is_always_lock_free, "read by a signal handler");
+
+extern "C" void on_signal(int number) {
+  Interrupt* const interrupt = watched.load();
+  if (interrupt == nullptr) return;
+  if (interrupt->raised()) ::_exit(signal_status_base + number);
+  const int interrupted_errno = errno;
+  interrupt->raise(number);
+  const std::uint64_t one = 1;
+  // Fails only when the counter is full; then it is readable already.
+  [[maybe_unused]] const ssize_t written = ::write(interrupt->descriptor(), &one, sizeof one);
+  errno = interrupted_errno;
+}
+
+struct sigaction action_for(int number) {
+  struct sigaction action = {};
+  // No SA_RESTART: a question at the terminal must end too, and that is a plain read().
+  action.sa_handler = number == SIGPIPE ? SIG_IGN : on_signal;
+  for (const int other : watched_signals) ::sigaddset(&action.sa_mask, other);
+  return action;
+}
+
+}  // namespace
+
+struct SignalWatch::Previous {
+  std::array<struct sigaction, watched_signals.size()> actions = {};
+};
+
+SignalWatch::SignalWatch()
+    : interrupt_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      previous_(std::make_unique<Previous>()) {
+  watched.store(&interrupt_);
+  for (std::size_t i = 0; i < watched_signals.size(); ++i) {
+    const struct sigaction action = action_for(watched_signals[i]);
+    ::sigaction(watched_signals[i], &action, &previous_->actions[i]);
+  }
+}
+
+SignalWatch::~SignalWatch() {
+  for (std::size_t i = 0; i < watched_signals.size(); ++i) {
+    ::sigaction(watched_signals[i], &previous_->actions[i], nullptr);
+  }
+  watched.store(nullptr);
+  ::close(interrupt_.descriptor());
+}
+
+}  // namespace spindle::posix

@@ -1,0 +1,72 @@
+#include "spindle/posix/streams.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace spindle::posix {
+namespace {
+
+// 0, or the errno of the write that failed.
+int write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written >= 0) {
+      text.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno == EAGAIN) {
+      // A terminal or pipe shared with a program that made it non-blocking.
+      pollfd room = {descriptor, POLLOUT, 0};
+      ::poll(&room, 1, -1);
+    } else if (errno != EINTR) {
+      return errno;
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+Result<void> write_out(std::string_view text) {
+  const int failure = write_all(STDOUT_FILENO, text);
+  if (failure == 0) return {};
+  if (failure == EPIPE) return tl::unexpected(Error{.code = Errc::closed_pipe});
+  return tl::unexpected(Error{
+      .code = Errc::internal,
+      .message = "cannot write the output: " + std::generic_category().message(failure),
+      .hint = "check the file or disk that the output goes to",
+  });
+}
+
+void write_err(std::string_view text) { write_all(STDERR_FILENO, text); }
+
+std::optional<std::string> read_line() {
+  // Byte by byte: what follows the line belongs to the next reader of standard input.
+  std::string line;
+  char byte = 0;
+  for (;;) {
+    const ssize_t got = ::read(STDIN_FILENO, &byte, 1);
+    // A user who presses Ctrl-C at a question wants out: a signal must not become an answer.
+    if (got < 0) return std::nullopt;
+    if (got == 0) break;
+    if (byte == '\n') return line;
+    line += byte;
+  }
+  if (line.empty()) return std::nullopt;
+  return line;
+}
+
+bool is_terminal(Stream stream) {
+  switch (stream) {
+    case Stream::in:
+      return ::isatty(STDIN_FILENO) == 1;
+    case Stream::out:
+      return ::isatty(STDOUT_FILENO) == 1;
+    case Stream::err:
+      return ::isatty(STDERR_FILENO) == 1;
+  }
+  return false;
+}
+
+}  // namespace spindle::posix

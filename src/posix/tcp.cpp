@@ -1,0 +1,183 @@
+#include "spindle/posix/tcp.hpp"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include <cerrno>
+
+#include "posix/descriptor.hpp"
+#include "posix/resolve.hpp"
+#include "posix/socket_errors.hpp"
+#include "posix/wait.hpp"
+
+namespace spindle::posix {
+namespace {
+
+// A tool that lost its Wi-Fi says nothing. These let the system notice within about ten seconds:
+// short enough that an operator still stands before the tool, long enough to roam between access
+// points. An idle connection gets three probes after five seconds of silence; a busy one breaks
+// after ten seconds without an acknowledgement, or old requests would pile up and reach the tool
+// when it comes back.
+constexpr int keep_alive_idle_s = 5;
+constexpr int keep_alive_interval_s = 2;
+constexpr int keep_alive_probes = 3;
+constexpr unsigned user_timeout_ms = 10'000;
+
+template <typename Value>
+void set_option(const Descriptor& socket, int level, int option, Value value) {
+  // Not checked: a connection without one of these still works.
+  ::setsockopt(socket.number(), level, option, &value, sizeof value);
+}
+
+// After connecting: the user timeout would otherwise cut the connect timeout short.
+void set_options(const Descriptor& socket) {
+  set_option(socket, IPPROTO_TCP, TCP_NODELAY, 1);
+  set_option(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
+  set_option(socket, IPPROTO_TCP, TCP_KEEPIDLE, keep_alive_idle_s);
+  set_option(socket, IPPROTO_TCP, TCP_KEEPINTVL, keep_alive_interval_s);
+  set_option(socket, IPPROTO_TCP, TCP_KEEPCNT, keep_alive_probes);
+  set_option(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, user_timeout_ms);
+}
+
+class TcpTransport final : public link::Transport {
+ public:
+  TcpTransport(Descriptor socket, const Clock& clock, const Interrupt& interrupt)
+      : socket_(std::move(socket)), clock_(&clock), interrupt_(&interrupt) {}
+
+  Result<void> send(ByteView bytes, TimePoint deadline) override;
+  Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
+  void shield() override { shield_ = Shield::up; }
+
+ private:
+  [[nodiscard]] bool interrupted() const { return shield_ == Shield::down && interrupt_->raised(); }
+  // Whether the socket became ready before the deadline.
+  Result<bool> wait(short events, TimePoint deadline) const;
+
+  Descriptor socket_;
+  const Clock* clock_;
+  const Interrupt* interrupt_;
+  Shield shield_ = Shield::down;
+};
+
+Result<bool> TcpTransport::wait(short events, TimePoint deadline) const {
+  const Interest interest = {.descriptor = socket_.number(), .events = events};
+  const Woken woken = wait_for(interest, deadline, *clock_, *interrupt_, shield_);
+  if (woken == Woken::interrupted) return tl::unexpected(interrupt_->error());
+  return woken == Woken::ready;
+}
+
+Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
+  while (!bytes.empty()) {
+    if (interrupted()) return tl::unexpected(interrupt_->error());
+    const ssize_t sent = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent >= 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      continue;
+    }
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN) return tl::unexpected(stream_error(errno));
+    const Result<bool> ready = wait(POLLOUT, deadline);
+    if (!ready) return tl::unexpected(ready.error());
+    if (!*ready) {
+      return tl::unexpected(
+          Error{.code = Errc::no_answer, .message = "connected, but the tool takes no more data"});
+    }
+  }
+  return {};
+}
+
+Result<std::size_t> TcpTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
+  for (;;) {
+    // Before every read: an interrupt wins over data that never ends, too.
+    if (interrupted()) return tl::unexpected(interrupt_->error());
+    const ssize_t received = ::recv(socket_.number(), into.data(), into.size(), 0);
+    if (received > 0) return static_cast<std::size_t>(received);
+    if (received == 0) return tl::unexpected(Error{.code = Errc::closed});
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN) return tl::unexpected(stream_error(errno));
+    const Result<bool> ready = wait(POLLIN, deadline);
+    if (!ready) return tl::unexpected(ready.error());
+    if (!*ready) return 0;
+  }
+}
+
+int pending_error(const Descriptor& socket) {
+  int error_number = 0;
+  socklen_t size = sizeof error_number;
+  ::getsockopt(socket.number(), SOL_SOCKET, SO_ERROR, &error_number, &size);
+  return error_number;
+}
+
+Result<Descriptor> connect_to(const Address& address, TimePoint deadline, const Clock& clock,
+                              const Interrupt& interrupt) {
+  Descriptor socket(
+      ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!socket.valid()) return tl::unexpected(connect_error(errno));
+  if (::connect(socket.number(), address.data(), address.size) == 0) return socket;
+  // A signal does not stop a connect under way.
+  if (errno != EINPROGRESS && errno != EINTR) return tl::unexpected(connect_error(errno));
+
+  const Interest connected = {.descriptor = socket.number(), .events = POLLOUT};
+  switch (wait_for(connected, deadline, clock, interrupt)) {
+    case Woken::interrupted:
+      return tl::unexpected(interrupt.error());
+    case Woken::deadline:
+      return tl::unexpected(connect_error(ETIMEDOUT));
+    case Woken::ready:
+      break;
+  }
+  const int failure = pending_error(socket);
+  if (failure != 0) return tl::unexpected(connect_error(failure));
+  return socket;
+}
+
+// Which of two addresses' failures says more. A name often has an IPv6 address that this computer
+// has no route to; that must not hide what the IPv4 address said.
+bool says_more(const Error& newer, const std::optional<Error>& older) {
+  return !older || newer.code != Errc::no_route || older->code == Errc::no_route;
+}
+
+struct Attempt {
+  TimePoint deadline;
+  Duration allowed;
+};
+
+Result<Descriptor> connect_to_any(const Resolved& resolved, const Attempt& attempt,
+                                  const Clock& clock, const Interrupt& interrupt) {
+  std::optional<Error> failure;
+  auto untried = static_cast<std::int64_t>(resolved.addresses.size());
+  for (const Address& address : resolved.addresses) {
+    // An address that swallows everything must leave time for those after it.
+    const TimePoint now = clock.now();
+    const TimePoint share = now + (attempt.deadline - now) / untried--;
+    Result<Descriptor> socket = connect_to(address, share, clock, interrupt);
+    if (socket) return socket;
+    if (interrupt.raised()) return tl::unexpected(interrupt.error());
+
+    Error error = std::move(socket.error());
+    if (error.code == Errc::connect_timeout) error.waited = attempt.allowed;
+    if (resolved.given == Resolved::Given::name) {
+      error.message = fmt::format("{} (address {})", message_of(error), to_text(address));
+    }
+    if (says_more(error, failure)) failure = std::move(error);
+  }
+  return tl::unexpected(failure.value_or(Error{.code = Errc::no_route}));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<link::Transport>> open_tcp(const std::string& host, std::uint16_t port,
+                                                  Duration connect_timeout, Clock& clock,
+                                                  const Interrupt& interrupt) {
+  const Attempt attempt = {.deadline = clock.now() + connect_timeout, .allowed = connect_timeout};
+  const Result<Resolved> resolved = resolve(host, port, attempt.deadline, clock, interrupt);
+  if (!resolved) return tl::unexpected(resolved.error());
+  Result<Descriptor> socket = connect_to_any(*resolved, attempt, clock, interrupt);
+  if (!socket) return tl::unexpected(std::move(socket.error()));
+  set_options(*socket);
+  return std::make_unique<TcpTransport>(std::move(*socket), clock, interrupt);
+}
+
+}  // namespace spindle::posix

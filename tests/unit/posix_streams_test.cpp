@@ -1,0 +1,165 @@
+#include <doctest/doctest.h>
+#include <fcntl.h>
+#include <sys/time.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <functional>
+#include <string>
+
+#include "posix/descriptor.hpp"
+#include "spindle/posix/streams.hpp"
+
+using namespace spindle;
+using posix::Descriptor;
+
+namespace {
+
+struct Pipe {
+  Pipe() {
+    std::array<int, 2> ends = {-1, -1};
+    if (::pipe2(ends.data(), O_CLOEXEC) == 0) {
+      reader = Descriptor(ends[0]);
+      writer = Descriptor(ends[1]);
+    }
+  }
+  Descriptor reader;
+  Descriptor writer;
+};
+
+void put(const Descriptor& descriptor, std::string_view text) {
+  REQUIRE(::write(descriptor.number(), text.data(), text.size()) ==
+          static_cast<ssize_t>(text.size()));
+}
+
+std::string read_all(const Descriptor& descriptor) {
+  std::string all;
+  std::array<char, 65536> some;
+  ssize_t got = 0;
+  while ((got = ::read(descriptor.number(), some.data(), some.size())) > 0) {
+    all.append(some.data(), static_cast<std::size_t>(got));
+  }
+  return all;
+}
+
+// Runs `body` in a child in which `standard` is `descriptor`; the child's exit status is what
+// `body` returns. The test's own streams stay as they are.
+pid_t start(int standard, int descriptor, const std::function<int()>& body) {
+  // What the test runner has not written yet must not be written by the child.
+  std::fflush(nullptr);
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  ::alarm(5);
+  ::signal(SIGPIPE, SIG_IGN);
+  ::dup2(descriptor, standard);
+  ::_exit(body());
+}
+
+int finish(pid_t child) {
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+}  // namespace
+
+TEST_CASE("streams: everything is written, also more than a pipe holds at once") {
+  for (const int flags : {0, O_NONBLOCK}) {
+    CAPTURE(flags);
+    Pipe pipe;
+    ::fcntl(pipe.writer.number(), F_SETFL, flags);
+    const std::string text(300'000, 'x');
+    const pid_t child = start(STDOUT_FILENO, pipe.writer.number(),
+                              [&text] { return posix::write_out(text).has_value() ? 0 : 1; });
+    pipe.writer.close();
+    CHECK((read_all(pipe.reader) == text));
+    CHECK(finish(child) == 0);
+  }
+}
+
+TEST_CASE("streams: a reader that is gone is closed_pipe, and status 0") {
+  Pipe pipe;
+  pipe.reader.close();
+  const pid_t child = start(STDOUT_FILENO, pipe.writer.number(), [] {
+    const Result<void> result = posix::write_out("x");
+    const bool expected = !result && result.error().code == Errc::closed_pipe;
+    return expected && result.error().status() == ExitStatus::ok ? 0 : 1;
+  });
+  CHECK(finish(child) == 0);
+}
+
+TEST_CASE("streams: a full disk is told in the system's words") {
+  const Descriptor full(::open("/dev/full", O_WRONLY | O_CLOEXEC));
+  REQUIRE(full.valid());
+  const pid_t child = start(STDOUT_FILENO, full.number(), [] {
+    const Result<void> result = posix::write_out("x");
+    const bool expected =
+        !result && result.error().code == Errc::internal &&
+        result.error().message == "cannot write the output: No space left on device";
+    return expected ? 0 : 1;
+  });
+  CHECK(finish(child) == 0);
+}
+
+TEST_CASE("streams: messages go to standard error, and a closed one is no harm") {
+  Pipe pipe;
+  const pid_t child = start(STDERR_FILENO, pipe.writer.number(), [] {
+    posix::write_err("spindle: oops\n");
+    return 0;
+  });
+  pipe.writer.close();
+  CHECK(read_all(pipe.reader) == "spindle: oops\n");
+  CHECK(finish(child) == 0);
+
+  Pipe broken;
+  broken.reader.close();
+  CHECK(finish(start(STDERR_FILENO, broken.writer.number(), [] {
+          posix::write_err("nobody hears this");
+          return 0;
+        })) == 0);
+}
+
+TEST_CASE("streams: lines are read without their end, the last one also without one") {
+  Pipe pipe;
+  put(pipe.writer, "yes\n\nlast");
+  pipe.writer.close();
+  const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [] {
+    if (posix::read_line() != "yes") return 1;
+    if (posix::read_line() != "") return 2;
+    if (posix::read_line() != "last") return 3;
+    return posix::read_line().has_value() ? 4 : 0;
+  });
+  CHECK(finish(child) == 0);
+}
+
+TEST_CASE("streams: a signal at the prompt is never an answer") {
+  Pipe pipe;
+  put(pipe.writer, "y");
+  const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [] {
+    struct sigaction action = {};
+    action.sa_handler = [](int) {};
+    ::sigaction(SIGALRM, &action, nullptr);
+    // The alarm comes again and again: whenever the read begins, one falls into it.
+    const timeval period = {.tv_sec = 0, .tv_usec = 1000};
+    const itimerval timer = {.it_interval = period, .it_value = period};
+    ::setitimer(ITIMER_REAL, &timer, nullptr);
+    return posix::read_line().has_value() ? 1 : 0;
+  });
+  CHECK(finish(child) == 0);
+}
+
+TEST_CASE("streams: a pipe is no terminal") {
+  Pipe pipe;
+  const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [&pipe] {
+    ::dup2(pipe.writer.number(), STDOUT_FILENO);
+    ::dup2(pipe.writer.number(), STDERR_FILENO);
+    const bool any = posix::is_terminal(posix::Stream::in) ||
+                     posix::is_terminal(posix::Stream::out) ||
+                     posix::is_terminal(posix::Stream::err);
+    return any ? 1 : 0;
+  });
+  CHECK(finish(child) == 0);
+}

@@ -1,0 +1,126 @@
+#include "spindle/posix/signals.hpp"
+
+#include <doctest/doctest.h>
+#include <poll.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <functional>
+#include <optional>
+
+#include "spindle/posix/clock.hpp"
+
+using namespace spindle;
+using namespace std::chrono_literals;
+
+namespace {
+
+bool readable(int descriptor) {
+  pollfd polled = {descriptor, POLLIN, 0};
+  return ::poll(&polled, 1, 0) == 1;
+}
+
+// The wait status of a child that runs `body`, then ends with 0. For what ends a process.
+int status_of_child(const std::function<void()>& body) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(5);
+    body();
+    ::_exit(0);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  return status;
+}
+
+void (*handler_of(int number))(int) {
+  struct sigaction action = {};
+  ::sigaction(number, nullptr, &action);
+  return action.sa_handler;
+}
+
+}  // namespace
+
+TEST_CASE("signals: the first one raises the interrupt and makes its descriptor readable") {
+  struct Row {
+    int signal;
+    Errc code;
+    ExitStatus status;
+  };
+  const Row rows[] = {{SIGINT, Errc::interrupted, ExitStatus::interrupted},
+                      {SIGTERM, Errc::terminated, ExitStatus::terminated}};
+  for (const Row& row : rows) {
+    CAPTURE(row.signal);
+    const posix::SignalWatch watch;
+    REQUIRE_FALSE(watch.interrupt().raised());
+    REQUIRE_FALSE(readable(watch.interrupt().descriptor()));
+    ::raise(row.signal);
+    REQUIRE(watch.interrupt().raised());
+    CHECK(watch.interrupt().error().code == row.code);
+    CHECK(watch.interrupt().error().status() == row.status);
+    CHECK(readable(watch.interrupt().descriptor()));
+    CHECK(readable(watch.interrupt().descriptor()));
+  }
+}
+
+TEST_CASE("signals: one that arrives during a sleep ends it") {
+  const posix::SignalWatch watch;
+  posix::SteadyClock clock(watch.interrupt());
+  const pid_t self = ::getpid();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::kill(self, SIGTERM);
+    ::_exit(0);
+  }
+  const Result<void> slept = clock.sleep_until(clock.now() + 5s);
+  ::waitpid(child, nullptr, 0);
+  REQUIRE_FALSE(slept.has_value());
+  CHECK(slept.error().code == Errc::terminated);
+}
+
+TEST_CASE("signals: the second one ends the process with 128 + its number") {
+  struct Row {
+    int first;
+    int second;
+    int status;
+  };
+  const Row rows[] = {{SIGINT, SIGINT, 130}, {SIGTERM, SIGTERM, 143}, {SIGINT, SIGTERM, 143}};
+  for (const Row& row : rows) {
+    CAPTURE(row.first);
+    CAPTURE(row.second);
+    const int status = status_of_child([&row] {
+      const posix::SignalWatch watch;
+      ::raise(row.first);
+      ::raise(row.second);
+    });
+    REQUIRE(WIFEXITED(status));
+    CHECK(WEXITSTATUS(status) == row.status);
+  }
+}
+
+TEST_CASE("signals: writing to a closed pipe is an error, not the end") {
+  const int status = status_of_child([] {
+    const posix::SignalWatch watch;
+    int ends[2];
+    if (::pipe(ends) != 0) ::_exit(1);
+    ::close(ends[0]);
+    if (::write(ends[1], "x", 1) != -1 || errno != EPIPE) ::_exit(2);
+  });
+  CHECK(status == 0);
+}
+
+TEST_CASE("signals: afterwards the earlier handlers are back, and a new watch starts fresh") {
+  constexpr int numbers[] = {SIGINT, SIGTERM, SIGPIPE};
+  void (*before[3])(int) = {};
+  for (int i = 0; i < 3; ++i) before[i] = handler_of(numbers[i]);
+  {
+    const posix::SignalWatch watch;
+    for (int i = 0; i < 3; ++i) CHECK((handler_of(numbers[i]) != before[i]));
+    ::raise(SIGINT);
+    CHECK(watch.interrupt().raised());
+  }
+  for (int i = 0; i < 3; ++i) CHECK((handler_of(numbers[i]) == before[i]));
+  const posix::SignalWatch again;
+  CHECK_FALSE(again.interrupt().raised());
+}
