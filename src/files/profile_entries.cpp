@@ -1,0 +1,325 @@
+#include "files/profile_entries.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::files {
+namespace {
+
+using catalogue::Action;
+using catalogue::Evidence;
+using catalogue::Hazard;
+using catalogue::Kind;
+using catalogue::Label;
+using catalogue::Parameter;
+
+constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
+
+/// Repetitions multiply; a slip of the pen must not fill the memory.
+constexpr std::size_t most_parameters = 10'000;
+
+constexpr std::string_view counter = "{n}";
+
+constexpr std::array<std::pair<std::string_view, Kind>, 4> encoding_words = {
+    {{"u16", Kind::u16}, {"i16", Kind::i16}, {"u32", Kind::u32}, {"i32", Kind::i32}}};
+
+/// "torque" stands for the torque unit that is set on the tool.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 24> unit_words = {{
+    {"", ""},         {"torque", "torque"}, {"%", "%"},           {"deg", "deg"},
+    {"rpm", "rpm"},   {"us", "us"},         {"ms", "ms"},         {"s", "s"},
+    {"min", "min"},   {"h", "h"},           {"degC", "degC"},     {"V", "V"},
+    {"mV", "mV"},     {"A", "A"},           {"mA", "mA"},         {"W", "W"},
+    {"Hz", "Hz"},     {"kgf.cm", "kgf.cm"}, {"kgf.m", "kgf.m"},   {"N.m", "N.m"},
+    {"cN.m", "cN.m"}, {"lbf.in", "lbf.in"}, {"ozf.in", "ozf.in"}, {"lbf.ft", "lbf.ft"},
+}};
+
+constexpr std::array<std::pair<std::string_view, Hazard>, 5> hazard_words = {
+    {{"none", Hazard::none},
+     {"moves", Hazard::moves},
+     {"locks", Hazard::locks},
+     {"unclear", Hazard::unclear},
+     {"erases", Hazard::erases}}};
+
+/// One entry before it is repeated.
+struct Template {
+  Parameter parameter;
+  NumberRange numbers = {};  ///< of {n}
+  std::uint64_t stride = 0;
+  std::optional<Evidence> repeats = std::nullopt;  ///< evidence of all but the first
+  bool repeated = false;
+};
+
+std::vector<Label> read_labels(const YamlNode& map, Findings& findings) {
+  std::vector<Label> labels;
+  expect(map, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : map.entries) {
+    const auto number = parse_integer(entry.key);
+    if (!number) {
+      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
+    }
+    auto text = to_text(entry.value, findings);
+    if (number && text) labels.push_back({*number, std::move(*text)});
+  }
+  return labels;
+}
+
+/// "0..6.00", where either side may be left out.
+std::optional<catalogue::Range> parse_limits(std::string_view text) {
+  const std::size_t dots = text.find("..");
+  if (dots == std::string_view::npos || text.size() == 2) return std::nullopt;
+  const std::string_view low = text.substr(0, dots);
+  const std::string_view high = text.substr(dots + 2);
+  catalogue::Range range{Decimal::parse(low), Decimal::parse(high)};
+  const bool wrong = (!low.empty() && !range.minimum) || (!high.empty() && !range.maximum);
+  if (wrong) return std::nullopt;
+  return range;
+}
+
+void read_limits(YamlMap& map, Parameter& parameter) {
+  const YamlNode* node = map.get("range");
+  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, map.findings())) return;
+  if (auto range = parse_limits(node->text)) {
+    parameter.range = *range;
+  } else {
+    map.findings().add(node->at, fmt::format("'{}' is not a range such as 0..6.00", node->text));
+  }
+}
+
+void read_scale(YamlMap& map, Parameter& parameter) {
+  const auto scale = map.decimal("scale");
+  if (!scale) return;
+  if (*scale > Decimal(0)) {
+    parameter.encoding.scale = *scale;
+  } else {
+    map.findings().add(map.node().at, "scale must be above zero");
+  }
+}
+
+std::string read_name(YamlMap& map, const YamlNode* group) {
+  if (group == nullptr) return map.text("name", Need::required).value_or("");
+  map.allow("name");
+  const YamlNode* prefix = group->find("name");
+  const YamlNode* own = map.node().find("name");
+  if (own == nullptr) {
+    map.findings().add(map.node().at, "key 'name' is missing");
+    return {};
+  }
+  return (prefix != nullptr ? prefix->text : std::string()) +
+         to_text(*own, map.findings()).value_or("");
+}
+
+void read_repetition(YamlMap& map, Template& entry) {
+  const auto numbers = map.range("n", last_register);
+  const auto stride = map.number<std::uint16_t>("stride");
+  entry.repeats = map.word<Evidence>("repeats", "evidence", evidence_words);
+  const bool has_counter = entry.parameter.name.find(counter) != std::string::npos;
+  if (has_counter != numbers.has_value()) {
+    map.findings().add(map.node().at, has_counter ? "the name has {n}, but key 'n' is missing"
+                                                  : "key 'n' is given, but the name has no {n}");
+    return;
+  }
+  if (!numbers) return;
+  if (!stride || *stride == 0) {
+    map.findings().add(map.node().at, "key 'n' needs a 'stride' above zero");
+    return;
+  }
+  entry.repeated = true;
+  entry.numbers = *numbers;
+  entry.stride = *stride;
+}
+
+Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
+  Template entry;
+  Parameter& parameter = entry.parameter;
+  parameter.name = read_name(map, group);
+  assign(parameter.title, map.text("title", Need::required));
+  assign(parameter.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  if (auto address = map.number<std::uint16_t>("register", Need::required)) {
+    parameter.address = {*address};
+  }
+  assign(parameter.encoding.kind,
+         map.word<Kind>("encoding", "encoding", encoding_words, Need::required));
+  read_scale(map, parameter);
+  if (const auto unit = map.word<std::string_view>("unit", "unit", unit_words)) {
+    parameter.unit = *unit;
+  }
+  read_limits(map, parameter);
+  parameter.default_value = map.decimal("default");
+  if (const YamlNode* labels = map.get("labels")) {
+    parameter.labels = read_labels(*labels, map.findings());
+  }
+  assign(parameter.access,
+         map.word<catalogue::Access>("access", "access", access_words, Need::required));
+  assign(parameter.evidence,
+         map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+  assign(parameter.source, map.text("source", Need::required));
+  assign(parameter.note, map.text("note"));
+  overlaps = map.flag("overlaps").value_or(false);
+  read_repetition(map, entry);
+  return entry;
+}
+
+std::string substitute(std::string text, std::uint64_t number) {
+  for (std::size_t at = text.find(counter); at != std::string::npos; at = text.find(counter, at)) {
+    text.replace(at, counter.size(), std::to_string(number));
+  }
+  return text;
+}
+
+void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draft,
+                   Findings& findings) {
+  std::vector<Parameter>& parameters = draft.profile.parameters;
+  const auto [known, is_new] = draft.parameter_index.try_emplace(parameter.name, parameters.size());
+  if (is_new) {
+    parameters.push_back(std::move(parameter));
+    draft.parameters.push_back(origin);
+  } else if (draft.parameters[known->second].layer == origin.layer) {
+    findings.add_once(origin.of("name"),
+                      fmt::format("parameter '{}' is already there", parameter.name));
+  } else {
+    parameters[known->second] = std::move(parameter);
+    draft.parameters[known->second] = origin;
+  }
+}
+
+void repeat(const Template& entry, const Origin& origin, ProfileDraft& draft, Findings& findings) {
+  const std::uint64_t first = entry.parameter.address.value;
+  for (std::uint64_t n = entry.numbers.from; n <= entry.numbers.to; ++n) {
+    const std::uint64_t address = first + (n - entry.numbers.from) * entry.stride;
+    if (address > last_register || draft.profile.parameters.size() >= most_parameters) {
+      findings.add_once(
+          origin.of("n"),
+          address > last_register
+              ? fmt::format("repetition {} would be at register {}, behind the last", n, address)
+              : fmt::format("more than {} parameters", most_parameters));
+      return;
+    }
+    Parameter parameter = entry.parameter;
+    parameter.name = substitute(std::move(parameter.name), n);
+    parameter.title = substitute(std::move(parameter.title), n);
+    parameter.address = {static_cast<std::uint16_t>(address)};
+    if (n != entry.numbers.from) assign(parameter.evidence, std::optional(entry.repeats));
+    add_parameter(std::move(parameter), origin, draft, findings);
+  }
+}
+
+void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft,
+                Findings& findings) {
+  YamlMap map(node, findings, group);
+  Origin origin{.entry = &node, .group = group, .layer = draft.layers};
+  Template entry = read_template(map, group, origin.overlaps);
+  map.finish();
+  if (entry.parameter.name.empty()) return;
+  if (entry.repeated) {
+    repeat(entry, origin, draft, findings);
+  } else {
+    add_parameter(std::move(entry.parameter), origin, draft, findings);
+  }
+}
+
+void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
+                Findings& findings) {
+  YamlMap group(node, findings);
+  for (const std::string_view key :
+       {"name", "n", "stride", "table", "encoding", "scale", "unit", "access", "evidence",
+        "repeats", "source", "note", "overlaps", "fields"}) {
+    group.allow(key);
+  }
+  group.finish();
+  expect(fields, YamlNode::Kind::sequence, findings);
+  for (const YamlNode& field : fields.items) read_entry(field, &node, draft, findings);
+}
+
+void read_given_value(YamlMap& map, Action& action) {
+  if (const YamlNode* labels = map.get("labels")) {
+    action.labels = read_labels(*labels, map.findings());
+    std::erase_if(action.labels, [&](const Label& label) {
+      const bool wrong =
+          label.number < 0 || label.number > static_cast<std::int64_t>(last_register);
+      if (wrong) map.findings().add(labels->at, fmt::format("{} does not fit u16", label.number));
+      return wrong;
+    });
+  }
+  if (const auto range = map.range("range", last_register)) {
+    action.minimum = static_cast<std::uint16_t>(range->from);
+    action.maximum = static_cast<std::uint16_t>(range->to);
+  } else if (!action.labels.empty()) {
+    const auto [low, high] =
+        std::minmax_element(action.labels.begin(), action.labels.end(),
+                            [](const Label& a, const Label& b) { return a.number < b.number; });
+    action.minimum = static_cast<std::uint16_t>(low->number);
+    action.maximum = static_cast<std::uint16_t>(high->number);
+  } else if (!action.value) {
+    map.findings().add(map.node().at, "an action needs a 'value', or a 'range' or 'labels'");
+  }
+}
+
+Action read_action(YamlMap& map) {
+  Action action;
+  assign(action.name, map.text("name", Need::required));
+  assign(action.title, map.text("title"));
+  if (auto address = map.number<std::uint16_t>("register", Need::required)) {
+    action.address = {*address};
+  }
+  action.value = map.number<std::uint16_t>("value");
+  action.stop_value = map.number<std::uint16_t>("stop");
+  read_given_value(map, action);
+  assign(action.hazard, map.word<Hazard>("hazard", "hazard", hazard_words, Need::required));
+  assign(action.evidence,
+         map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+  assign(action.source, map.text("source", Need::required));
+  assign(action.check, map.text("check"));
+  assign(action.confirm, map.text("confirm"));
+  if (const auto confirmed = map.number<std::uint32_t>("confirm-value")) {
+    action.confirm_value = *confirmed;
+  }
+  return action;
+}
+
+void add_action(Action action, const Origin& origin, ProfileDraft& draft, Findings& findings) {
+  std::vector<Action>& actions = draft.profile.actions;
+  const auto known = std::find_if(actions.begin(), actions.end(),
+                                  [&](const Action& other) { return other.name == action.name; });
+  if (known == actions.end()) {
+    actions.push_back(std::move(action));
+    draft.actions.push_back(origin);
+    return;
+  }
+  Origin& old = draft.actions[static_cast<std::size_t>(known - actions.begin())];
+  if (old.layer == origin.layer) {
+    findings.add(origin.of("name"), fmt::format("action '{}' is already there", action.name));
+  } else {
+    *known = std::move(action);
+    old = origin;
+  }
+}
+
+}  // namespace
+
+void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
+  expect(list, YamlNode::Kind::sequence, findings);
+  for (const YamlNode& node : list.items) {
+    if (const YamlNode* fields = node.find("fields")) {
+      read_group(node, *fields, draft, findings);
+    } else {
+      read_entry(node, nullptr, draft, findings);
+    }
+  }
+}
+
+void read_actions(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
+  expect(list, YamlNode::Kind::sequence, findings);
+  for (const YamlNode& node : list.items) {
+    YamlMap map(node, findings);
+    Action action = read_action(map);
+    map.finish();
+    if (action.name.empty()) continue;
+    add_action(std::move(action), {.entry = &node, .layer = draft.layers}, draft, findings);
+  }
+}
+
+}  // namespace spindle::files

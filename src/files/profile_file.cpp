@@ -1,0 +1,489 @@
+#include "files/profile_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "files/profile_entries.hpp"
+#include "files/yaml_map.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::files {
+namespace {
+
+using catalogue::Area;
+using catalogue::CodeText;
+using catalogue::Evidence;
+
+/// The only format there is; a later one gets a number of its own.
+constexpr std::uint16_t known_format = 1;
+
+constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
+constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
+
+constexpr std::array<std::pair<std::string_view, modbus::Framing>, 2> framing_words = {
+    {{"tcp", modbus::Framing::tcp}, {"rtu", modbus::Framing::rtu}}};
+constexpr std::array<std::pair<std::string_view, char>, 3> parity_words = {
+    {{"none", 'N'}, {"even", 'E'}, {"odd", 'O'}}};
+constexpr std::array<std::pair<std::string_view, bool>, 2> pair_words = {
+    {{"even", true}, {"any", false}}};
+/// A tool that does not copy the transaction id cannot be told from its own pushed frames.
+constexpr std::array<std::pair<std::string_view, bool>, 1> transaction_words = {{{"echoed", true}}};
+
+Need need_of(bool inherited) { return inherited ? Need::optional : Need::required; }
+
+// ---- register areas ----
+
+std::optional<Area> read_area(const YamlNode& node, modbus::RegisterTable table,
+                              Findings& findings) {
+  Area area{.table = table};
+  std::optional<NumberRange> range;
+  if (node.kind == YamlNode::Kind::map) {
+    YamlMap map(node, findings);
+    range = map.range("at", last_register, Need::required);
+    assign(area.note, map.text("note"));
+    map.finish();
+  } else {
+    range = to_range(node, last_register, findings);
+  }
+  if (!range) return std::nullopt;
+  area.from = static_cast<std::uint16_t>(range->from);
+  area.to = static_cast<std::uint16_t>(range->to);
+  return area;
+}
+
+/// {holding: [1..725, {at: 564..568, note: "..."}], input: [...]}
+std::optional<std::vector<Area>> read_areas(const YamlNode* node, Findings& findings) {
+  if (node == nullptr) return std::nullopt;
+  YamlMap map(*node, findings);
+  std::vector<Area> areas;
+  for (const auto& [name, table] : table_words) {
+    const YamlNode* list = map.get(name);
+    if (list == nullptr || !expect(*list, YamlNode::Kind::sequence, findings)) continue;
+    for (const YamlNode& item : list->items) {
+      if (auto area = read_area(item, table, findings)) areas.push_back(std::move(*area));
+    }
+  }
+  map.finish();
+  return areas;
+}
+
+// ---- link ----
+
+std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node, Findings& findings) {
+  if (node == nullptr || !expect(*node, YamlNode::Kind::sequence, findings)) return std::nullopt;
+  std::vector<catalogue::GapRule> gaps;
+  for (const YamlNode& item : node->items) {
+    YamlMap map(item, findings);
+    catalogue::GapRule rule;
+    assign(rule.up_to_baud, map.number<unsigned>("up-to"));
+    map.get("gap", Need::required);
+    assign(rule.gap, map.duration("gap"));
+    map.finish();
+    gaps.push_back(rule);
+  }
+  return gaps;
+}
+
+void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings& findings) {
+  YamlMap map(node, findings);
+  assign(serial.baud, map.number<unsigned>("baud"));
+  assign(serial.parity, map.word<char>("parity", "parity", parity_words));
+  assign(serial.stop_bits, map.number<unsigned>("stop"));
+  assign(serial.gaps, read_gaps(map.get("gaps"), findings));
+  assign(serial.broadcast_pause, map.duration("broadcast-pause"));
+  map.finish();
+}
+
+void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(node, findings);
+  catalogue::LinkFacts& link = draft.profile.link;
+  assign(link.framing, map.word<modbus::Framing>("framing", "framing", framing_words,
+                                                 need_of(draft.link.entry != nullptr)));
+  assign(link.port, map.number<std::uint16_t>("port"));
+  assign(link.unit, map.number<std::uint8_t>("unit"));
+  map.word<bool>("transaction", "transaction", transaction_words);
+  assign(link.max_read, map.number<std::uint16_t>("max-read"));
+  assign(link.max_write, map.number<std::uint16_t>("max-write"));
+  assign(link.keep_alive, map.duration("keep-alive"));
+  assign(link.answer, map.duration("answer"));
+  assign(link.connect, map.duration("connect"));
+  assign(link.retries, map.number<unsigned>("retries"));
+  assign(link.loopback, map.flag("loopback"));
+  assign(link.even_pairs, map.word<bool>("pairs", "pairs", pair_words));
+  if (const YamlNode* serial = map.get("serial")) read_serial(*serial, link.serial, findings);
+  assign(link.contiguous, read_areas(map.get("contiguous"), findings));
+  assign(link.absent, read_areas(map.get("absent"), findings));
+  map.finish();
+}
+
+// ---- identity ----
+
+template <typename Number>
+void read_names(const YamlNode* node, std::map<Number, std::string>& names, Findings& findings) {
+  if (node == nullptr) return;
+  expect(*node, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : node->entries) {
+    const auto number = parse_unsigned(entry.key, last_register);
+    if (!number) {
+      findings.add(entry.key_at,
+                   fmt::format("'{}' is not a number up to {}", entry.key, last_register));
+    }
+    auto text = to_text(entry.value, findings);
+    if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
+  }
+}
+
+std::optional<catalogue::Slice> read_slice(YamlMap& map, std::string_view key,
+                                           Need need = Need::optional) {
+  const auto range = map.range(key, last_byte, need);
+  if (!range) return std::nullopt;
+  return catalogue::Slice{static_cast<std::uint8_t>(range->from),
+                          static_cast<std::uint8_t>(range->to - range->from + 1)};
+}
+
+void read_long_serial(const YamlNode& node, catalogue::IdentityFacts& identity,
+                      Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(identity.long_serial_bytes != 0);
+  assign(identity.long_serial_bytes, map.number<std::uint8_t>("from-bytes", need));
+  assign(identity.long_serial, read_slice(map, "at", need));
+  assign(identity.product_byte, map.number<std::uint8_t>("product-at"));
+  read_names(map.get("products"), identity.products, findings);
+  map.finish();
+}
+
+void read_total(const YamlNode& node, catalogue::IdentityFacts& identity, Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(identity.total_bytes != 0);
+  assign(identity.total_bytes, map.number<std::uint8_t>("from-bytes", need));
+  assign(identity.total, read_slice(map, "at", need));
+  map.finish();
+}
+
+void read_identity(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(draft.profile.identity.has_value());
+  if (!draft.profile.identity) draft.profile.identity.emplace();
+  catalogue::IdentityFacts& identity = *draft.profile.identity;
+  assign(identity.minimum_bytes, map.number<std::uint8_t>("minimum-bytes", need));
+  assign(identity.id, read_slice(map, "id"));
+  assign(identity.controller_model, read_slice(map, "controller-model"));
+  assign(identity.tool_model, read_slice(map, "tool-model", need));
+  assign(identity.firmware, read_slice(map, "firmware", need));
+  assign(identity.serial, read_slice(map, "serial", need));
+  if (const YamlNode* part = map.get("long-serial")) read_long_serial(*part, identity, findings);
+  if (const YamlNode* part = map.get("total")) read_total(*part, identity, findings);
+  read_names(map.get("models", need), identity.models, findings);
+  assign(identity.firmware_below, map.number<unsigned>("firmware-below"));
+  map.finish();
+}
+
+// ---- events, limits, numbered ----
+
+void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
+  YamlMap map(node, findings);
+  assign(events.arm_register,
+         map.number<std::uint16_t>("register", need_of(events.arm_register != 0)));
+  assign(events.arm_value, map.number<std::uint16_t>("value"));
+  assign(events.disarm_value, map.number<std::uint16_t>("disarm"));
+  assign(events.arm_every, map.duration("every"));
+  assign(events.arm_expires, map.duration("expires"));
+  map.finish();
+}
+
+void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(draft.profile.events.has_value());
+  if (!draft.profile.events) draft.profile.events.emplace();
+  catalogue::EventFacts& events = *draft.profile.events;
+  if (const YamlNode* arm = map.get("arm", need)) read_arm(*arm, events, findings);
+  assign(events.function, map.number<std::uint8_t>("function", need));
+  assign(events.first, map.number<std::uint16_t>("first", need));
+  assign(events.count, map.number<std::uint16_t>("count", need));
+  assign(events.number, map.text("number", need));
+  assign(events.kind, map.text("kind", need));
+  read_names(map.get("kinds"), events.kinds, findings);
+  map.finish();
+}
+
+void read_limits(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(draft.profile.limits.has_value());
+  if (!draft.profile.limits) draft.profile.limits.emplace();
+  catalogue::LimitFacts& limits = *draft.profile.limits;
+  assign(limits.minimum_offset, map.number<std::uint16_t>("minimum-offset", need));
+  assign(limits.maximum_offset, map.number<std::uint16_t>("maximum-offset", need));
+  assign(limits.from, map.number<std::uint16_t>("from", need));
+  assign(limits.to, map.number<std::uint16_t>("to", need));
+  map.finish();
+}
+
+void read_numbered(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(node, findings);
+  const Need need = need_of(draft.profile.numbered.has_value());
+  if (!draft.profile.numbered) draft.profile.numbered.emplace();
+  catalogue::NumberedFacts& numbered = *draft.profile.numbered;
+  assign(numbered.prefix, map.text("prefix", need));
+  assign(numbered.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  assign(numbered.from, map.number<std::uint16_t>("from", need));
+  assign(numbered.to, map.number<std::uint16_t>("to", need));
+  assign(numbered.access, map.word<catalogue::Access>("access", "access", access_words));
+  assign(numbered.evidence, map.word<Evidence>("evidence", "evidence", evidence_words));
+  assign(numbered.source, map.text("source"));
+  map.finish();
+}
+
+// ---- codes ----
+
+struct Provenance {
+  Evidence evidence = Evidence::inferred;
+  std::string source = {};
+};
+
+std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& from,
+                                       Findings& findings) {
+  CodeText code{.text = {}, .remedy = {}, .evidence = from.evidence, .source = from.source};
+  if (node.kind != YamlNode::Kind::map) {
+    auto text = to_text(node, findings);
+    if (!text) return std::nullopt;
+    code.text = std::move(*text);
+    return code;
+  }
+  YamlMap map(node, findings);
+  assign(code.text, map.text("text", Need::required));
+  assign(code.remedy, map.text("remedy"));
+  assign(code.evidence, map.word<Evidence>("evidence", "evidence", evidence_words));
+  assign(code.source, map.text("source"));
+  map.finish();
+  return code;
+}
+
+void read_code_map(const YamlNode& node, const Provenance& from, catalogue::CodeTexts& codes,
+                   Findings& findings) {
+  expect(node, YamlNode::Kind::map, findings);
+  std::vector<std::int64_t> seen;
+  for (const YamlEntry& entry : node.entries) {
+    const auto number = parse_unsigned(entry.key, last_register);
+    if (!number) {
+      findings.add(entry.key_at,
+                   fmt::format("'{}' is not a code from 0 to {}", entry.key, last_register));
+      continue;
+    }
+    const auto code = static_cast<std::int64_t>(*number);
+    if (std::find(seen.begin(), seen.end(), code) != seen.end()) {
+      findings.add(entry.key_at, fmt::format("code {} is given twice", entry.key));
+    }
+    seen.push_back(code);
+    auto text = read_code_text(entry.value, from, findings);
+    if (text) codes.insert_or_assign(code, std::move(*text));
+  }
+}
+
+/// A map of codes, or a list of such maps with the evidence that each shares.
+void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& findings) {
+  if (node.kind != YamlNode::Kind::sequence) {
+    read_code_map(node, {}, codes, findings);
+    return;
+  }
+  for (const YamlNode& item : node.items) {
+    YamlMap map(item, findings);
+    Provenance from;
+    assign(from.evidence,
+           map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+    assign(from.source, map.text("source", Need::required));
+    const YamlNode* list = map.get("codes", Need::required);
+    map.finish();
+    if (list != nullptr) read_code_map(*list, from, codes, findings);
+  }
+}
+
+using ReadSection = void (*)(const YamlNode&, ProfileDraft&, Findings&);
+
+/// Reads a section that may be left out, and remembers where it stands.
+void read_section(YamlMap& map, std::string_view key, ReadSection read, Origin& origin,
+                  ProfileDraft& draft) {
+  const YamlNode* node = map.get(key);
+  if (node == nullptr) return;
+  read(*node, draft, map.findings());
+  origin = {.entry = node, .layer = draft.layers};
+}
+
+// ---- simulation ----
+
+Bytes read_hex(const YamlNode& node, Findings& findings) {
+  Bytes bytes;
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
+  for (const std::string_view pair : split(node.text, ' ')) {
+    const auto byte =
+        pair.size() == 2 ? parse_unsigned(fmt::format("0x{}", pair), last_byte) : std::nullopt;
+    if (!byte) {
+      findings.add(node.at, fmt::format("'{}' is not a byte of two hexadecimal digits", pair));
+      return {};
+    }
+    bytes.push_back(static_cast<std::uint8_t>(*byte));
+  }
+  return bytes;
+}
+
+void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& facts,
+                             Findings& findings) {
+  YamlMap map(node, findings);
+  if (const YamlNode* bytes = map.get("bytes", Need::required)) {
+    facts.identity = read_hex(*bytes, findings);
+  }
+  facts.identity_bytes =
+      map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));
+  if (facts.identity_bytes > facts.identity.size()) {
+    findings.add(node.at, fmt::format("the answer has {} bytes, but only {} are given",
+                                      facts.identity_bytes, facts.identity.size()));
+  }
+  map.finish();
+}
+
+void read_simulated_values(const YamlNode& node, catalogue::SimulationFacts& facts,
+                           Findings& findings) {
+  expect(node, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto raw = parse_integer(entry.value.text);
+    if (raw) {
+      facts.values.push_back({entry.key, *raw});
+    } else {
+      findings.add_once(entry.value.at, "a whole number is expected here");
+    }
+  }
+}
+
+void read_simulated_limits(const YamlNode& node, catalogue::SimulationFacts& facts,
+                           Findings& findings) {
+  expect(node, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto range = to_range(entry.value, last_register, findings);
+    if (!range) continue;
+    facts.limits.push_back(
+        {entry.key, static_cast<std::int64_t>(range->from), static_cast<std::int64_t>(range->to)});
+  }
+}
+
+void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry, std::int64_t raw,
+                       Findings& findings) {
+  const auto meant = profile.select({entry.key});
+  if (!meant) {
+    findings.add(entry.key_at, message_of(meant.error()));
+    return;
+  }
+  for (const catalogue::Parameter& parameter : *meant) {
+    const catalogue::Kind kind = parameter.encoding.kind;
+    if (raw >= catalogue::lowest(kind) && raw <= catalogue::highest(kind)) continue;
+    findings.add_once(entry.value.at, fmt::format("does not fit {}, the encoding of {}",
+                                                  catalogue::to_text(kind), parameter.name));
+  }
+}
+
+}  // namespace
+
+Position Origin::of(std::string_view key) const {
+  if (const YamlNode* own = entry->find(key)) return own->at;
+  if (group != nullptr) {
+    if (const YamlNode* shared = group->find(key)) return shared->at;
+  }
+  return entry->at;
+}
+
+ProfileHead read_head(const YamlNode& document, Findings& findings) {
+  ProfileHead head;
+  if (!expect(document, YamlNode::Kind::map, findings)) return head;
+  YamlMap map(document, findings);
+  const YamlNode* format = map.get("format", Need::required);
+  if (format != nullptr && format->text != std::to_string(known_format)) {
+    findings.add(format->at, fmt::format("unknown format '{}'; this version reads format {}",
+                                         format->text, known_format));
+  }
+  if (const YamlNode* base = map.get("extends")) {
+    assign(head.extends, to_text(*base, findings));
+    head.extends_at = base->at;
+  }
+  assign(head.abstract, map.flag("abstract"));
+  return head;
+}
+
+void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findings) {
+  YamlMap map(document, findings);
+  catalogue::Profile& profile = draft.profile;
+  draft.top = {.entry = &document, .layer = draft.layers};
+  for (const std::string_view head : {"format", "extends", "abstract"}) map.allow(head);
+  assign(profile.id, map.text("id", Need::required));
+  assign(profile.title, map.text("title", Need::required));
+  assign(profile.maker, map.text("maker"));
+  assign(profile.series, map.text("series"));
+  read_section(map, "link", read_link, draft.link, draft);
+  read_section(map, "identity", read_identity, draft.identity, draft);
+  read_section(map, "events", read_events, draft.events, draft);
+  read_section(map, "limits", read_limits, draft.limits, draft);
+  read_section(map, "numbered", read_numbered, draft.numbered, draft);
+  if (const YamlNode* codes = map.get("exceptions")) {
+    read_codes(*codes, profile.exceptions, findings);
+  }
+  if (const YamlNode* list = map.get("parameters")) read_parameters(*list, draft, findings);
+  if (const YamlNode* list = map.get("actions")) read_actions(*list, draft, findings);
+  map.finish();
+  ++draft.layers;
+}
+
+const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_view part,
+                          Findings& findings) {
+  const YamlNode* found = nullptr;
+  for (std::size_t i = 1; i < documents.size(); ++i) {
+    YamlMap map(documents[i], findings);
+    constexpr std::array<std::pair<std::string_view, std::string_view>, 2> part_words = {
+        {{"texts", "texts"}, {"simulation", "simulation"}}};
+    const auto name = map.word<std::string_view>("part", "part", part_words, Need::required);
+    if (!name || *name != part) continue;
+    if (found != nullptr) {
+      findings.add(documents[i].at, fmt::format("a second document of part '{}'", part));
+    }
+    found = &documents[i];
+  }
+  return found;
+}
+
+void read_texts(const YamlNode& document, catalogue::CodeTexts& codes, Findings& findings) {
+  YamlMap map(document, findings);
+  map.allow("part");
+  if (const YamlNode* node = map.get("error-codes", Need::required)) {
+    read_codes(*node, codes, findings);
+  }
+  map.finish();
+}
+
+catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& findings) {
+  catalogue::SimulationFacts facts;
+  YamlMap map(document, findings);
+  map.allow("part");
+  if (const YamlNode* node = map.get("identity")) {
+    read_simulated_identity(*node, facts, findings);
+  }
+  if (const YamlNode* node = map.get("values")) read_simulated_values(*node, facts, findings);
+  if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
+  assign(facts.absent, read_areas(map.get("absent"), findings));
+  map.finish();
+  return facts;
+}
+
+void check_simulation(const catalogue::Profile& profile, const YamlNode& document,
+                      Findings& findings) {
+  if (const YamlNode* values = document.find("values")) {
+    for (const YamlEntry& entry : values->entries) {
+      const auto raw = parse_integer(entry.value.text).value_or(0);
+      check_start_value(profile, entry, raw, findings);
+    }
+  }
+  if (const YamlNode* limits = document.find("limits")) {
+    for (const YamlEntry& entry : limits->entries) {
+      check_start_value(profile, entry, 0, findings);
+    }
+  }
+}
+
+}  // namespace spindle::files

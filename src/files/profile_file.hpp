@@ -1,0 +1,66 @@
+#pragma once
+
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "files/yaml_reader.hpp"
+#include "spindle/catalogue/profile.hpp"
+
+namespace spindle::files {
+
+/// Where one entry or section of a profile was written. Valid as long as its document lives.
+struct Origin {
+  const YamlNode* entry = nullptr;
+  const YamlNode* group = nullptr;  ///< shared defaults of a group of parameters; may be null
+  std::size_t layer = 0;            ///< 0: the deepest base
+  bool overlaps = false;            ///< the entry declares that it shares registers
+
+  /// The value of a key, else the entry as a whole. Requires an entry.
+  [[nodiscard]] Position of(std::string_view key) const;
+};
+
+/// A profile while its files are read, base first: what each layer says overrides key by key.
+struct ProfileDraft {
+  catalogue::Profile profile;
+  std::size_t layers = 0;
+  std::vector<Origin> parameters;  ///< side by side with profile.parameters
+  std::vector<Origin> actions;     ///< side by side with profile.actions
+  Origin top = {};
+  Origin link = {};  ///< these: the last layer that says something of the section, or none
+  Origin identity = {};
+  Origin events = {};
+  Origin limits = {};
+  Origin numbered = {};
+  std::unordered_map<std::string, std::size_t> parameter_index = {};
+};
+
+/// What must be known of a document before anything else is read from it.
+struct ProfileHead {
+  std::string extends;  ///< id of the base; empty: none
+  Position extends_at = {};
+  bool abstract = false;
+};
+
+/// Also checks the format number.
+ProfileHead read_head(const YamlNode& document, Findings& findings);
+
+/// Lays one first document over the draft. Missing, unknown and ill-typed keys are findings.
+void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findings);
+
+/// The document with this `part`, among those behind the first; null when there is none. Documents
+/// of unknown parts, and second ones of the same part, are findings.
+const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_view part,
+                          Findings& findings);
+
+/// `part: texts`, laid over what is there.
+void read_texts(const YamlNode& document, catalogue::CodeTexts& codes, Findings& findings);
+
+/// `part: simulation`.
+catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& findings);
+
+/// Simulation patterns must mean something, and start values fit: only check() pays for this.
+void check_simulation(const catalogue::Profile& profile, const YamlNode& document,
+                      Findings& findings);
+
+}  // namespace spindle::files

@@ -1,0 +1,467 @@
+#include "files/profile_rules.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <limits>
+
+#include "spindle/base/text.hpp"
+#include "spindle/catalogue/value.hpp"
+
+namespace spindle::files {
+namespace {
+
+using catalogue::Access;
+using catalogue::Action;
+using catalogue::Label;
+using catalogue::Parameter;
+using modbus::RegisterTable;
+
+constexpr unsigned last_register = std::numeric_limits<std::uint16_t>::max();
+
+bool is_word_character(char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
+
+/// Registers that one parameter occupies.
+struct Span {
+  RegisterTable table;
+  unsigned first;
+  unsigned last;
+  std::size_t index;  ///< of the parameter
+};
+
+Span span_of(const Parameter& parameter, std::size_t index) {
+  const unsigned first = parameter.address.value;
+  return {parameter.table, first, first + catalogue::register_count(parameter.encoding.kind) - 1U,
+          index};
+}
+
+template <typename Visit>
+void for_each_parameter(const ProfileDraft& draft, const Visit& visit) {
+  for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
+    visit(draft.profile.parameters[i], draft.parameters[i]);
+  }
+}
+
+template <typename Visit>
+void for_each_action(const ProfileDraft& draft, const Visit& visit) {
+  for (std::size_t i = 0; i < draft.actions.size(); ++i) {
+    visit(draft.profile.actions[i], draft.actions[i]);
+  }
+}
+
+const Parameter* parameter_named(const ProfileDraft& draft, const std::string& name) {
+  const auto found = draft.parameter_index.find(name);
+  return found == draft.parameter_index.end() ? nullptr : &draft.profile.parameters[found->second];
+}
+
+std::string no_such_parameter(const ProfileDraft& draft, const std::string& name) {
+  std::vector<std::string> names;
+  for (const Parameter& parameter : draft.profile.parameters) names.push_back(parameter.name);
+  const std::string hint = suggestion(name, names);
+  return fmt::format("'{}' is no parameter of this profile{}{}", name, hint.empty() ? "" : "; ",
+                     hint);
+}
+
+// ---- names ----
+
+void id_is_the_file_name(const ProfileDraft& draft, Findings& findings) {
+  const catalogue::Profile& profile = draft.profile;
+  const std::string stem = std::filesystem::path(profile.path).stem().string();
+  if (!is_catalogue_name(profile.id)) {
+    findings.add_once(draft.top.of("id"),
+                      fmt::format("id '{}' is not made of lower-case words and numbers joined by "
+                                  "'-' or '.'",
+                                  profile.id));
+  } else if (profile.id != stem) {
+    findings.add_once(draft.top.of("id"),
+                      fmt::format("id '{}' differs from the file name '{}'", profile.id, stem));
+  }
+}
+
+void names_have_the_pattern(const ProfileDraft& draft, Findings& findings) {
+  const auto check = [&](const std::string& name, const Origin& origin) {
+    if (is_catalogue_name(name)) return;
+    findings.add_once(origin.of("name"),
+                      fmt::format("name '{}' is not made of lower-case words and numbers joined by "
+                                  "'-' or '.'",
+                                  name));
+  };
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    check(parameter.name, origin);
+  });
+  for_each_action(draft,
+                  [&](const Action& action, const Origin& origin) { check(action.name, origin); });
+}
+
+void names_are_no_numbers(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.numbered) return;
+  const std::string& prefix = draft.profile.numbered->prefix;
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const std::string_view name = parameter.name;
+    if (!name.starts_with(prefix) || name.size() == prefix.size()) return;
+    if (name.find_first_not_of("0123456789", prefix.size()) != std::string_view::npos) return;
+    findings.add_once(origin.of("name"),
+                      fmt::format("name '{}' looks like a numbered parameter", name));
+  });
+}
+
+// ---- registers ----
+
+void registers_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (span_of(parameter, 0).last <= last_register) return;
+    findings.add_once(origin.of("register"),
+                      fmt::format("{}: its second register is behind the last", parameter.name));
+  });
+}
+
+void overlaps_are_declared(const ProfileDraft& draft, Findings& findings) {
+  std::vector<Span> spans;
+  spans.reserve(draft.parameters.size());
+  for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
+    spans.push_back(span_of(draft.profile.parameters[i], i));
+  }
+  std::stable_sort(spans.begin(), spans.end(), [](const Span& a, const Span& b) {
+    return std::tie(a.table, a.first) < std::tie(b.table, b.first);
+  });
+  std::size_t reaching = 0;  // the span seen so far that reaches farthest
+  for (std::size_t i = 1; i < spans.size(); ++i) {
+    const Span& span = spans[i];
+    const Span& before = spans[reaching];
+    const bool overlap = span.table == before.table && span.first <= before.last;
+    const bool declared =
+        draft.parameters[span.index].overlaps || draft.parameters[before.index].overlaps;
+    if (overlap && !declared) {
+      const auto [earlier, later] = std::minmax(span.index, before.index);
+      findings.add_once(
+          draft.parameters[later].of("register"),
+          fmt::format("{} shares register {} with {}; write 'overlaps: true' if this is meant",
+                      draft.profile.parameters[later].name, span.first,
+                      draft.profile.parameters[earlier].name));
+    }
+    if (span.table != before.table || span.last >= before.last) reaching = i;
+  }
+}
+
+void pairs_are_even(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.link.even_pairs) return;
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const bool pair = catalogue::register_count(parameter.encoding.kind) == 2;
+    if (!pair || parameter.address.value % 2 == 0) return;
+    findings.add_once(origin.of("register"),
+                      fmt::format("{}: a 32-bit value begins at an odd register, {}",
+                                  parameter.name, parameter.address.value));
+  });
+}
+
+void input_registers_are_read_only(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (parameter.table != RegisterTable::input || parameter.access == Access::read_only) return;
+    findings.add_once(origin.of("access"),
+                      fmt::format("{}: input registers cannot be written", parameter.name));
+  });
+}
+
+// ---- values ----
+
+void ranges_fit(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const auto& [minimum, maximum] = parameter.range;
+    if (minimum && maximum && *minimum > *maximum) {
+      findings.add_once(origin.of("range"),
+                        fmt::format("{}: its minimum is above its maximum", parameter.name));
+    }
+    for (const auto& limit : {minimum, maximum}) {
+      if (!limit) continue;
+      const auto registers = catalogue::encode(parameter, *limit);
+      if (!registers) {
+        findings.add_once(origin.of("range"),
+                          fmt::format("{}: {}", parameter.name, message_of(registers.error())));
+      }
+    }
+  });
+}
+
+void defaults_fit(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (!parameter.default_value) return;
+    const auto value = catalogue::parse_value(parameter, parameter.default_value->to_string());
+    if (value) return;
+    findings.add_once(origin.of("default"),
+                      fmt::format("{}: {}", parameter.name, message_of(value.error())));
+  });
+}
+
+void read_only_has_no_default(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (!parameter.default_value || parameter.access == Access::read_write) return;
+    findings.add_once(origin.of("default"),
+                      fmt::format("{}: what is read-only has no default", parameter.name));
+  });
+}
+
+/// The first thing wrong with a list of labels; empty when it is good.
+std::string fault_of(const std::vector<Label>& labels, const Parameter& parameter) {
+  Parameter earlier = parameter;
+  earlier.labels.clear();
+  for (const Label& label : labels) {
+    const catalogue::Kind kind = parameter.encoding.kind;
+    if (label.number < catalogue::lowest(kind) || label.number > catalogue::highest(kind)) {
+      return fmt::format("label {} does not fit {}", label.number, catalogue::to_text(kind));
+    }
+    if (label.text.empty()) return fmt::format("the label of {} is empty", label.number);
+    for (const Label& other : earlier.labels) {
+      if (other.number == label.number) {
+        return fmt::format("number {} has two labels", label.number);
+      }
+    }
+    // A label is what a user types, so two that parse_value() cannot tell apart are one.
+    if (!earlier.labels.empty() && catalogue::parse_value(earlier, label.text)) {
+      return fmt::format("label '{}' can be read in two ways", label.text);
+    }
+    earlier.labels.push_back(label);
+  }
+  return {};
+}
+
+void labels_are_unique(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (parameter.labels.empty()) return;
+    Parameter plain{.name = {},
+                    .title = {},
+                    .encoding = {parameter.encoding.kind},
+                    .unit = {},
+                    .source = {},
+                    .note = {}};
+    const std::string fault = fault_of(parameter.labels, plain);
+    if (!fault.empty()) {
+      findings.add_once(origin.of("labels"), fmt::format("{}: {}", parameter.name, fault));
+    }
+  });
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    const std::string fault = fault_of(action.labels, Parameter{});
+    if (!fault.empty()) {
+      findings.add_once(origin.of("labels"), fmt::format("{}: {}", action.name, fault));
+    }
+  });
+}
+
+void entries_have_a_source(const ProfileDraft& draft, Findings& findings) {
+  const auto check = [&](const std::string& name, const std::string& source, const Origin& origin) {
+    if (source.empty())
+      findings.add_once(origin.of("source"), fmt::format("{} has no source", name));
+  };
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    check(parameter.name, parameter.source, origin);
+  });
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    check(action.name, action.source, origin);
+  });
+}
+
+// ---- actions ----
+
+void actions_stay_off_parameters(const ProfileDraft& draft, Findings& findings) {
+  const auto& numbered = draft.profile.numbered;
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    const unsigned address = action.address.value;
+    const bool taken = numbered && numbered->table == RegisterTable::holding &&
+                       address >= numbered->from && address <= numbered->to;
+    if (!taken) return;
+    findings.add_once(
+        origin.of("register"),
+        fmt::format("{}: register {} belongs to the numbered parameters", action.name, address));
+  });
+}
+
+void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    if (action.confirm.empty()) {
+      if (action.confirm_value) {
+        findings.add_once(origin.of("confirm-value"),
+                          fmt::format("{}: confirm-value needs 'confirm'", action.name));
+      }
+      return;
+    }
+    if (parameter_named(draft, action.confirm) == nullptr) {
+      findings.add_once(origin.of("confirm"), no_such_parameter(draft, action.confirm));
+    }
+  });
+}
+
+// ---- sections ----
+
+void link_is_usable(const ProfileDraft& draft, Findings& findings) {
+  if (draft.link.entry == nullptr) return;
+  const catalogue::LinkFacts& link = draft.profile.link;
+  const auto check = [&](std::string_view key, std::uint16_t value, std::uint16_t most) {
+    if (value >= 1 && value <= most) return;
+    findings.add_once(draft.link.of(key), fmt::format("{} must be 1 to {}", key, most));
+  };
+  check("max-read", link.max_read, modbus::max_read_count);
+  check("max-write", link.max_write, modbus::max_write_count);
+}
+
+void identity_slices_fit(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.identity) return;
+  const catalogue::IdentityFacts& facts = *draft.profile.identity;
+  const auto check = [&](std::string_view key, const catalogue::Slice& slice, unsigned bytes) {
+    if (unsigned{slice.offset} + slice.size <= bytes) return;
+    findings.add_once(draft.identity.of(key),
+                      fmt::format("{} reaches behind byte {} of the answer", key, bytes));
+  };
+  check("id", facts.id, facts.minimum_bytes);
+  check("controller-model", facts.controller_model, facts.minimum_bytes);
+  check("tool-model", facts.tool_model, facts.minimum_bytes);
+  check("firmware", facts.firmware, facts.minimum_bytes);
+  check("serial", facts.serial, facts.minimum_bytes);
+  check("long-serial", facts.long_serial, facts.long_serial_bytes);
+  check("total", facts.total, facts.total_bytes);
+}
+
+void event_block_is_legal(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events) return;
+  const catalogue::EventFacts& events = *draft.profile.events;
+  const auto is = [&](modbus::FunctionCode code) {
+    return events.function == static_cast<std::uint8_t>(code);
+  };
+  if (!is(modbus::FunctionCode::read_holding_registers) &&
+      !is(modbus::FunctionCode::read_input_registers)) {
+    findings.add_once(draft.events.of("function"), "events come as answers to function 3 or 4");
+  }
+  if (events.count < 1 || events.count > modbus::max_read_count) {
+    findings.add_once(draft.events.of("count"),
+                      fmt::format("an answer holds 1 to {} registers", modbus::max_read_count));
+  } else if (events.first + events.count - 1U > last_register) {
+    findings.add_once(draft.events.of("count"), "the event block reaches behind the last register");
+  }
+}
+
+void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events) return;
+  const catalogue::EventFacts& events = *draft.profile.events;
+  const auto table =
+      events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers)
+          ? RegisterTable::holding
+          : RegisterTable::input;
+  const auto check = [&](std::string_view key, const std::string& name) {
+    const Parameter* parameter = parameter_named(draft, name);
+    if (parameter == nullptr) {
+      findings.add_once(draft.events.of(key), no_such_parameter(draft, name));
+      return;
+    }
+    const Span span = span_of(*parameter, 0);
+    const unsigned end = unsigned{events.first} + events.count;
+    if (span.table == table && span.first >= events.first && span.last < end) return;
+    findings.add_once(draft.events.of(key), fmt::format("{} is outside the event block", name));
+  };
+  check("number", events.number);
+  check("kind", events.kind);
+}
+
+void arming_is_no_parameter(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events) return;
+  const modbus::RegisterAddress address{draft.profile.events->arm_register};
+  if (!draft.profile.writable(address)) return;
+  findings.add_once(draft.events.of("arm"),
+                    fmt::format("register {} arms events, but is also a parameter", address.value));
+}
+
+void event_kinds_are_known(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events) return;
+  const std::vector<std::string> known = {"fastening-ok",  "fastening-ng", "direction-change",
+                                          "preset-change", "alarm-reset",  "error",
+                                          "barcode",       "screw-count",  "other"};
+  for (const auto& [number, kind] : draft.profile.events->kinds) {
+    if (std::find(known.begin(), known.end(), kind) != known.end()) continue;
+    const std::string hint = suggestion(kind, known);
+    findings.add_once(draft.events.of("kinds"), fmt::format("unknown event kind '{}'{}{}", kind,
+                                                            hint.empty() ? "" : "; ", hint));
+  }
+}
+
+void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.limits) return;
+  const catalogue::LimitFacts& limits = *draft.profile.limits;
+  if (limits.from > limits.to) {
+    findings.add_once(draft.limits.of("from"), "limits begin behind their end");
+  }
+  for (const std::string_view key : {"minimum-offset", "maximum-offset"}) {
+    const unsigned offset = key == "minimum-offset" ? limits.minimum_offset : limits.maximum_offset;
+    if (offset + limits.to > last_register) {
+      findings.add_once(draft.limits.of(key), "the limits reach behind the last register");
+    }
+  }
+}
+
+void numbered_are_usable(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.numbered) return;
+  const catalogue::NumberedFacts& numbered = *draft.profile.numbered;
+  const std::string& prefix = numbered.prefix;
+  if (prefix.empty() || prefix.find_first_not_of("abcdefghijklmnopqrstuvwxyz") != prefix.npos) {
+    findings.add_once(draft.numbered.of("prefix"), "a prefix is made of lower-case letters");
+  }
+  if (numbered.from > numbered.to) {
+    findings.add_once(draft.numbered.of("from"), "numbers begin behind their end");
+  }
+  if (numbered.table == RegisterTable::input && numbered.access == Access::read_write) {
+    findings.add_once(draft.numbered.of("access"), "input registers cannot be written");
+  }
+}
+
+void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
+  for (const auto& [code, text] : draft.profile.exceptions) {
+    if (code <= std::numeric_limits<std::uint8_t>::max()) continue;
+    findings.add_once(draft.top.of("exceptions"),
+                      fmt::format("exception code {} does not fit a byte", code));
+  }
+}
+
+using Rule = void (*)(const ProfileDraft&, Findings&);
+
+constexpr std::array<Rule, 23> rules = {
+    id_is_the_file_name,
+    names_have_the_pattern,
+    names_are_no_numbers,
+    registers_are_in_the_table,
+    overlaps_are_declared,
+    pairs_are_even,
+    input_registers_are_read_only,
+    ranges_fit,
+    read_only_has_no_default,
+    defaults_fit,
+    labels_are_unique,
+    entries_have_a_source,
+    actions_stay_off_parameters,
+    confirmations_exist,
+    link_is_usable,
+    identity_slices_fit,
+    event_block_is_legal,
+    event_fields_are_in_the_block,
+    arming_is_no_parameter,
+    event_kinds_are_known,
+    limits_are_in_the_table,
+    numbered_are_usable,
+    exception_codes_fit,
+};
+
+}  // namespace
+
+bool is_catalogue_name(std::string_view text) {
+  char before = '.';
+  for (const char c : text) {
+    const bool joint = c == '.' || c == '-';
+    if (!joint && !is_word_character(c)) return false;
+    if (joint && !is_word_character(before)) return false;
+    before = c;
+  }
+  return is_word_character(before);
+}
+
+void check_rules(const ProfileDraft& draft, Findings& findings) {
+  for (const Rule rule : rules) rule(draft, findings);
+}
+
+}  // namespace spindle::files

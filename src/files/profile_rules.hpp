@@ -1,0 +1,15 @@
+#pragma once
+
+#include "files/profile_file.hpp"
+
+namespace spindle::files {
+
+/// Whether a text is a name as profiles use them: lower-case words and numbers joined by single
+/// dots or hyphens ("preset.1.target-torque").
+bool is_catalogue_name(std::string_view text);
+
+/// Every rule that a complete profile must keep, beyond the shape of its files. Runs on every load;
+/// adds a finding for each breach.
+void check_rules(const ProfileDraft& draft, Findings& findings);
+
+}  // namespace spindle::files

@@ -1,0 +1,265 @@
+#include "spindle/files/profile_store.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "files/profile_file.hpp"
+#include "files/profile_rules.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::files {
+namespace {
+
+using catalogue::Profile;
+
+constexpr std::string_view extension = ".yaml";
+
+/// Ours have two layers; a user's own makes three.
+constexpr std::size_t deepest_chain = 8;
+
+bool is_path(std::string_view name_or_file) {
+  return name_or_file.find('/') != std::string_view::npos || name_or_file.ends_with(extension);
+}
+
+std::string in_folder(const std::string& folder, std::string_view id) {
+  return fmt::format("{}/{}{}", folder, id, extension);
+}
+
+bool is_file(const std::string& path) {
+  std::error_code problem;
+  return std::filesystem::exists(path, problem);
+}
+
+/// One file of a chain of bases.
+struct Layer {
+  std::string path;
+  std::size_t file = 0;  ///< number for findings
+  std::vector<YamlNode> documents;
+  ProfileHead head;
+};
+
+/// A profile file and those it extends, the file itself first.
+using Chain = std::vector<Layer>;
+
+/// The base of a layer: beside it, else in the store's folders.
+std::optional<std::string> locate_base(const Layer& layer,
+                                       const std::vector<std::string>& folders) {
+  const std::string& id = layer.head.extends;
+  std::string folder = std::filesystem::path(layer.path).parent_path().string();
+  if (folder.empty()) folder = ".";
+  std::string beside = in_folder(folder, id);
+  if (is_file(beside)) return beside;
+  for (const std::string& other : folders) {
+    std::string path = in_folder(other, id);
+    if (is_file(path)) return path;
+  }
+  return std::nullopt;
+}
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code problem;
+  return std::filesystem::equivalent(a, b, problem);
+}
+
+Result<Layer> read_layer(const std::string& path, Documents documents, Findings& findings) {
+  auto text = read_text_file(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  Layer layer{.path = path, .file = findings.add_file(path), .documents = {}, .head = {}};
+  layer.documents = parse_yaml(*text, layer.file, documents, findings);
+  if (!layer.documents.empty()) {
+    layer.head = read_head(layer.documents.front(), findings);
+  } else if (findings.empty()) {
+    findings.add({layer.file, 1, 1}, "the file is empty");
+  }
+  return layer;
+}
+
+/// The next file of the chain; empty at its end, or after a finding.
+std::optional<std::string> next_of(const Chain& chain, const std::vector<std::string>& folders,
+                                   Findings& findings) {
+  const ProfileHead& head = chain.back().head;
+  if (head.extends.empty()) return std::nullopt;
+  if (!is_catalogue_name(head.extends)) {
+    findings.add(head.extends_at, fmt::format("'{}' is no profile id", head.extends));
+    return std::nullopt;
+  }
+  auto path = locate_base(chain.back(), folders);
+  if (!path) {
+    findings.add(head.extends_at, fmt::format("base profile '{}' is not found", head.extends));
+    return std::nullopt;
+  }
+  const bool cycle = std::any_of(chain.begin(), chain.end(),
+                                 [&](const Layer& layer) { return same_file(layer.path, *path); });
+  if (cycle || chain.size() == deepest_chain) {
+    findings.add(head.extends_at,
+                 cycle ? fmt::format("'{}' extends itself in the end", head.extends)
+                       : fmt::format("more than {} profiles extend each other", deepest_chain));
+    return std::nullopt;
+  }
+  return path;
+}
+
+Result<Chain> read_chain(const std::string& path, Documents documents,
+                         const std::vector<std::string>& folders, Findings& findings) {
+  Chain chain;
+  std::optional<std::string> next = path;
+  while (next) {
+    auto layer = read_layer(*next, documents, findings);
+    if (!layer) return tl::unexpected(std::move(layer.error()));
+    chain.push_back(std::move(*layer));
+    next = next_of(chain, folders, findings);
+  }
+  return chain;
+}
+
+Profile build(const Chain& chain, Findings& findings) {
+  ProfileDraft draft;
+  draft.profile.path = chain.front().path;
+  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+    if (!layer->documents.empty()) read_profile(layer->documents.front(), draft, findings);
+  }
+  const bool complete = findings.empty();
+  const bool concrete = !chain.front().head.abstract;
+  if (complete && concrete && draft.link.entry == nullptr) {
+    findings.add(draft.top.entry->at, "key 'link' is missing");
+  }
+  // Rules speak of a profile whose every entry could be read; on half-read ones they would add
+  // findings that are none.
+  if (complete) check_rules(draft, findings);
+  return std::move(draft.profile);
+}
+
+catalogue::CodeTexts collect_texts(const Chain& chain, Findings& findings) {
+  catalogue::CodeTexts codes;
+  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+    if (const YamlNode* part = find_part(layer->documents, "texts", findings)) {
+      read_texts(*part, codes, findings);
+    }
+  }
+  return codes;
+}
+
+const YamlNode* nearest_simulation(const Chain& chain, Findings& findings) {
+  for (const Layer& layer : chain) {
+    if (const YamlNode* part = find_part(layer.documents, "simulation", findings)) return part;
+  }
+  return nullptr;
+}
+
+bool is_abstract(const std::string& path) {
+  Findings findings;
+  const auto layer = read_layer(path, Documents::first, findings);
+  return layer && layer->head.abstract;
+}
+
+Error with_check_hint(Error error, const std::string& path) {
+  error.hint = fmt::format("'spindle profile check {}' lists every fault", path);
+  return error;
+}
+
+}  // namespace
+
+Result<std::string> ProfileStore::locate(std::string_view name_or_file) const {
+  if (is_path(name_or_file)) return std::string(name_or_file);
+  if (is_catalogue_name(name_or_file)) {
+    for (const std::string& folder : folders_) {
+      std::string path = in_folder(folder, name_or_file);
+      if (is_file(path)) return path;
+    }
+  }
+  std::vector<std::string> ids;
+  for (const ProfileEntry& entry : list()) ids.push_back(entry.id);
+  std::string hint = suggestion(name_or_file, ids);
+  if (hint.empty()) hint = "'spindle profile list' shows those that exist";
+  return tl::unexpected(Error{.code = Errc::unknown_name,
+                              .message = "no such profile",
+                              .hint = std::move(hint),
+                              .name = std::string(name_or_file)});
+}
+
+Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
+  const auto path = locate(name_or_file);
+  if (!path) return tl::unexpected(path.error());
+  Findings findings;
+  const auto chain = read_chain(*path, Documents::first, folders_, findings);
+  if (!chain) return tl::unexpected(chain.error());
+  Profile profile = build(*chain, findings);
+  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
+  if (chain->front().head.abstract) {
+    return tl::unexpected(Error{.code = Errc::bad_file,
+                                .message = "is only a base for other profiles",
+                                .hint = "'spindle profile list' shows those of products",
+                                .name = std::string(name_or_file)});
+  }
+  return profile;
+}
+
+Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
+    std::string_view name_or_file) const {
+  const auto path = locate(name_or_file);
+  if (!path) return tl::unexpected(path.error());
+  Findings findings;
+  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  if (!chain) return tl::unexpected(chain.error());
+  const YamlNode* part = nearest_simulation(*chain, findings);
+  catalogue::SimulationFacts facts;
+  if (part != nullptr) facts = read_simulation(*part, findings);
+  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
+  if (part != nullptr) return facts;
+  return tl::unexpected(
+      Error{.code = Errc::bad_file,
+            .message = "this profile has no start state for a simulated tool",
+            .hint = "add a document '--- part: simulation', or extend a profile that has one",
+            .name = std::string(name_or_file)});
+}
+
+Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {
+  const auto path = locate(name_or_file);
+  if (!path) return tl::unexpected(path.error());
+  Findings findings;
+  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  if (!chain) return tl::unexpected(chain.error());
+  catalogue::CodeTexts codes = collect_texts(*chain, findings);
+  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
+  return codes;
+}
+
+Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
+  const auto path = locate(name_or_file);
+  if (!path) return tl::unexpected(path.error());
+  Findings findings;
+  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  if (!chain) return tl::unexpected(chain.error());
+  const Profile profile = build(*chain, findings);
+  collect_texts(*chain, findings);
+  if (const YamlNode* part = nearest_simulation(*chain, findings)) {
+    read_simulation(*part, findings);
+    check_simulation(profile, *part, findings);
+  }
+  return findings.list();
+}
+
+std::vector<ProfileEntry> ProfileStore::list() const {
+  std::map<std::string, std::string> found;
+  for (const std::string& folder : folders_) {
+    std::error_code problem;
+    for (auto file = std::filesystem::directory_iterator(folder, problem);
+         !problem && file != std::filesystem::directory_iterator(); file.increment(problem)) {
+      const std::filesystem::path& path = file->path();
+      const std::string id = path.stem().string();
+      if (path.extension() == extension && is_catalogue_name(id)) {
+        found.try_emplace(id, in_folder(folder, id));
+      }
+    }
+  }
+  std::vector<ProfileEntry> entries;
+  for (auto& [id, path] : found) {
+    if (!is_abstract(path)) entries.push_back({id, path});
+  }
+  return entries;
+}
+
+}  // namespace spindle::files

@@ -1,0 +1,120 @@
+#include "spindle/files/tools_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "files/yaml_map.hpp"
+#include "files/yaml_reader.hpp"
+
+namespace spindle::files {
+namespace {
+
+constexpr std::array<std::string_view, 7> torque_units = {"kgf.cm", "kgf.m",  "N.m",   "cN.m",
+                                                          "lbf.in", "ozf.in", "lbf.ft"};
+
+bool is_letter_or_digit(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+}
+
+/// Begins with a letter or digit, so that it is neither a group (@), an option (-) nor a path.
+bool is_tool_name(std::string_view text) {
+  return !text.empty() && is_letter_or_digit(text.front()) &&
+         std::all_of(text.begin(), text.end(), [](char c) {
+           return is_letter_or_digit(c) || c == '_' || c == '.' || c == '-';
+         });
+}
+
+void check_name(const YamlEntry& entry, Findings& findings) {
+  if (is_tool_name(entry.key)) return;
+  findings.add(entry.key_at,
+               fmt::format("name '{}' is not made of letters, digits, '_', '.' and '-', beginning "
+                           "with a letter or digit",
+                           entry.key));
+}
+
+std::vector<std::string> read_words(const YamlNode& list, Findings& findings) {
+  std::vector<std::string> words;
+  if (!expect(list, YamlNode::Kind::sequence, findings)) return words;
+  for (const YamlNode& item : list.items) {
+    auto word = to_text(item, findings);
+    if (!word) continue;
+    if (std::find(words.begin(), words.end(), *word) != words.end()) {
+      findings.add(item.at, fmt::format("'{}' is given twice", *word));
+    }
+    words.push_back(std::move(*word));
+  }
+  return words;
+}
+
+Tool read_tool(const YamlEntry& entry, Findings& findings) {
+  check_name(entry, findings);
+  Tool tool;
+  tool.name = entry.key;
+  YamlMap map(entry.value, findings);
+  assign(tool.url, map.text("url", Need::required));
+  assign(tool.profile, map.text("profile"));
+  std::array<std::pair<std::string_view, std::string_view>, torque_units.size()> units;
+  std::transform(torque_units.begin(), torque_units.end(), units.begin(),
+                 [](std::string_view unit) { return std::pair(unit, unit); });
+  assign(tool.torque_unit, map.word<std::string_view>("torque-unit", "torque unit", units));
+  if (const YamlNode* verified = map.get("verified")) {
+    tool.verified = read_words(*verified, findings);
+  }
+  map.finish();
+  return tool;
+}
+
+std::vector<std::string> names_of(const Tools& tools) {
+  std::vector<std::string> names;
+  for (const Tool& tool : tools.tools) names.push_back(tool.name);
+  return names;
+}
+
+void read_group(const YamlEntry& entry, Tools& tools, Findings& findings) {
+  check_name(entry, findings);
+  std::vector<std::string> members = read_words(entry.value, findings);
+  if (entry.value.kind == YamlNode::Kind::sequence && members.empty()) {
+    findings.add_once(entry.value.at, fmt::format("group '{}' has no tools", entry.key));
+  }
+  const std::vector<std::string> known = names_of(tools);
+  for (const YamlNode& item : entry.value.items) {
+    if (item.kind != YamlNode::Kind::scalar) continue;
+    if (std::find(known.begin(), known.end(), item.text) != known.end()) continue;
+    findings.add_once(item.at, unknown_word("tool", item.text, known));
+  }
+  tools.groups.emplace(entry.key, std::move(members));
+}
+
+void read_tools(const YamlNode& document, Tools& tools, Findings& findings) {
+  YamlMap map(document, findings);
+  if (const YamlNode* list = map.get("tools", Need::required)) {
+    expect(*list, YamlNode::Kind::map, findings);
+    for (const YamlEntry& entry : list->entries) tools.tools.push_back(read_tool(entry, findings));
+  }
+  if (const YamlNode* groups = map.get("groups")) {
+    expect(*groups, YamlNode::Kind::map, findings);
+    for (const YamlEntry& entry : groups->entries) read_group(entry, tools, findings);
+  }
+  map.finish();
+}
+
+}  // namespace
+
+Result<Tools> load_tools(const std::string& path) {
+  const auto text = read_text_file(path);
+  if (!text) return tl::unexpected(text.error());
+  Findings findings;
+  const std::size_t file = findings.add_file(path);
+  const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
+  Tools tools;
+  tools.path = path;
+  if (!documents.empty()) read_tools(documents.front(), tools, findings);
+  if (documents.empty()) findings.add_once({file, 1, 1}, "the file is empty");
+  if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
+  if (!findings.empty()) return tl::unexpected(findings.error());
+  return tools;
+}
+
+}  // namespace spindle::files

@@ -1,0 +1,159 @@
+#include "files/yaml_map.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "spindle/base/duration.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::files {
+namespace {
+
+std::string_view describe(YamlNode::Kind kind) {
+  switch (kind) {
+    case YamlNode::Kind::nothing:
+      return "nothing";
+    case YamlNode::Kind::scalar:
+      return "a single value";
+    case YamlNode::Kind::sequence:
+      return "a list";
+    case YamlNode::Kind::map:
+      break;
+  }
+  return "a mapping of keys to values";
+}
+
+}  // namespace
+
+bool expect(const YamlNode& node, YamlNode::Kind kind, Findings& findings) {
+  if (node.kind == kind) return true;
+  findings.add(node.at,
+               fmt::format("{} is expected here, not {}", describe(kind), describe(node.kind)));
+  return false;
+}
+
+std::optional<std::string> to_text(const YamlNode& node, Findings& findings) {
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
+  return node.text;
+}
+
+std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t maximum,
+                                         Findings& findings) {
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
+  const auto number = parse_unsigned(node.text, maximum);
+  if (!number) {
+    findings.add(node.at,
+                 fmt::format("'{}' is not a whole number from 0 to {}", node.text, maximum));
+  }
+  return number;
+}
+
+std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
+                                    Findings& findings) {
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
+  const std::string_view text = node.text;
+  const std::size_t dots = text.find("..");
+  const auto from = parse_unsigned(text.substr(0, dots), maximum);
+  const auto to =
+      dots == std::string_view::npos ? from : parse_unsigned(text.substr(dots + 2), maximum);
+  if (!from || !to || *from > *to) {
+    findings.add(node.at,
+                 fmt::format("'{}' is not a range such as 1..15, at most up to {}", text, maximum));
+    return std::nullopt;
+  }
+  return NumberRange{*from, *to};
+}
+
+std::optional<std::int64_t> parse_integer(std::string_view text) {
+  const bool negative = text.starts_with('-');
+  if (negative) text.remove_prefix(1);
+  const auto magnitude = parse_unsigned(text, std::numeric_limits<std::uint32_t>::max());
+  if (!magnitude) return std::nullopt;
+  const auto number = static_cast<std::int64_t>(*magnitude);
+  return negative ? -number : number;
+}
+
+std::string unknown_word(std::string_view what, std::string_view text,
+                         const std::vector<std::string>& words) {
+  const std::string hint = suggestion(text, words);
+  if (!hint.empty()) return fmt::format("unknown {} '{}'; {}", what, text, hint);
+  return fmt::format("unknown {} '{}'; known: {}", what, text, fmt::join(words, ", "));
+}
+
+YamlMap::YamlMap(const YamlNode& map, Findings& findings, const YamlNode* defaults)
+    : map_(map), defaults_(defaults), findings_(findings) {
+  expect(map, YamlNode::Kind::map, findings);
+}
+
+const YamlNode* YamlMap::get(std::string_view key, Need need) {
+  known_.push_back(key);
+  const YamlNode* node = map_.find(key);
+  if (node == nullptr && defaults_ != nullptr) node = defaults_->find(key);
+  if (node == nullptr && need == Need::required && map_.kind == YamlNode::Kind::map) {
+    findings_.add(map_.at, fmt::format("key '{}' is missing", key));
+  }
+  return node;
+}
+
+std::optional<std::string> YamlMap::text(std::string_view key, Need need) {
+  const YamlNode* node = get(key, need);
+  if (node == nullptr) return std::nullopt;
+  auto read = files::to_text(*node, findings_);
+  if (read && read->empty() && need == Need::required) {
+    findings_.add(node->at, fmt::format("key '{}' is empty", key));
+  }
+  return read;
+}
+
+std::optional<Decimal> YamlMap::decimal(std::string_view key) {
+  const YamlNode* node = get(key);
+  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
+  auto number = Decimal::parse(node->text);
+  if (!number) findings_.add(node->at, fmt::format("'{}' is not a number", node->text));
+  return number;
+}
+
+std::optional<Duration> YamlMap::duration(std::string_view key) {
+  const YamlNode* node = get(key);
+  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
+  const auto read = parse_duration(node->text);
+  if (!read) {
+    findings_.add(node->at, fmt::format("'{}' is not a duration such as 500ms or 2s", node->text));
+    return std::nullopt;
+  }
+  return *read;
+}
+
+std::optional<bool> YamlMap::flag(std::string_view key) {
+  const YamlNode* node = get(key);
+  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
+  if (node->text == "true") return true;
+  if (node->text == "false") return false;
+  findings_.add(node->at, fmt::format("'{}' is neither true nor false", node->text));
+  return std::nullopt;
+}
+
+std::optional<NumberRange> YamlMap::range(std::string_view key, std::uint64_t maximum, Need need) {
+  const YamlNode* node = get(key, need);
+  if (node == nullptr) return std::nullopt;
+  return to_range(*node, maximum, findings_);
+}
+
+std::optional<std::uint64_t> YamlMap::number_up_to(std::string_view key, std::uint64_t maximum,
+                                                   Need need) {
+  const YamlNode* node = get(key, need);
+  if (node == nullptr) return std::nullopt;
+  return to_unsigned(*node, maximum, findings_);
+}
+
+void YamlMap::finish() {
+  for (const YamlEntry& entry : map_.entries) {
+    if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+    const std::vector<std::string> words(known_.begin(), known_.end());
+    findings_.add(entry.key_at, unknown_word("key", entry.key, words));
+  }
+}
+
+}  // namespace spindle::files

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "files/yaml_reader.hpp"
+#include "spindle/base/clock.hpp"
+#include "spindle/base/decimal.hpp"
+
+namespace spindle::files {
+
+enum class Need : std::uint8_t { optional, required };
+
+/// First and last number of "1..15".
+struct NumberRange {
+  std::uint64_t from = 0;
+  std::uint64_t to = 0;
+};
+
+// ---- one value: the finding says what was expected; empty when it is not that ----
+
+std::optional<std::string> to_text(const YamlNode& node, Findings& findings);
+std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t maximum,
+                                         Findings& findings);
+/// "5" is 5..5.
+std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
+                                    Findings& findings);
+bool expect(const YamlNode& node, YamlNode::Kind kind, Findings& findings);
+
+/// A whole integer with an optional minus sign, such as the key of a label.
+std::optional<std::int64_t> parse_integer(std::string_view text);
+
+/// "unknown WHAT 'TEXT', did you mean …" for a word out of a fixed list.
+std::string unknown_word(std::string_view what, std::string_view text,
+                         const std::vector<std::string>& words);
+
+/// Reads a map key by key. Every key asked for is a known one; finish() reports the others.
+class YamlMap {
+ public:
+  /// `defaults` is asked for keys that are not in the map itself; may be null.
+  YamlMap(const YamlNode& map, Findings& findings, const YamlNode* defaults = nullptr);
+
+  /// The value; null when it is not there, with a finding when it is required.
+  const YamlNode* get(std::string_view key, Need need = Need::optional);
+
+  std::optional<std::string> text(std::string_view key, Need need = Need::optional);
+  std::optional<Decimal> decimal(std::string_view key);
+  std::optional<Duration> duration(std::string_view key);
+  std::optional<bool> flag(std::string_view key);
+  std::optional<NumberRange> range(std::string_view key, std::uint64_t maximum,
+                                   Need need = Need::optional);
+
+  template <typename Number>
+  std::optional<Number> number(std::string_view key, Need need = Need::optional) {
+    const auto read = number_up_to(key, std::numeric_limits<Number>::max(), need);
+    if (!read) return std::nullopt;
+    return static_cast<Number>(*read);
+  }
+
+  /// A word out of a fixed list of {text, meaning}.
+  template <typename Meaning, typename Words>
+  std::optional<Meaning> word(std::string_view key, std::string_view what, const Words& words,
+                              Need need = Need::optional) {
+    const YamlNode* node = get(key, need);
+    if (node == nullptr) return std::nullopt;
+    const auto read = to_text(*node, findings_);
+    if (!read) return std::nullopt;
+    std::vector<std::string> known;
+    for (const auto& [name, meaning] : words) {
+      if (name == *read) return meaning;
+      known.emplace_back(name);
+    }
+    findings_.add(node->at, unknown_word(what, *read, known));
+    return std::nullopt;
+  }
+
+  /// Marks a key as known that is read elsewhere.
+  void allow(std::string_view key) { known_.push_back(key); }
+
+  /// Reports the keys nobody asked for.
+  void finish();
+
+  [[nodiscard]] const YamlNode& node() const { return map_; }
+  [[nodiscard]] Findings& findings() const { return findings_; }
+
+ private:
+  std::optional<std::uint64_t> number_up_to(std::string_view key, std::uint64_t maximum, Need need);
+
+  const YamlNode& map_;
+  const YamlNode* defaults_;
+  Findings& findings_;
+  std::vector<std::string_view> known_;
+};
+
+/// Overwrites the target only when there is a value: how a profile overrides its base.
+template <typename Target, typename Source>
+void assign(Target& target, std::optional<Source>&& source) {
+  if (source) target = std::move(*source);
+}
+
+}  // namespace spindle::files

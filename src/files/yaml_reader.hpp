@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/base/error.hpp"
+#include "spindle/files/profile_store.hpp"
+
+namespace spindle::files {
+
+/// A place in one of the files that are read together; line and column count from 1.
+struct Position {
+  std::size_t file = 0;  ///< as given by Findings::add_file()
+  int line = 1;
+  int column = 1;
+  friend auto operator<=>(const Position&, const Position&) = default;
+};
+
+/// Faults of several files, collected instead of stopping at the first.
+class Findings {
+ public:
+  /// The number by which positions name this file.
+  std::size_t add_file(std::string path);
+
+  /// The same fault at the same place counts once.
+  void add(const Position& at, std::string message);
+  /// Only when nothing is wrong at this place yet: a repeated entry tells its fault once.
+  void add_once(const Position& at, std::string message);
+
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
+  /// Sorted by place.
+  [[nodiscard]] std::vector<Finding> list() const;
+  /// The first finding as `bad_file`, and how many there are. Requires at least one.
+  [[nodiscard]] Error error() const;
+
+ private:
+  struct Entry {
+    Position at;
+    std::string message;
+  };
+  std::vector<std::string> files_;
+  std::vector<Entry> entries_;  ///< sorted by place
+};
+
+struct YamlEntry;
+
+/// A YAML value as it was written. Scalars stay text: nothing is guessed from their looks.
+struct YamlNode {
+  enum class Kind : std::uint8_t { nothing, scalar, sequence, map };
+  Kind kind = Kind::nothing;
+  Position at = {};
+  std::string text = {};           ///< of a scalar
+  std::vector<YamlNode> items;     ///< of a sequence
+  std::vector<YamlEntry> entries;  ///< of a map, in the order of the file
+
+  /// The value of a key of this map; null when it is not there or this is no map.
+  [[nodiscard]] const YamlNode* find(std::string_view key) const;
+};
+
+struct YamlEntry {
+  std::string key;
+  Position key_at;
+  YamlNode value;
+};
+
+/// Which documents of a file are wanted; the rest is not even scanned.
+enum class Documents : std::uint8_t { first, all };
+
+/// Reads a whole file. Error `bad_file` when it cannot be read or is larger than any file of ours.
+Result<std::string> read_text_file(const std::string& path);
+
+/// The documents of a YAML text. Strict: aliases, anchors, tags, duplicate keys, keys that are no
+/// plain text, deep nesting, NUL and invalid UTF-8 are findings. After a syntax error the documents
+/// before it are returned.
+std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
+                                 Findings& findings);
+
+}  // namespace spindle::files
