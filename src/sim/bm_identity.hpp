@@ -1,0 +1,15 @@
+#pragma once
+
+#include "spindle/base/bytes.hpp"
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/sim/bm_tool.hpp"
+
+namespace spindle::sim {
+
+/// The device-specific bytes of a simulated tool's answer to FC 11h: those of the start state, cut
+/// or padded to the length asked for, with the options' numbers in the places that the profile
+/// names. The serial number is the same in the short and in the long form.
+Bytes make_identity(const std::optional<catalogue::IdentityFacts>& facts,
+                    const catalogue::SimulationFacts& start, const BmOptions& options);
+
+}  // namespace spindle::sim

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "spindle/base/bytes.hpp"
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/modbus/types.hpp"
+
+namespace spindle::sim {
+
+/// What a simulated tool makes of a write.
+enum class WriteVerdict : std::uint8_t { allowed, no_such_register, outside_limits };
+
+/// The registers of a simulated tool, laid out by its profile: named and numbered parameters, the
+/// mirrors with their limits, the event block; start values, limits and holes from its start state.
+/// A hole has no mirrors either. Keeps no reference to the profile.
+class RegisterBank {
+ public:
+  RegisterBank(const catalogue::Profile& profile, const catalogue::SimulationFacts& start);
+
+  /// Empty when one of the registers does not exist.
+  [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
+                                              std::uint16_t count) const;
+
+  [[nodiscard]] WriteVerdict check_write(std::uint16_t address, std::uint16_t value) const;
+  /// Stores without asking. Requires a holding register that exists.
+  void store(std::uint16_t address, std::uint16_t value);
+
+  /// A 16-bit parameter by name; 0 when the profile does not name it or it is a hole.
+  [[nodiscard]] std::uint16_t get(std::string_view name) const;
+  /// Nothing happens when the profile does not name it or it is a hole.
+  void set(std::string_view name, std::uint16_t value);
+
+ private:
+  struct Place {
+    modbus::RegisterTable table = modbus::RegisterTable::holding;
+    std::uint16_t address = 0;
+    catalogue::Kind kind = catalogue::Kind::u16;
+  };
+  struct Limits {
+    std::int64_t minimum = 0;
+    std::int64_t maximum = 0;
+    catalogue::Kind kind = catalogue::Kind::u16;
+  };
+  using Words = std::map<std::uint16_t, std::uint16_t>;
+
+  [[nodiscard]] const Words& words(modbus::RegisterTable table) const;
+  [[nodiscard]] Words& words(modbus::RegisterTable table);
+  void add_parameter(const catalogue::Parameter& parameter);
+  void add_numbered(const catalogue::NumberedFacts& facts);
+  void add_event_block(const catalogue::EventFacts& facts);
+  void start_value(const Place& place, std::int64_t raw);
+  void start_limits(const Place& place, std::int64_t minimum, std::int64_t maximum);
+  void add_mirrors(const catalogue::LimitFacts& facts);
+  void remove(const catalogue::Area& area, const std::optional<catalogue::LimitFacts>& limits);
+
+  std::map<std::string, Place, std::less<>> places_ = {};
+  Words holding_ = {};
+  Words input_ = {};
+  std::map<std::uint16_t, Limits> writable_ = {};
+};
+
+}  // namespace spindle::sim
