@@ -110,7 +110,7 @@ std::size_t end_of_quoted(std::string_view text, std::size_t begin) {
 std::size_t end_of_raw_string(std::string_view text, std::size_t quote) {
   const std::size_t open = text.find('(', quote);
   if (open == std::string_view::npos) return text.size();
-  const std::string close = ")" + std::string(text.substr(quote + 1, open - quote - 1)) + "\"";
+  const std::string close = fmt::format("){}\"", text.substr(quote + 1, open - quote - 1));
   const std::size_t end = text.find(close, open);
   return end == std::string_view::npos ? text.size() : end + close.size();
 }
