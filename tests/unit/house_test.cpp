@@ -88,6 +88,7 @@ const std::vector<BannedWord> banned_words = {
     {"make_shared", Counts::anywhere, {}},
 };
 
+// Lines of code in main.cpp; includes, comments and blank lines are free.
 constexpr std::ptrdiff_t longest_main = 20;
 
 // Spelt in halves so that this file does not find itself.
@@ -303,7 +304,7 @@ void check_pragma_once(const Source& source, Findings& findings) {
 
 void check_main(const Source& source, Findings& findings) {
   if (layer_of(source.path) != "main") return;
-  const std::vector<std::string> lines = lines_of(code_of(source.text));
+  const std::vector<std::string> lines = lines_of(statements_of(source));
   const auto code_lines = std::count_if(
       lines.begin(), lines.end(), [](const std::string& line) { return !trimmed(line).empty(); });
   if (code_lines > longest_main) {
@@ -440,7 +441,7 @@ TEST_CASE("a file that breaks the law is found") {
 }
 
 TEST_CASE("a main that grew too long is found") {
-  std::string lines = "// a comment does not count\n\n";
+  std::string lines = "// a comment does not count\n\n#include <neither>\n";
   for (std::ptrdiff_t line = 0; line < longest_main; ++line) lines += "call();\n";
   CHECK(judge({.path = "src/main.cpp", .text = lines}).empty());
   CHECK(joined(judge({.path = "src/main.cpp", .text = lines + "call();\n"})) ==
