@@ -1,1 +1,21 @@
-int main() { return 0; }
+#include "spindle/cli/run.hpp"
+#include "spindle/posix/clock.hpp"
+#include "spindle/posix/serve.hpp"
+#include "spindle/posix/signals.hpp"
+#include "spindle/posix/world.hpp"
+
+int main(int count, char** arguments) {
+  using namespace spindle::posix;
+  const SignalWatch signals;
+  SteadyClock clock(signals.interrupt());
+  spindle::cli::World world{.io = {write_out, write_err, read_line, is_terminal(Stream::in),
+                                   is_terminal(Stream::out), is_terminal(Stream::err)},
+                            .clock = clock,
+                            .interrupt = signals.interrupt(),
+                            .open = line_opener(clock, signals.interrupt()),
+                            .serve = tool_server(clock, signals.interrupt()),
+                            .environment = environment,
+                            .file_exists = file_exists,
+                            .program_folder = program_folder()};
+  return spindle::cli::run({arguments + 1, arguments + count}, world);
+}

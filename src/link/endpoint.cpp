@@ -283,4 +283,12 @@ Result<Endpoint> parse_endpoint(std::string_view url) {
   return endpoint;
 }
 
+std::string to_url(const Endpoint& endpoint) {
+  const bool is_ipv6 = endpoint.host.find(':') != std::string::npos;
+  std::string url = "tcp://" + (is_ipv6 ? "[" + endpoint.host + "]" : endpoint.host);
+  if (endpoint.port) url += fmt::format(":{}", *endpoint.port);
+  if (endpoint.unit) url += fmt::format("?unit={}", endpoint.unit->value);
+  return url;
+}
+
 }  // namespace spindle::link

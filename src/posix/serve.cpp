@@ -137,4 +137,10 @@ Result<void> serve_tcp(sim::Server& server, const ServeOptions& options, Clock& 
   return {};
 }
 
+sim::Serve tool_server(Clock& clock, const Interrupt& interrupt) {
+  return [&clock, &interrupt](sim::Server& server, const ServeOptions& options) {
+    return serve_tcp(server, options, clock, interrupt);
+  };
+}
+
 }  // namespace spindle::posix

@@ -37,7 +37,7 @@ ServedClient::ServedClient(Descriptor socket, sim::ConnectionId connection, Serv
       options_(&service.options),
       peer_(service.server, connection, service.options.framing, service.options.faults,
             service.answers) {
-  hear(ServeOptions::Heard::connected, {});
+  hear(sim::Heard::connected, {});
 }
 
 ServedClient::~ServedClient() {
@@ -47,7 +47,7 @@ ServedClient::~ServedClient() {
   std::array<std::uint8_t, read_size> discarded;
   std::size_t reads = health_ == Health::sound ? max_discarded_reads : 0;
   while (reads > 0 && ::recv(socket_.number(), discarded.data(), discarded.size(), 0) > 0) --reads;
-  hear(ServeOptions::Heard::disconnected, {});
+  hear(sim::Heard::disconnected, {});
 }
 
 short ServedClient::events() const {
@@ -71,7 +71,7 @@ void ServedClient::read(TimePoint now) {
     end_input(now);
   } else if (output_ == Half::open) {
     const ByteView got(bytes.data(), static_cast<std::size_t>(received));
-    hear(ServeOptions::Heard::request, got);
+    hear(sim::Heard::request, got);
     peer_.receive(got, now);
   }
 }
@@ -85,7 +85,7 @@ void ServedClient::write(TimePoint now) {
   flush();
   // Piece by piece, so that each leaves as a segment of its own while the client keeps up.
   for (Bytes piece = peer_.take(now); !piece.empty(); piece = peer_.take(now)) {
-    hear(ServeOptions::Heard::response, piece);
+    hear(sim::Heard::response, piece);
     outgoing_.insert(outgoing_.end(), piece.begin(), piece.end());
     flush();
     if (outgoing_.size() > max_outgoing) health_ = Health::broken;
@@ -124,7 +124,7 @@ void ServedClient::end_output(TimePoint now) {
   ::shutdown(socket_.number(), SHUT_WR);
 }
 
-void ServedClient::hear(ServeOptions::Heard heard, ByteView bytes) const {
+void ServedClient::hear(sim::Heard heard, ByteView bytes) const {
   if (options_->log) options_->log(heard, connection_.value, bytes);
 }
 

@@ -46,7 +46,7 @@ class ServedClient {
   void flush();
   void end_input(TimePoint now);
   void end_output(TimePoint now);
-  void hear(ServeOptions::Heard heard, ByteView bytes) const;
+  void hear(sim::Heard heard, ByteView bytes) const;
 
   Descriptor socket_;
   sim::ConnectionId connection_;

@@ -20,9 +20,9 @@ void append_csv_field(std::string& out, std::string_view text) {
   out += '"';
 }
 
-class CsvRenderer final : public Renderer {
+class CsvRenderer final : public PlainRenderer {
  public:
-  CsvRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
+  using PlainRenderer::PlainRenderer;
 
   Result<void> begin(std::span<const Column> columns) override {
     std::vector<std::string> keys;
@@ -35,21 +35,11 @@ class CsvRenderer final : public Renderer {
 
   Result<void> record(const Record& record) override {
     return write_line([&record](std::string_view key) {
-      return printable(shown_text(record, key), LineBreaks::keep);
+      return printable(cell_text(record, key), LineBreaks::keep);
     });
   }
 
   Result<void> end() override { return {}; }
-
-  Result<void> summary(const Record& /*counts*/, std::string_view sentence) override {
-    say_summary(streams_, talk_, sentence);
-    return {};
-  }
-
-  Result<void> error(const Error& error, WallTime /*time*/) override {
-    say_error(streams_, error);
-    return {};
-  }
 
  private:
   template <typename TextOfKey>
@@ -60,11 +50,9 @@ class CsvRenderer final : public Renderer {
       append_csv_field(line_, text_of(key));
     }
     line_ += "\r\n";
-    return streams_.out(line_);
+    return streams().out(line_);
   }
 
-  Streams& streams_;
-  Talk talk_;
   std::vector<std::string> keys_;
   std::string line_;
 };

@@ -93,12 +93,17 @@ std::string printable(std::string_view text, LineBreaks breaks) {
 }
 
 std::string shown_text(const Record& record, std::string_view key) {
+  const Field* const field = record.find(key);
+  const bool has_own = field != nullptr && !field->shown.empty();
+  return has_own ? field->shown : cell_text(record, key);
+}
+
+std::string cell_text(const Record& record, std::string_view key) {
   if (key == "target") return record.target;
   if (key == "time") return to_text(record.time);
   if (key == "type") return record.type;
   const Field* const field = record.find(key);
-  if (field == nullptr) return {};
-  return field->shown.empty() ? to_text(field->cell) : field->shown;
+  return field == nullptr ? std::string() : to_text(field->cell);
 }
 
 }  // namespace spindle::report

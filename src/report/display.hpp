@@ -23,4 +23,7 @@ std::string printable(std::string_view text, LineBreaks breaks);
 /// "time" and "type" are the record's own. Empty when the record has no such field.
 std::string shown_text(const Record& record, std::string_view key);
 
+/// The same as programs see it: always the cell, never the field's `shown`.
+std::string cell_text(const Record& record, std::string_view key);
+
 }  // namespace spindle::report

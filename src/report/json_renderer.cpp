@@ -6,7 +6,7 @@ namespace {
 
 class JsonRenderer final : public Renderer {
  public:
-  explicit JsonRenderer(Streams& streams) : streams_(streams) {}
+  JsonRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
 
   Result<void> begin(std::span<const Column> /*columns*/) override { return {}; }
 
@@ -18,6 +18,12 @@ class JsonRenderer final : public Renderer {
   }
 
   Result<void> end() override { return {}; }
+
+  Result<void> line(const Record& record, std::string_view /*plain*/) override {
+    return this->record(record);
+  }
+
+  void note(std::string_view sentence) override { say_sentence(streams_, talk_, sentence); }
 
   Result<void> summary(const Record& counts, std::string_view /*sentence*/) override {
     return record(counts);
@@ -31,13 +37,14 @@ class JsonRenderer final : public Renderer {
 
  private:
   Streams& streams_;
+  Talk talk_;
   std::string line_;
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_json_renderer(Streams& streams) {
-  return std::make_unique<JsonRenderer>(streams);
+std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Talk talk) {
+  return std::make_unique<JsonRenderer>(streams, talk);
 }
 
 }  // namespace spindle::report

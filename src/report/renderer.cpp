@@ -17,7 +17,7 @@ Cell number(std::int64_t value) { return Decimal(value); }
 std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk) {
   switch (format) {
     case Format::json:
-      return make_json_renderer(streams);
+      return make_json_renderer(streams, talk);
     case Format::csv:
       return make_csv_renderer(streams, talk);
     case Format::table:
@@ -49,9 +49,25 @@ void say_error(const Streams& streams, const Error& error) {
   streams.err("spindle: " + printable(describe(error), LineBreaks::fold) + "\n");
 }
 
-void say_summary(const Streams& streams, Talk talk, std::string_view sentence) {
+void say_sentence(const Streams& streams, Talk talk, std::string_view sentence) {
   if (talk == Talk::quiet || sentence.empty()) return;
   streams.err(printable(sentence, LineBreaks::fold) + "\n");
+}
+
+Result<void> PlainRenderer::line(const Record& /*record*/, std::string_view plain) {
+  return streams_.out(printable(plain, LineBreaks::fold) + "\n");
+}
+
+void PlainRenderer::note(std::string_view sentence) { say_sentence(streams_, talk_, sentence); }
+
+Result<void> PlainRenderer::summary(const Record& /*record*/, std::string_view sentence) {
+  say_sentence(streams_, talk_, sentence);
+  return {};
+}
+
+Result<void> PlainRenderer::error(const Error& error, WallTime /*time*/) {
+  say_error(streams_, error);
+  return {};
 }
 
 }  // namespace spindle::report

@@ -25,9 +25,9 @@ std::string draw(const Row& row, std::span<const Column> columns,
   return line;
 }
 
-class TableRenderer final : public Renderer {
+class TableRenderer final : public PlainRenderer {
  public:
-  TableRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
+  using PlainRenderer::PlainRenderer;
 
   Result<void> begin(std::span<const Column> columns) override {
     if (Result<void> flushed = end(); !flushed) return flushed;
@@ -56,16 +56,6 @@ class TableRenderer final : public Renderer {
     return flush();
   }
 
-  Result<void> summary(const Record& /*counts*/, std::string_view sentence) override {
-    say_summary(streams_, talk_, sentence);
-    return {};
-  }
-
-  Result<void> error(const Error& error, WallTime /*time*/) override {
-    say_error(streams_, error);
-    return {};
-  }
-
  private:
   /// Which header line comes next: the first one, another one behind a blank line, or none.
   enum class Heading : std::uint8_t { first, another, drawn };
@@ -82,11 +72,11 @@ class TableRenderer final : public Renderer {
     }
   }
 
-  [[nodiscard]] std::string header() const {
+  [[nodiscard]] std::string header() {
     Row titles;
     for (const Column& column : columns_) titles.push_back(column.title);
     std::string line = draw(titles, columns_, widths_);
-    if (streams_.color == Color::off) return line;
+    if (streams().color == Color::off) return line;
     return std::string(bold).append(line).append(plain);
   }
 
@@ -98,11 +88,9 @@ class TableRenderer final : public Renderer {
     for (const Row& row : rows_) text += draw(row, columns_, widths_) + '\n';
     rows_.clear();
     heading_ = Heading::drawn;
-    return streams_.out(text);
+    return streams().out(text);
   }
 
-  Streams& streams_;
-  Talk talk_;
   std::vector<Column> columns_;
   std::vector<std::size_t> widths_;
   std::vector<Row> rows_;

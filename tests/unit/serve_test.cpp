@@ -304,8 +304,8 @@ TEST_CASE("serve: a client that takes nothing is given up, and harms no other") 
   std::promise<void> gone;
   std::atomic<bool> told = false;
   ServeOptions options;
-  options.log = [&](ServeOptions::Heard heard, std::uint32_t, ByteView) {
-    if (heard == ServeOptions::Heard::disconnected && !told.exchange(true)) gone.set_value();
+  options.log = [&](sim::Heard heard, std::uint32_t, ByteView) {
+    if (heard == sim::Heard::disconnected && !told.exchange(true)) gone.set_value();
   };
   Served served(options);
   const Descriptor lazy = test::connect_plainly(served.port);
@@ -363,12 +363,12 @@ TEST_CASE("serve: the log hears connections and bytes, as the server sees them")
   Bytes request;
   Bytes response;
   ServeOptions options;
-  options.log = [&](ServeOptions::Heard heard, std::uint32_t connection, ByteView bytes) {
+  options.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     const std::lock_guard lock(mutex);
     constexpr const char* words[] = {"connected", "request", "response", "disconnected"};
     story += std::to_string(connection) + " " + words[static_cast<int>(heard)] + "\n";
-    if (heard == ServeOptions::Heard::request) request.assign(bytes.begin(), bytes.end());
-    if (heard == ServeOptions::Heard::response) response.assign(bytes.begin(), bytes.end());
+    if (heard == sim::Heard::request) request.assign(bytes.begin(), bytes.end());
+    if (heard == sim::Heard::response) response.assign(bytes.begin(), bytes.end());
   };
   Served served(options);
   Client client(served.port);

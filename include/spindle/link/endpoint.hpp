@@ -36,4 +36,8 @@ bool looks_like_url(std::string_view text);
 /// outside 1…65535, unit outside 0…255 (0…247 on RTU), unknown or repeated option.
 Result<Endpoint> parse_endpoint(std::string_view url);
 
+/// "tcp://HOST:PORT", with brackets around an IPv6 address: a network endpoint whose port has been
+/// filled in, for messages.
+std::string to_url(const Endpoint& endpoint);
+
 }  // namespace spindle::link

@@ -66,6 +66,8 @@ class Session {
   void shield() { transport_->shield(); }
 
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
+  /// For a profile that is only known after the first answer.
+  void set_rules(DemuxRules rules) { options_.rules = std::move(rules); }
   [[nodiscard]] const SessionOptions& options() const { return options_; }
   [[nodiscard]] const SessionCounters& counters() const { return counters_; }
   [[nodiscard]] Clock& clock() const { return *clock_; }

@@ -22,7 +22,7 @@ using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Tex
 struct Field {
   std::string key;  ///< snake_case, as in the contract's table of record types
   Cell cell;
-  std::string shown = {};  ///< what people see instead, in tables and CSV; empty: the cell itself
+  std::string shown = {};  ///< what people see instead, in tables; empty: the cell itself
 };
 
 /// What commands produce. Renderers decide how it looks.

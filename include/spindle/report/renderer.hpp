@@ -41,6 +41,11 @@ class Renderer {
   virtual Result<void> record(const Record& record) = 0;
   /// Draws what was held back to align it. CSV without records still has its header line.
   virtual Result<void> end() = 0;
+  /// A record that stands for itself, at once: a JSON line, or `plain` as a line of its own on
+  /// stdout.
+  virtual Result<void> line(const Record& record, std::string_view plain) = 0;
+  /// Something that people should know: a sentence on stderr, left out when talk is quiet.
+  virtual void note(std::string_view sentence) = 0;
   /// The closing counts: a JSON line on stdout, or `sentence` on stderr.
   virtual Result<void> summary(const Record& record, std::string_view sentence) = 0;
   /// The sentence on stderr, and for JSON also an `error` line on stdout.

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::cli {
+
+/// The outside world as the program sees it; tests bring their own.
+struct World {
+  report::Streams io;
+  Clock& clock;
+  const Interrupt& interrupt;
+  device::OpenTransport open;  ///< real lines
+  sim::Serve serve;            ///< puts a simulated tool on a port
+  std::function<std::optional<std::string>(std::string_view name)> environment;
+  std::function<bool(const std::string& path)> file_exists;
+  std::string program_folder;  ///< where the executable is; its profiles are found from here
+};
+
+/// The whole program: parses the arguments (without the program's name), runs one command, and
+/// returns the exit status of the contract. Every failure has been told on world.io when it
+/// returns; nothing is thrown.
+int run(const std::vector<std::string>& arguments, World& world);
+
+}  // namespace spindle::cli

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/commands/context.hpp"
+
+/// One options struct and one function a verb. None of them prints, exits or parses a command line.
+namespace spindle::commands {
+
+struct IdentifyOptions {
+  std::vector<std::string> targets;
+};
+Result<Outcome> identify(const IdentifyOptions& options, Context& context);
+
+struct ListOptions {
+  std::vector<std::string> arguments;  ///< [TARGET] [PATTERN...]
+};
+Result<Outcome> list(const ListOptions& options, Context& context);
+
+struct GetOptions {
+  std::string target;
+  std::vector<std::string> names;
+  device::Limits limits = device::Limits::skip;
+};
+Result<Outcome> get(const GetOptions& options, Context& context);
+
+enum class Execution : std::uint8_t { real, dry_run };
+
+struct SetOptions {
+  std::string target;
+  std::vector<std::string> assignments;  ///< NAME=VALUE
+  Execution execution = Execution::real;
+};
+Result<Outcome> set(const SetOptions& options, Context& context);
+
+enum class Acceptance : std::uint8_t { verified_only, unverified };
+
+struct DoOptions {
+  std::string target;
+  std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
+  Acceptance acceptance = Acceptance::verified_only;
+};
+Result<Outcome> perform(const DoOptions& options, Context& context);
+
+struct PingOptions {
+  std::string target;
+  unsigned count = 4;
+  Duration interval = std::chrono::seconds(1);
+};
+Result<Outcome> ping(const PingOptions& options, Context& context);
+
+struct SimulateOptions {
+  std::string profile;
+  std::string listen = "tcp://127.0.0.1:0";
+  std::vector<std::string> faults;
+  std::optional<unsigned> identity_bytes;
+  std::optional<std::uint16_t> firmware;
+  std::optional<std::uint32_t> serial;
+  std::optional<std::uint16_t> model;
+};
+Result<Outcome> simulate(const SimulateOptions& options, Context& context);
+
+struct ProfileNameOptions {
+  std::string profile;  ///< id or file
+};
+Result<Outcome> profile_list(Context& context);
+Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context);
+Result<Outcome> profile_check(const ProfileNameOptions& options, Context& context);
+
+}  // namespace spindle::commands

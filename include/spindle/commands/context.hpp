@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/base/interrupt.hpp"
+#include "spindle/device/device.hpp"
+#include "spindle/files/profile_store.hpp"
+#include "spindle/files/tools_file.hpp"
+#include "spindle/report/renderer.hpp"
+#include "spindle/report/streams.hpp"
+#include "spindle/sim/serve.hpp"
+
+namespace spindle::commands {
+
+/// Whether a question may be asked before something is changed.
+enum class Consent : std::uint8_t {
+  ask,       ///< on a terminal; refused elsewhere
+  given,     ///< --yes
+  no_input,  ///< --no-input: never ask, so refuse
+};
+
+enum class Verbosity : std::uint8_t { normal, frames };
+
+/// The options that every command takes (contract, section 2.2), as far as commands see them.
+struct CommonOptions {
+  std::string profile = {};  ///< --profile; empty: not given
+  std::optional<Duration> timeout = std::nullopt;
+  std::optional<Duration> connect_timeout = std::nullopt;
+  std::optional<unsigned> retries = std::nullopt;
+  Consent consent = Consent::ask;
+  Verbosity verbosity = Verbosity::normal;
+};
+
+/// Everything a command may touch.
+struct Context {
+  report::Streams& io;
+  Clock& clock;
+  const Interrupt& interrupt;
+  const device::OpenTransport& open;  ///< real lines; simulated tools are opened by commands
+  const sim::Serve& serve;
+  const files::ProfileStore& profiles;
+  const files::Tools& tools;
+  report::Renderer& renderer;
+  const CommonOptions& common;
+};
+
+/// How a command that handled several things ended.
+class Outcome {
+ public:
+  void succeed() { ++succeeded_; }
+  void fail(const Error& error);
+  /// Done, and the answer is no (status 1), unless something failed.
+  void negate() { negative_ = true; }
+
+  /// ok; the common status of all failures when nothing succeeded; else partial. Interruptions win.
+  [[nodiscard]] ExitStatus status() const;
+  [[nodiscard]] std::size_t succeeded() const { return succeeded_; }
+  [[nodiscard]] std::size_t failed() const { return failed_; }
+
+ private:
+  std::size_t succeeded_ = 0;
+  std::size_t failed_ = 0;
+  bool negative_ = false;
+  ExitStatus first_ = ExitStatus::ok;
+  bool mixed_ = false;
+};
+
+}  // namespace spindle::commands

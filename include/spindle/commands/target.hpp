@@ -1,0 +1,93 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::commands {
+
+/// A tool as the user named it, with everything that is known before connecting.
+struct Target {
+  std::string shown;  ///< name or URL as given: the `target` of records
+  link::Endpoint endpoint = {};
+  std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
+  std::string torque_unit = {};  ///< of the tools file; empty: unknown
+  std::vector<std::string> verified = {};
+};
+
+/// A target that was connected.
+struct OpenTool {
+  Target target;
+  device::Device device;
+};
+
+/// Name, @group or URL to targets. Errors `bad_target` and `unknown_name` with a suggestion.
+Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
+                                            const Context& context);
+
+/// The same for a command that takes one tool; a group of several is an error.
+Result<Target> resolve_target(const std::string& text, const Context& context);
+
+/// Whether a first argument is meant as a target rather than a parameter pattern.
+bool is_target(std::string_view text, const Context& context);
+
+/// Whether a command can do without knowing what the registers mean.
+enum class Need : std::uint8_t { named_registers, raw_registers };
+
+/// The target's profile, or an empty one where none is known before connecting.
+Result<catalogue::Profile> load_profile(const Target& target, const Context& context);
+
+/// Connects, and asks nothing.
+Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context);
+
+/// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
+/// other registers than the profile's is refused (`wrong_generation`).
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Context& context);
+
+/// An open tool, and what was prepared from its profile.
+template <typename Prepared>
+struct Opened {
+  OpenTool tool;
+  Prepared prepared;
+};
+
+/// Opens a tool and calls `prepare(profile)` as early as possible: before connecting where the
+/// profile is known, so that a misspelt name is told without asking anybody.
+template <typename Prepare>
+auto open_prepared(const Target& target, Need need, const Context& context, Prepare prepare)
+    -> Result<
+        Opened<typename std::invoke_result_t<Prepare, const catalogue::Profile&>::value_type>> {
+  using Attempt = std::invoke_result_t<Prepare, const catalogue::Profile&>;
+  auto profile = load_profile(target, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  const bool known = !target.profile.empty() || need == Need::raw_registers;
+  std::optional<Attempt> prepared;
+  if (known) prepared = prepare(*profile);
+  if (prepared && !*prepared) return tl::unexpected(std::move(prepared->error()));
+  auto tool = open_tool(target, std::move(*profile), need, context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (!prepared) prepared = prepare(tool->device.profile());
+  if (!*prepared) return tl::unexpected(std::move(prepared->error()));
+  return Opened<typename Attempt::value_type>{std::move(*tool), std::move(**prepared)};
+}
+
+/// What the answer to FC 11h fits.
+struct Identification {
+  catalogue::Identity identity;
+  std::string profile = {};                  ///< empty: unknown, or several fit
+  std::vector<std::string> candidates = {};  ///< all that fit
+  std::string maker = {};
+  std::string series = {};
+};
+
+/// Matches an answer against all profiles, or against `only` when it is not empty.
+Result<Identification> match_identity(ByteView answer, const std::string& only,
+                                      const Context& context);
+
+}  // namespace spindle::commands

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/catalogue/identity.hpp"
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/catalogue/value.hpp"
+#include "spindle/link/client.hpp"
+#include "spindle/link/endpoint.hpp"
+#include "spindle/link/session.hpp"
+
+namespace spindle::device {
+
+/// Opens the line to an endpoint; `posix` and `sim` bring the implementations.
+using OpenTransport = std::function<Result<std::unique_ptr<link::Transport>>(
+    const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>;
+
+/// What the user may override of a profile's link facts.
+struct LinkOptions {
+  std::optional<Duration> answer_timeout = std::nullopt;
+  std::optional<Duration> connect_timeout = std::nullopt;
+  std::optional<unsigned> retries = std::nullopt;  ///< of reads
+  link::Trace trace = {};
+};
+
+/// One parameter as read. `registers` and `value` hold the same error when it could not be.
+struct Reading {
+  catalogue::Parameter parameter;
+  Result<Registers> registers;
+  Result<catalogue::Value> value;
+  /// The tool's own limits, when they were asked for and exist.
+  std::optional<catalogue::Value> minimum = std::nullopt;
+  std::optional<catalogue::Value> maximum = std::nullopt;
+  std::optional<Error> limits_error = std::nullopt;
+};
+
+enum class Limits : std::uint8_t { skip, read };
+
+/// How a write ended, as proven by reading back.
+enum class WriteResult : std::uint8_t {
+  written,   ///< the tool holds the new value
+  coerced,   ///< the tool holds a third value
+  mismatch,  ///< the tool answered, but still holds the old value
+};
+
+struct Written {
+  WriteResult result;
+  catalogue::Value now;  ///< as read back
+};
+
+/// How an action ended.
+enum class ActionResult : std::uint8_t {
+  confirmed,      ///< a reading proves the effect
+  sent,           ///< acknowledged; nothing that can be read proves the effect
+  not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
+};
+
+/// One tool behind one connection: reads, writes and acts by catalogue entries.
+class Device {
+ public:
+  /// Connects. Errors carry the endpoint's text as target, here and in every other function.
+  static Result<Device> open(const link::Endpoint& endpoint, catalogue::Profile profile,
+                             const LinkOptions& options, const OpenTransport& open_transport,
+                             Clock& clock);
+
+  [[nodiscard]] const catalogue::Profile& profile() const { return profile_; }
+  [[nodiscard]] link::Session& session() { return *session_; }
+
+  /// The bytes of FC 11h. An exception response is an error like any other.
+  Result<Bytes> report_server_id();
+
+  /// Goes on with a profile that was found by the answer to FC 11h.
+  void use(catalogue::Profile profile);
+
+  /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
+  /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
+  /// 11h is refused): on such a tool only raw registers may be read.
+  Result<void> require_known_registers();
+
+  /// Reads all in the fewest requests. A refused register stands in its reading; anything else ends
+  /// it.
+  Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
+                                         Limits limits, const link::Progress& progress = {});
+
+  /// Writes and reads back. A write without an answer is repeated once, and only after reading back
+  /// has shown that it did not take. Does not check ranges. `before` is the value read before.
+  Result<Written> write(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                        const catalogue::Value& value);
+
+  /// Sends the action once, never again, and waits for its confirming parameter.
+  Result<ActionResult> perform(const catalogue::Action& action, std::uint16_t value);
+
+  /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
+  /// response counts as an answer.
+  Result<Duration> ping();
+
+ private:
+  Device(std::string target, catalogue::Profile profile, std::unique_ptr<link::Session> session,
+         unsigned retries);
+
+  Error located(Error error) const;
+  Error with_exception_text(Error error) const;
+  Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
+                     const link::RegisterImage& image) const;
+  Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
+  Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
+
+  std::string target_;
+  catalogue::Profile profile_;
+  std::unique_ptr<link::Session> session_;
+  unsigned retries_;
+  link::Client client_;
+  bool registers_known_ = false;
+};
+
+}  // namespace spindle::device

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "spindle/base/bytes.hpp"
+#include "spindle/base/error.hpp"
+#include "spindle/modbus/adu.hpp"
+#include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/server.hpp"
+
+namespace spindle::sim {
+
+/// What happens on a connection of a served tool; directions as the server sees them.
+enum class Heard : std::uint8_t { connected, request, response, disconnected };
+
+/// Where and how a simulated tool is served.
+struct ServeOptions {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 0;  ///< 0: the system chooses
+  modbus::Framing framing = modbus::Framing::tcp;
+  FaultPlan faults = {};
+  /// Called once with the port that is listened on, before the first connection is accepted.
+  std::function<Result<void>(std::uint16_t port)> listening = {};
+  /// Hears every connection and all bytes as they come and go (usually a frame at a time).
+  std::function<void(Heard, std::uint32_t connection, ByteView bytes)> log = {};
+};
+
+/// Serves a tool to any number of clients until an interrupt; `posix` brings the implementation.
+using Serve = std::function<Result<void>(Server& server, const ServeOptions& options)>;
+
+}  // namespace spindle::sim

@@ -1,0 +1,602 @@
+#include "grammar.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "spindle/base/duration.hpp"
+#include "spindle/base/text.hpp"
+#include "spindle/sim/fault_plan.hpp"
+#include "version.hpp"
+
+namespace spindle::cli {
+namespace {
+
+using commands::Context;
+using commands::Outcome;
+using Run = std::function<Result<Outcome>(Context&)>;
+
+/// The common options as typed.
+struct Typed {
+  std::string output;
+  std::string profile;
+  std::string tools;
+  std::string timeout;
+  std::string connect_timeout;
+  std::string retries;
+  std::string color;
+  bool json = false;
+  bool yes = false;
+  bool no_input = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool help = false;
+  bool version = false;
+};
+
+/// What people read of a command beside its options.
+struct Words {
+  std::string_view name;
+  std::string_view synopsis;  ///< behind the command's name
+  std::string_view meaning;
+  std::string_view examples;  ///< one a line
+};
+
+/// The grammar while it is being parsed: the innermost command that was named.
+struct Draft {
+  Typed typed;
+  std::map<const CLI::App*, Words> words;
+  const CLI::App* chosen = nullptr;
+  Run run;
+};
+
+Error usage(std::string message, std::string hint = {}) {
+  return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
+}
+
+Error missing(std::string_view command, std::string_view argument) {
+  return usage(fmt::format("{}: {} is missing", command, argument),
+               fmt::format("'spindle {} --help' shows examples", command));
+}
+
+Error bad_option(std::string_view option, std::string_view value, std::string_view allowed) {
+  Error error = usage(fmt::format("'{}' is not {}", value, allowed));
+  error.code = Errc::bad_value;
+  error.name = option;
+  return error;
+}
+
+Result<std::uint64_t> to_number(std::string_view option, const std::string& text,
+                                std::uint64_t minimum, std::uint64_t maximum) {
+  const auto number = parse_unsigned(text, maximum);
+  if (number && *number >= minimum) return *number;
+  return tl::unexpected(
+      bad_option(option, text, fmt::format("a number from {} to {}", minimum, maximum)));
+}
+
+Result<std::optional<Duration>> to_duration(std::string_view option, const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  auto duration = parse_duration(text);
+  if (duration && *duration > Duration::zero()) return *duration;
+  return tl::unexpected(bad_option(option, text, "a duration such as 500ms, 2s or 5min"));
+}
+
+/// One of a few words, with a suggestion for a misspelt one.
+template <typename Choice, std::size_t count>
+Result<Choice> to_choice(std::string_view option, const std::string& text,
+                         const std::array<std::pair<std::string_view, Choice>, count>& choices) {
+  std::vector<std::string> words;
+  for (const auto& [word, choice] : choices) {
+    if (word == text) return choice;
+    words.emplace_back(word);
+  }
+  Error error = bad_option(option, text, fmt::format("one of {}", fmt::join(words, ", ")));
+  error.hint = suggestion(text, words);
+  return tl::unexpected(std::move(error));
+}
+
+constexpr std::array<std::pair<std::string_view, report::Format>, 3> formats = {
+    {{"table", report::Format::table},
+     {"json", report::Format::json},
+     {"csv", report::Format::csv}}};
+
+constexpr std::array<std::pair<std::string_view, ColorChoice>, 3> colors = {
+    {{"auto", ColorChoice::automatic},
+     {"always", ColorChoice::always},
+     {"never", ColorChoice::never}}};
+
+CLI::Option* option(CLI::App* app, const std::string& names, std::string& into,
+                    const std::string& placeholder, const std::string& meaning) {
+  return app->add_option(names, into, meaning)
+      ->type_name(placeholder)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+}
+
+void add_common_options(CLI::App& app, Typed& typed) {
+  option(&app, "-o,--output", typed.output, "FORMAT", "table, json (JSON Lines) or csv");
+  app.add_flag("--json", typed.json, "the same as -o json");
+  option(&app, "--profile", typed.profile, "NAME|FILE", "what the tool's registers mean");
+  option(&app, "--tools", typed.tools, "FILE", "file of named tools");
+  option(&app, "--timeout", typed.timeout, "DURATION", "how long to wait for one answer");
+  option(&app, "--connect-timeout", typed.connect_timeout, "DURATION",
+         "how long to wait for the connection");
+  option(&app, "--retries", typed.retries, "N", "how often a read without an answer is repeated");
+  app.add_flag("-y,--yes", typed.yes, "answer every question with yes");
+  app.add_flag("--no-input", typed.no_input, "never ask; what would have to be asked is refused");
+  app.add_flag("-q,--quiet", typed.quiet, "no summary and no notes on stderr");
+  app.add_flag("-v,--verbose", typed.verbose, "every frame and decision on stderr");
+  option(&app, "--color", typed.color, "WHEN", "auto, always or never");
+  app.add_flag("-h,--help", typed.help, "show this help");
+  app.add_flag("--version", typed.version, "show the version");
+}
+
+/// Adds a command whose options struct CLI11 fills while `make_run` turns it into the deed. The
+/// options are copied into the run, because the grammar is gone when it runs.
+template <typename Options, typename MakeRun>
+CLI::App* add_command(CLI::App& parent, Draft& draft, const Words& words, Options& options,
+                      MakeRun make_run) {
+  CLI::App* command = parent.add_subcommand(std::string(words.name), std::string(words.meaning));
+  command->fallthrough();
+  command->set_help_flag();
+  draft.words[command] = words;
+  command->final_callback([&draft, &options, command, make_run] {
+    if (draft.chosen != nullptr) return;  // a command below this one was named
+    draft.chosen = command;
+    draft.run = [typed = options, make_run](Context& context) { return make_run(typed, context); };
+  });
+  return command;
+}
+
+/// The options as typed, command by command; what needs converting is text here.
+struct TypedPing {
+  commands::PingOptions options;
+  std::string count;
+  std::string interval;
+};
+struct TypedSet {
+  commands::SetOptions options;
+  bool dry_run = false;
+};
+struct TypedGet {
+  commands::GetOptions options;
+  bool limits = false;
+};
+struct TypedDo {
+  commands::DoOptions options;
+  bool accept_unverified = false;
+};
+struct TypedSimulate {
+  commands::SimulateOptions options;
+  std::string identity_bytes;
+  std::string firmware;
+  std::string serial;
+  std::string model;
+};
+
+/// Everything that CLI11 writes into; must live as long as the parser.
+struct TypedCommands {
+  commands::IdentifyOptions identify;
+  commands::ListOptions list;
+  TypedGet get;
+  TypedSet set;
+  TypedDo perform;
+  TypedPing ping;
+  TypedSimulate simulate;
+  commands::ProfileNameOptions profile;
+  commands::ProfileNameOptions profile_list;
+  commands::ProfileNameOptions profile_show;
+  commands::ProfileNameOptions profile_check;
+};
+
+void add_identify(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"identify", "TARGET...",
+                           "who is there: maker, model, serial, firmware, profile",
+                           "spindle identify sim:doga-bm\n"
+                           "spindle identify tcp://192.168.10.23:5000\n"
+                           "spindle identify station3 station4 --json"};
+  const auto run = [](const commands::IdentifyOptions& options, Context& context) {
+    return options.targets.empty() ? Result<Outcome>(tl::unexpected(missing("identify", "TARGET")))
+                                   : commands::identify(options, context);
+  };
+  add_command(app, draft, words, typed.identify, run)
+      ->add_option("TARGET", typed.identify.targets, "tool name, @group or URL");
+}
+
+void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"list", "[TARGET] [PATTERN...]",
+                           "the parameter catalogue, offline when --profile is given",
+                           "spindle list --profile doga-bm\n"
+                           "spindle list --profile doga-bm 'preset.1.*'\n"
+                           "spindle list station3 '*torque*' --json"};
+  add_command(app, draft, words, typed.list, commands::list)
+      ->add_option("ARGUMENT", typed.list.arguments, "target (optional), then names or patterns");
+}
+
+void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"get", "TARGET [NAME|PATTERN...]",
+                           "read parameters by name, pattern, number (p242) or raw register "
+                           "(@holding:2, @input:3204/i16)",
+                           "spindle get sim:doga-bm 'preset.1.*torque*'\n"
+                           "spindle get station3 status.ready status.alarm\n"
+                           "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16"};
+  const auto run = [](TypedGet get, Context& context) {
+    if (get.options.target.empty())
+      return Result<Outcome>(tl::unexpected(missing("get", "TARGET")));
+    if (get.limits) get.options.limits = device::Limits::read;
+    return commands::get(get.options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.get, run);
+  command->add_option("TARGET", typed.get.options.target, "tool name or URL");
+  command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
+  command->add_flag("--limits", typed.get.limits, "also read the tool's own minimum and maximum");
+}
+
+void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"set", "TARGET NAME=VALUE...",
+                           "check everything, show old and new, write only what differs, read back",
+                           "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
+                           "spindle set station3 preset.1.mode=TC/AM preset.1.speed=900\n"
+                           "spindle set station3 preset.2.target-torque=3.10 --dry-run"};
+  const auto run = [](TypedSet set, Context& context) {
+    if (set.options.target.empty())
+      return Result<Outcome>(tl::unexpected(missing("set", "TARGET")));
+    if (set.options.assignments.empty())
+      return Result<Outcome>(tl::unexpected(missing("set", "NAME=VALUE")));
+    if (set.dry_run) set.options.execution = commands::Execution::dry_run;
+    return commands::set(set.options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.set, run);
+  command->add_option("TARGET", typed.set.options.target, "tool name or URL");
+  command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
+  command->add_flag("--dry-run", typed.set.dry_run, "check and show everything, write nothing");
+}
+
+void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"do", "TARGET [ACTION[=VALUE]...]",
+                           "run actions of the catalogue; without one, list them",
+                           "spindle do sim:doga-bm\n"
+                           "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
+                           "spindle do station3 alarm-reset"};
+  const auto run = [](TypedDo perform, Context& context) {
+    if (perform.options.target.empty())
+      return Result<Outcome>(tl::unexpected(missing("do", "TARGET")));
+    if (perform.accept_unverified) perform.options.acceptance = commands::Acceptance::unverified;
+    return commands::perform(perform.options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.perform, run);
+  command->add_option("TARGET", typed.perform.options.target, "tool name or URL");
+  command->add_option("ACTION", typed.perform.options.actions,
+                      "actions, with =VALUE where they take one");
+  command->add_flag("--accept-unverified", typed.perform.accept_unverified,
+                    "send what may move or lock the tool although its register is not certain");
+}
+
+Result<Outcome> run_ping(TypedPing ping, Context& context) {
+  if (ping.options.target.empty()) return tl::unexpected(missing("ping", "TARGET"));
+  if (!ping.count.empty()) {
+    const auto count = to_number("--count", ping.count, 1, 1'000'000);
+    if (!count) return tl::unexpected(count.error());
+    ping.options.count = static_cast<unsigned>(*count);
+  }
+  const auto interval = to_duration("--interval", ping.interval);
+  if (!interval) return tl::unexpected(interval.error());
+  ping.options.interval = interval->value_or(ping.options.interval);
+  return commands::ping(ping.options, context);
+}
+
+void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"ping", "TARGET [-c N]",
+                           "round-trip statistics without touching any value",
+                           "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
+                           "spindle ping station3\n"
+                           "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
+  CLI::App* command = add_command(app, draft, words, typed.ping, run_ping);
+  command->add_option("TARGET", typed.ping.options.target, "tool name or URL");
+  option(command, "-c,--count", typed.ping.count, "N", "how many requests (default 4)");
+  option(command, "--interval", typed.ping.interval, "DURATION", "time between them (default 1s)");
+}
+
+template <typename Number>
+Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
+                         std::optional<Number>& into) {
+  if (text.empty()) return {};
+  return to_number(name, text, 0, maximum).map([&](std::uint64_t number) {
+    into = static_cast<Number>(number);
+  });
+}
+
+Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
+  commands::SimulateOptions& options = typed.options;
+  if (options.profile.empty()) return tl::unexpected(missing("simulate", "PROFILE"));
+  auto filled =
+      fill_number("--identity-bytes", typed.identity_bytes, 255, options.identity_bytes)
+          .and_then(
+              [&] { return fill_number("--firmware", typed.firmware, 0xFFFF, options.firmware); })
+          .and_then(
+              [&] { return fill_number("--serial", typed.serial, 0xFFFF'FFFF, options.serial); })
+          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, options.model); });
+  if (!filled) return tl::unexpected(std::move(filled.error()));
+  return commands::simulate(options, context);
+}
+
+std::string fault_words() {
+  std::string text = "make the tool misbehave: KIND[=ARGUMENT][@K|@every:N], repeatable:";
+  for (const sim::FaultHelp& fault : sim::fault_help()) {
+    text += fmt::format("\n  {:<28}{}", fault.syntax, fault.meaning);
+  }
+  return text;
+}
+
+void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"simulate", "PROFILE [--listen URL]",
+                           "a simulated tool to learn on, script against and test with",
+                           "spindle simulate doga-bm\n"
+                           "spindle simulate doga-bm --listen tcp://127.0.0.1:5000 -v\n"
+                           "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3"};
+  CLI::App* command = add_command(app, draft, words, typed.simulate, run_simulate);
+  auto& options = typed.simulate.options;
+  command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
+  option(command, "--listen", options.listen, "URL",
+         "where to listen (default tcp://127.0.0.1:0: a free port)");
+  command->add_option("--fault", options.faults, fault_words())
+      ->type_name("FAULT")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
+         "length of the identity: 12, 13 or 17");
+  option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");
+  option(command, "--serial", typed.simulate.serial, "N", "serial number to report");
+  option(command, "--model", typed.simulate.model, "N", "tool model code to report");
+}
+
+void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  using Options = commands::ProfileNameOptions;
+  constexpr Words words = {"profile", "list|show|check [PROFILE]",
+                           "the catalogue files: which exist, what they say, whether one is valid",
+                           "spindle profile list\n"
+                           "spindle profile show doga-bm\n"
+                           "spindle profile check ./my-tool.yaml"};
+  const auto none = [](const Options&, Context&) -> Result<Outcome> {
+    return tl::unexpected(missing("profile", "list, show or check"));
+  };
+  CLI::App* command = add_command(app, draft, words, typed.profile, none);
+  const auto list = [](const Options&, Context& context) {
+    return commands::profile_list(context);
+  };
+  add_command(*command, draft,
+              {"list", "", "all profiles that can be named", "spindle profile list"},
+              typed.profile_list, list);
+  const auto show = [](const Options& options, Context& context) {
+    return options.profile.empty()
+               ? Result<Outcome>(tl::unexpected(missing("profile show", "PROFILE")))
+               : commands::profile_show(options, context);
+  };
+  add_command(*command, draft,
+              {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
+              typed.profile_show, show)
+      ->add_option("PROFILE", typed.profile_show.profile, "name or file");
+  const auto check = [](const Options& options, Context& context) {
+    return options.profile.empty()
+               ? Result<Outcome>(tl::unexpected(missing("profile check", "PROFILE")))
+               : commands::profile_check(options, context);
+  };
+  add_command(*command, draft,
+              {"check", "PROFILE", "every fault of a file, with its place",
+               "spindle profile check ./my-tool.yaml"},
+              typed.profile_check, check)
+      ->add_option("PROFILE", typed.profile_check.profile, "name or file");
+}
+
+void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  add_identify(app, draft, typed);
+  add_list(app, draft, typed);
+  add_get(app, draft, typed);
+  add_set(app, draft, typed);
+  add_do(app, draft, typed);
+  add_ping(app, draft, typed);
+  add_simulate(app, draft, typed);
+  add_profile(app, draft, typed);
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+/// Long names of all options of a command and of the program itself.
+std::vector<std::string> option_names(const CLI::App& app, const CLI::App* command) {
+  std::vector<std::string> names;
+  for (const CLI::App* level : {&app, command}) {
+    if (level == nullptr) continue;
+    for (const CLI::Option* known : level->get_options()) {
+      for (const std::string& name : known->get_lnames()) names.push_back("--" + name);
+    }
+  }
+  return names;
+}
+
+Error unexpected_argument(const CLI::App& app, const Draft& draft, const std::string& extra) {
+  const std::string command = draft.chosen == nullptr ? "" : draft.chosen->get_name();
+  if (extra.size() > 1 && extra.front() == '-') {
+    const std::string name = extra.substr(0, extra.find('='));
+    std::string hint = suggestion(name, option_names(app, draft.chosen));
+    if (hint.empty())
+      hint =
+          fmt::format("'spindle {}--help' lists all options", command.empty() ? "" : command + " ");
+    return usage(fmt::format("unknown option '{}'", name), hint);
+  }
+  if (draft.chosen == nullptr || !draft.chosen->get_subcommands({}).empty()) {
+    std::string hint =
+        suggestion(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
+    if (hint.empty()) hint = "'spindle --help' lists all commands";
+    return usage(fmt::format("unknown command '{}'", extra), hint);
+  }
+  return usage(fmt::format("{}: '{}' is one argument too many", command, extra),
+               fmt::format("'spindle {} --help' shows examples", command));
+}
+
+/// CLI11 can only fail on options without their value, or flags with one; everything else is ours.
+Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseError& error) {
+  const std::string what = error.what();
+  for (const std::string& argument : arguments) {
+    const std::string name = argument.substr(0, argument.find('='));
+    if (name.size() < 2 || name.front() != '-' || what.find(name) == std::string::npos) continue;
+    if (name != argument) return usage(fmt::format("'{}' takes no value", name));
+    return usage(fmt::format("'{}' needs a value", name));
+  }
+  return usage("an option has no value, or one that it does not take");
+}
+
+Result<void> understand_common(const Typed& typed, Invocation& invocation) {
+  const std::string output = typed.json ? "json" : typed.output.empty() ? "table" : typed.output;
+  const auto format = to_choice("--output", output, formats);
+  if (!format) return tl::unexpected(format.error());
+  const auto color = to_choice("--color", typed.color.empty() ? "auto" : typed.color, colors);
+  if (!color) return tl::unexpected(color.error());
+  const auto timeout = to_duration("--timeout", typed.timeout);
+  if (!timeout) return tl::unexpected(timeout.error());
+  const auto connect_timeout = to_duration("--connect-timeout", typed.connect_timeout);
+  if (!connect_timeout) return tl::unexpected(connect_timeout.error());
+  commands::CommonOptions& common = invocation.common;
+  auto retries = fill_number("--retries", typed.retries, 100, common.retries);
+  if (!retries) return retries;
+  invocation.format = *format;
+  invocation.color = *color;
+  invocation.talk = typed.quiet ? report::Talk::quiet : report::Talk::normal;
+  invocation.tools_file = typed.tools;
+  common.profile = typed.profile;
+  common.timeout = *timeout;
+  common.connect_timeout = *connect_timeout;
+  if (typed.no_input) common.consent = commands::Consent::no_input;
+  if (typed.yes) common.consent = commands::Consent::given;
+  if (typed.verbose) common.verbosity = commands::Verbosity::frames;
+  return {};
+}
+
+std::string option_lines(const CLI::App& app) {
+  std::string text;
+  for (const CLI::Option* known : app.get_options()) {
+    const bool positional = known->nonpositional() ? false : true;
+    std::string names = positional ? known->get_name(true) : known->get_name(false, true);
+    if (!positional && known->get_expected_max() > 0 && !known->get_type_name().empty()) {
+      names += " " + known->get_type_name();
+    }
+    text += fmt::format("  {:<32}{}\n", names, known->get_description());
+  }
+  return text;
+}
+
+std::string indented(std::string_view lines) {
+  std::string text;
+  for (const std::string_view line : split(lines, '\n')) text += fmt::format("  {}\n", line);
+  return text;
+}
+
+std::string command_lines(const CLI::App& app) {
+  std::string text;
+  for (const CLI::App* command : app.get_subcommands({})) {
+    text += fmt::format("  {:<12}{}\n", command->get_name(), command->get_description());
+  }
+  return text;
+}
+
+std::string path_of(const CLI::App* command) {
+  std::string path = command->get_name();
+  for (const CLI::App* parent = command->get_parent();
+       parent != nullptr && parent->get_parent() != nullptr; parent = parent->get_parent()) {
+    path = parent->get_name() + " " + path;
+  }
+  return path;
+}
+
+std::string program_help(const CLI::App& app) {
+  return fmt::format(
+      "spindle: the operator tool for screwdrivers and motor drivers that speak Modbus\n\n"
+      "Examples:\n{}\nUsage: spindle [OPTIONS] COMMAND [OPTIONS] [TARGET...] [ARGUMENTS]\n\n"
+      "Commands:\n{}\nOptions of every command:\n{}\n"
+      "A target is tcp://HOST[:PORT], sim:PROFILE (a simulated tool), or a name of the tools "
+      "file.\n"
+      "'spindle COMMAND --help' shows examples of a command.\n",
+      indented("spindle identify sim:doga-bm\nspindle get sim:doga-bm 'preset.1.*torque*'\n"
+               "spindle set tcp://192.168.10.23:5000 preset.1.target-torque=2.80"),
+      command_lines(app), option_lines(app));
+}
+
+std::string command_help(const CLI::App& app, const CLI::App* command, const Words& words) {
+  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: spindle {} {}\n", words.meaning,
+                                 indented(words.examples), path_of(command), words.synopsis);
+  const std::string commands = command_lines(*command);
+  const std::string options = option_lines(*command);
+  if (!commands.empty()) text += fmt::format("\nCommands:\n{}", commands);
+  if (!options.empty()) text += fmt::format("\nArguments and options:\n{}", options);
+  return text + fmt::format("\nOptions of every command:\n{}", option_lines(app));
+}
+
+std::string help_of(const CLI::App& app, const Draft& draft) {
+  if (draft.chosen == nullptr) return program_help(app);
+  return command_help(app, draft.chosen, draft.words.at(draft.chosen));
+}
+
+Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
+  Invocation invocation;
+  if (draft.typed.help) {
+    invocation.text = help_of(app, draft);
+    return invocation;
+  }
+  if (draft.typed.version) {
+    invocation.text = fmt::format("spindle {}\n", version);
+    return invocation;
+  }
+  if (const auto extras = app.remaining(true); !extras.empty()) {
+    return tl::unexpected(unexpected_argument(app, draft, extras.front()));
+  }
+  if (auto understood = understand_common(draft.typed, invocation); !understood) {
+    return tl::unexpected(std::move(understood.error()));
+  }
+  if (draft.chosen == nullptr) {
+    return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
+  }
+  invocation.run = std::move(draft.run);
+  return invocation;
+}
+
+}  // namespace
+
+Result<Invocation> parse(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  app.set_help_flag();
+  app.allow_extras();
+  app.require_subcommand(0, 1);
+  Draft draft;
+  TypedCommands typed;
+  add_common_options(app, draft.typed);
+  add_commands(app, draft, typed);
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  } catch (const CLI::ParseError& error) {
+    return tl::unexpected(parser_error(arguments, error));
+  }
+  return invocation_of(app, draft);
+}
+
+report::Format wanted_format(const std::vector<std::string>& arguments) {
+  report::Format format = report::Format::table;
+  for (std::size_t index = 0; index < arguments.size(); ++index) {
+    const std::string& argument = arguments[index];
+    if (argument == "--") break;
+    if (argument == "--json" || argument == "-ojson" || argument == "--output=json") {
+      return report::Format::json;
+    }
+    const bool output = argument == "-o" || argument == "--output";
+    if (output && index + 1 < arguments.size() && arguments[index + 1] == "json") {
+      return report::Format::json;
+    }
+  }
+  return format;
+}
+
+}  // namespace spindle::cli

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/report/renderer.hpp"
+
+namespace spindle::cli {
+
+enum class ColorChoice : std::uint8_t { automatic, always, never };
+
+/// What was typed, understood; nothing has been touched yet.
+struct Invocation {
+  /// Set: print this and end with status 0 (--help, --version).
+  std::optional<std::string> text = std::nullopt;
+  report::Format format = report::Format::table;
+  report::Talk talk = report::Talk::normal;
+  ColorChoice color = ColorChoice::automatic;
+  std::string tools_file = {};  ///< --tools; empty: look for one
+  commands::CommonOptions common = {};
+  std::function<Result<commands::Outcome>(commands::Context&)> run = {};
+};
+
+/// Understands the arguments. Errors are `usage` with a suggestion where there is one.
+Result<Invocation> parse(const std::vector<std::string>& arguments);
+
+/// The format that the arguments ask for, as far as that can be seen although they are wrong: so
+/// that even a usage error is told as JSON where JSON was wanted.
+report::Format wanted_format(const std::vector<std::string>& arguments);
+
+}  // namespace spindle::cli

@@ -1,0 +1,120 @@
+#include "spindle/cli/run.hpp"
+
+#include <exception>
+#include <utility>
+
+#include "grammar.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::cli {
+namespace {
+
+int exit_status(ExitStatus status) { return static_cast<int>(status); }
+
+std::string variable(const World& world, std::string_view name) {
+  return world.environment(name).value_or(std::string());
+}
+
+/// XDG Base Directory Specification: a variable, or its default below the home folder; empty when
+/// neither is known.
+std::string xdg_folder(const World& world, std::string_view name, std::string_view below_home) {
+  if (const std::string folder = variable(world, name); folder.starts_with('/')) return folder;
+  const std::string home = variable(world, "HOME");
+  return home.empty() ? std::string() : home + "/" + std::string(below_home);
+}
+
+/// The user's own profiles first, then the installed ones, then those of the build tree.
+std::vector<std::string> profile_folders(const World& world) {
+  std::vector<std::string> folders;
+  const std::string path = variable(world, "SPINDLE_PROFILE_PATH");
+  for (const std::string_view folder : split(path, ':')) {
+    if (!folder.empty()) folders.emplace_back(folder);
+  }
+  const std::string data = xdg_folder(world, "XDG_DATA_HOME", ".local/share");
+  if (!data.empty()) folders.push_back(data + "/spindle/profiles");
+  for (const std::string_view below :
+       {"/../share/spindle/profiles", "/profiles", "/../profiles", "/../../profiles"}) {
+    folders.push_back(world.program_folder + std::string(below));
+  }
+  return folders;
+}
+
+Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
+  if (!invocation.tools_file.empty()) return files::load_tools(invocation.tools_file);
+  if (const std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) {
+    return files::load_tools(named);
+  }
+  std::vector<std::string> places = {"./spindle.yaml"};
+  const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
+  if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
+  places.emplace_back("/etc/spindle/tools.yaml");
+  for (const std::string& place : places) {
+    if (world.file_exists(place)) return files::load_tools(place);
+  }
+  return files::Tools();
+}
+
+report::Color color_of(const World& world, ColorChoice choice) {
+  if (choice == ColorChoice::always) return report::Color::on;
+  if (choice == ColorChoice::never) return report::Color::off;
+  if (!variable(world, "NO_COLOR").empty()) return report::Color::off;
+  const std::string force = variable(world, "CLICOLOR_FORCE");
+  if (!force.empty() && force != "0") return report::Color::on;
+  const bool able = world.io.out_is_terminal && variable(world, "TERM") != "dumb";
+  return able ? report::Color::on : report::Color::off;
+}
+
+Result<commands::Outcome> run_command(const Invocation& invocation, World& world,
+                                      report::Renderer& renderer) {
+  const auto tools = find_tools(world, invocation);
+  if (!tools) return tl::unexpected(tools.error());
+  const files::ProfileStore profiles(profile_folders(world));
+  commands::Context context{.io = world.io,
+                            .clock = world.clock,
+                            .interrupt = world.interrupt,
+                            .open = world.open,
+                            .serve = world.serve,
+                            .profiles = profiles,
+                            .tools = *tools,
+                            .renderer = renderer,
+                            .common = invocation.common};
+  return invocation.run(context);
+}
+
+/// Tells why, and says with which status to end. Nobody is left to tell after a closed pipe.
+int tell(const Error& error, World& world, report::Renderer& renderer) {
+  if (error.code == Errc::closed_pipe) return exit_status(ExitStatus::ok);
+  const auto told = renderer.error(error, world.clock.wall());
+  static_cast<void>(told);  // the status says it even where the words can not
+  return exit_status(error.status());
+}
+
+int run_guarded(const std::vector<std::string>& arguments, World& world) {
+  auto invocation = parse(arguments);
+  const report::Format format = invocation ? invocation->format : wanted_format(arguments);
+  const report::Talk talk = invocation ? invocation->talk : report::Talk::normal;
+  if (invocation) world.io.color = color_of(world, invocation->color);
+  const auto renderer = report::make_renderer(format, world.io, talk);
+  if (!invocation) return tell(invocation.error(), world, *renderer);
+  if (invocation->text) {
+    const auto written = world.io.out(*invocation->text);
+    return written ? exit_status(ExitStatus::ok) : tell(written.error(), world, *renderer);
+  }
+  const auto outcome = run_command(*invocation, world, *renderer);
+  return outcome ? exit_status(outcome->status()) : tell(outcome.error(), world, *renderer);
+}
+
+}  // namespace
+
+int run(const std::vector<std::string>& arguments, World& world) {
+  try {
+    return run_guarded(arguments, world);
+  } catch (const std::exception& exception) {
+    // Every library is fenced where it is called; what arrives here is a bug of ours.
+    world.io.err(std::string("spindle: internal error: ") + exception.what() +
+                 "; please report it with the command line\n");
+    return exit_status(ExitStatus::internal);
+  }
+}
+
+}  // namespace spindle::cli

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string_view>
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::commands {
+
+/// Asks before something is changed: --yes answers; on a terminal the user does; elsewhere it is
+/// refused with `not_confirmed`, and the flag is named. `what` completes "… changes nothing yet:".
+Result<void> ask_consent(std::string_view what, const Context& context);
+
+}  // namespace spindle::commands

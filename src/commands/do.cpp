@@ -1,0 +1,232 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "consent.hpp"
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/base/text.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Action;
+using catalogue::Evidence;
+using catalogue::Hazard;
+using catalogue::Profile;
+using report::Column;
+
+struct Deed {
+  Action action;
+  std::uint16_t value;
+};
+
+Error bad_action_value(const Action& action, std::string message, std::string hint = {}) {
+  return {.code = Errc::bad_value,
+          .message = std::move(message),
+          .hint = std::move(hint),
+          .name = action.name};
+}
+
+Result<std::uint16_t> parse_label(const Action& action, std::string_view text) {
+  std::vector<std::string> known;
+  for (const catalogue::Label& label : action.labels) {
+    const bool same = label.text == text || std::to_string(label.number) == text;
+    if (same) return static_cast<std::uint16_t>(label.number);
+    known.push_back(fmt::format("{} ({})", label.text, label.number));
+  }
+  return tl::unexpected(bad_action_value(action, fmt::format("'{}' is none of its values", text),
+                                         fmt::format("it takes {}", fmt::join(known, ", "))));
+}
+
+Result<std::uint16_t> parse_action_value(const Action& action, std::string_view text) {
+  if (!action.labels.empty()) return parse_label(action, text);
+  const auto value = parse_unsigned(text, 0xFFFF);
+  if (value && *value >= action.minimum && *value <= action.maximum) {
+    return static_cast<std::uint16_t>(*value);
+  }
+  return tl::unexpected(bad_action_value(
+      action,
+      fmt::format("'{}' is not a number from {} to {}", text, action.minimum, action.maximum)));
+}
+
+Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
+  const auto equals = text.find('=');
+  auto action = profile.find_action(text.substr(0, equals));
+  if (!action) return tl::unexpected(std::move(action.error()));
+  const bool given = equals != std::string::npos;
+  if (action->value) {
+    if (!given) return Deed{*action, *action->value};
+    return tl::unexpected(bad_action_value(*action, "it takes no value",
+                                           fmt::format("write '{}' alone", action->name)));
+  }
+  if (!given) {
+    return tl::unexpected(bad_action_value(*action, "a value is missing",
+                                           fmt::format("write {}=VALUE", action->name)));
+  }
+  return parse_action_value(*action, std::string_view(text).substr(equals + 1))
+      .map([&](std::uint16_t value) {
+        return Deed{*action, value};
+      });
+}
+
+bool is_weak(Evidence evidence) {
+  return evidence == Evidence::sibling || evidence == Evidence::inferred;
+}
+
+/// The evidence rule: what may move or lock a tool is not sent on the word of another product.
+Result<void> check_evidence(const Action& action, const Target& target, Acceptance acceptance) {
+  const bool moves_or_locks = action.hazard == Hazard::moves || action.hazard == Hazard::locks ||
+                              action.hazard == Hazard::unclear;
+  const bool verified = std::find(target.verified.begin(), target.verified.end(), action.name) !=
+                        target.verified.end();
+  const bool accepted = verified || acceptance == Acceptance::unverified;
+  if (!moves_or_locks || !is_weak(action.evidence) || accepted) return {};
+  return tl::unexpected(Error{
+      .code = Errc::unverified,
+      .message = fmt::format(
+          "that register {} is '{}' on this tool is not certain: evidence {} ({})",
+          action.address.value, action.name, catalogue::to_text(action.evidence), action.source),
+      .hint = fmt::format("{}; then add --accept-unverified, or list it under 'verified' in the "
+                          "tools file",
+                          action.check),
+      .name = action.name,
+      .register_address = action.address.value});
+}
+
+/// A started motion needs somebody who stops it again, and this command ends at once.
+Result<void> check_guard(const Deed& deed) {
+  const bool starts = deed.action.stop_value && deed.value != *deed.action.stop_value;
+  if (deed.action.hazard != Hazard::moves || !starts) return {};
+  return tl::unexpected(Error{.code = Errc::usage,
+                              .message = "it starts a motion, and 'do' does not stay to stop it",
+                              .hint = "a start needs a guard that always ends in a stop",
+                              .name = deed.action.name});
+}
+
+Result<std::vector<Deed>> check_deeds(const DoOptions& options, const Profile& profile,
+                                      const Target& target) {
+  std::vector<Deed> deeds;
+  for (const std::string& text : options.actions) {
+    auto deed = parse_deed(text, profile);
+    if (!deed) return tl::unexpected(std::move(deed.error()));
+    auto allowed = check_evidence(deed->action, target, options.acceptance).and_then([&] {
+      return check_guard(*deed);
+    });
+    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    deeds.push_back(std::move(*deed));
+  }
+  return deeds;
+}
+
+Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
+                             const Context& context) {
+  std::vector<std::string> hazardous;
+  for (const Deed& deed : deeds) {
+    if (deed.action.hazard != Hazard::none) hazardous.push_back(deed.action.name);
+  }
+  if (hazardous.empty()) return {};
+  return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
+}
+
+std::string_view to_text(device::ActionResult result) {
+  switch (result) {
+    case device::ActionResult::confirmed:
+      return "confirmed";
+    case device::ActionResult::sent:
+      return "sent";
+    case device::ActionResult::not_confirmed:
+      return "not-confirmed";
+  }
+  return "";
+}
+
+const std::array<Column, 3> columns = {
+    {{"ACTION", "action"}, {"VALUE", "value", report::Align::right}, {"RESULT", "result"}}};
+
+report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,
+                           const Clock& clock) {
+  return {.type = "action",
+          .target = target.shown,
+          .time = clock.wall(),
+          .fields = {{"action", deed.action.name},
+                     {"value", number(deed.value)},
+                     {"result", std::string(to_text(result))}}};
+}
+
+Error not_confirmed(const Deed& deed, const Target& target) {
+  return {.code = Errc::mismatch,
+          .message = fmt::format("the tool acknowledged it, but {} does not show the effect",
+                                 deed.action.confirm),
+          .hint = "is the tool running or locked? its register may also mean something else here",
+          .target = target.endpoint.text,
+          .name = deed.action.name,
+          .register_address = deed.action.address.value};
+}
+
+Result<Outcome> list_actions(const Target& target, Context& context) {
+  auto profile = load_profile(target, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  if (target.profile.empty()) {
+    auto tool = open_tool(target, catalogue::Profile(), Need::named_registers, context);
+    if (!tool) return tl::unexpected(std::move(tool.error()));
+    *profile = tool->device.profile();
+  }
+  Outcome outcome;
+  Listing listing(context, action_columns());
+  for (const Action& action : profile->actions) {
+    listing.add(action_record(action, target.shown, context.clock));
+    outcome.succeed();
+  }
+  return finish(listing, outcome);
+}
+
+/// Carries the deeds out in order and stops at the first that fails: later ones may rest on it.
+Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Context& context) {
+  Outcome outcome;
+  Listing listing(context, columns);
+  for (const Deed& deed : deeds) {
+    const auto result = tool.device.perform(deed.action, deed.value);
+    if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
+    std::optional<Error> error;
+    if (!result) error = result.error();
+    if (result == device::ActionResult::not_confirmed) error = not_confirmed(deed, tool.target);
+    if (!error) {
+      outcome.succeed();
+      continue;
+    }
+    outcome.fail(*error);
+    listing.add(*error);
+    break;
+  }
+  return listing.end()
+      .and_then([&] {
+        return context.renderer.summary(
+            summary_record({{"done", number(static_cast<std::int64_t>(outcome.succeeded()))},
+                            {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                           outcome.status(), tool.target.shown, context.clock),
+            fmt::format("{} done, {} failed", outcome.succeeded(), outcome.failed()));
+      })
+      .map([&] { return outcome; });
+}
+
+}  // namespace
+
+Result<Outcome> perform(const DoOptions& options, Context& context) {
+  const auto target = resolve_target(options.target, context);
+  if (!target) return tl::unexpected(target.error());
+  if (options.actions.empty()) return list_actions(*target, context);
+  auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
+    return check_deeds(options, profile, *target).and_then([&](std::vector<Deed> deeds) {
+      return ask_for_hazards(deeds, *target, context).map([&] { return std::move(deeds); });
+    });
+  });
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  return carry_out(opened->prepared, opened->tool, context);
+}
+
+}  // namespace spindle::commands

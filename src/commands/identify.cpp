@@ -1,0 +1,107 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "listing.hpp"
+#include "records.hpp"
+#include "side_by_side.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using report::Cell;
+using report::Column;
+
+const std::array<Column, 6> columns = {{{"TARGET", "target"},
+                                        {"MODEL", "tool_model"},
+                                        {"SERIAL", "serial"},
+                                        {"FIRMWARE", "firmware"},
+                                        {"PROFILE", "profile"},
+                                        {"ROUND TRIP", "round_trip_ms"}}};
+
+/// One tool's answer, or why there is none.
+struct Identified {
+  report::Record record;
+  std::optional<Error> misfit;  ///< it is not what --profile or the tools file says
+};
+
+template <typename Number>
+Cell number_or_null(const std::optional<Number>& value) {
+  return value ? number(static_cast<std::int64_t>(*value)) : Cell();
+}
+
+report::Record identity_record(const OpenTool& tool, const Identification& found,
+                               Duration round_trip, const Clock& clock) {
+  const catalogue::Identity& identity = found.identity;
+  const Decimal tenths(
+      std::chrono::duration_cast<std::chrono::microseconds>(round_trip).count() / 100, -1);
+  return {.type = "identity",
+          .target = tool.target.shown,
+          .time = clock.wall(),
+          .fields = {{"endpoint", tool.target.endpoint.text},
+                     {"profile", text_or_null(found.profile),
+                      fmt::format("{}", fmt::join(found.candidates, " or "))},
+                     {"profile_candidates", found.candidates},
+                     {"maker", text_or_null(found.maker)},
+                     {"series", text_or_null(found.series)},
+                     {"tool_model", text_or_null(identity.tool_model)},
+                     {"tool_model_code", number_or_null(identity.tool_model_code)},
+                     {"controller_model_code", number_or_null(identity.controller_model_code)},
+                     {"id", number_or_null(identity.id)},
+                     {"serial", text_or_null(identity.serial)},
+                     {"firmware", number_or_null(identity.firmware)},
+                     {"raw", to_compact_hex(identity.raw)},
+                     {"round_trip_ms", milliseconds(round_trip), tenths.to_string() + " ms"},
+                     {"notes", identity.notes},
+                     {"total_fastenings", number_or_null(identity.total)}}};
+}
+
+std::optional<Error> misfit_of(const Target& target, const Identification& found) {
+  if (target.profile.empty() || !found.candidates.empty()) return std::nullopt;
+  return Error{.code = Errc::mismatch,
+               .message = fmt::format("this is not what profile {} describes: {}", target.profile,
+                                      fmt::join(found.identity.notes, "; ")),
+               .target = target.endpoint.text};
+}
+
+Result<Identified> identify_one(const Target& target, const Context& context) {
+  auto profile = load_profile(target, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  const std::string only = profile->id;
+  auto tool = connect(target, std::move(*profile), context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  const auto answer = tool->device.report_server_id();
+  if (!answer) return tl::unexpected(answer.error());
+  const Duration round_trip = tool->device.session().last_round_trip();
+  const auto found = match_identity(*answer, target.profile, context);
+  if (!found) return tl::unexpected(found.error());
+  return Identified{identity_record(*tool, *found, round_trip, context.clock),
+                    misfit_of(tool->target, *found)};
+}
+
+}  // namespace
+
+Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
+  const auto targets = resolve_targets(options.targets, context);
+  if (!targets) return tl::unexpected(targets.error());
+  const auto results =
+      side_by_side(*targets, [&](const Target& target) { return identify_one(target, context); });
+  Outcome outcome;
+  Listing listing(context, columns);
+  for (const Result<Identified>& result : results) {
+    if (result) listing.add(result->record);
+    const std::optional<Error> error = result ? result->misfit : result.error();
+    if (error) {
+      outcome.fail(*error);
+      listing.add(*error);
+    } else {
+      outcome.succeed();
+    }
+  }
+  return finish(listing, outcome);
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,66 @@
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+/// What to list: a profile, and the patterns that narrow it.
+struct Subject {
+  std::string target;  ///< as shown in records; empty: offline
+  catalogue::Profile profile;
+  std::vector<std::string> patterns;
+};
+
+/// Without a tool there is nothing to ask: the profile's own words.
+Result<Subject> offline(const ListOptions& options, const Context& context) {
+  auto profile = context.profiles.load(context.common.profile);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  return Subject{{}, std::move(*profile), options.arguments};
+}
+
+Result<Subject> of_target(const ListOptions& options, const Context& context) {
+  auto target = resolve_target(options.arguments.front(), context);
+  if (!target) return tl::unexpected(std::move(target.error()));
+  std::vector<std::string> patterns(options.arguments.begin() + 1, options.arguments.end());
+  if (!target->profile.empty()) {
+    auto profile = context.profiles.load(target->profile);
+    if (!profile) return tl::unexpected(std::move(profile.error()));
+    return Subject{target->shown, std::move(*profile), std::move(patterns)};
+  }
+  auto tool = open_tool(*target, catalogue::Profile(), Need::named_registers, context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  return Subject{target->shown, tool->device.profile(), std::move(patterns)};
+}
+
+Result<Subject> subject_of(const ListOptions& options, const Context& context) {
+  const bool has_target =
+      !options.arguments.empty() && is_target(options.arguments.front(), context);
+  if (has_target) return of_target(options, context);
+  if (!context.common.profile.empty()) return offline(options, context);
+  if (!options.arguments.empty()) return of_target(options, context);
+  return tl::unexpected(Error{.code = Errc::usage,
+                              .message = "list what? neither a target nor a profile is named",
+                              .hint =
+                                  "try 'spindle list --profile doga-bm'; 'spindle profile list' "
+                                  "shows all profiles"});
+}
+
+}  // namespace
+
+Result<Outcome> list(const ListOptions& options, Context& context) {
+  const auto subject = subject_of(options, context);
+  if (!subject) return tl::unexpected(subject.error());
+  const auto parameters = subject->profile.select(subject->patterns);
+  if (!parameters) return tl::unexpected(parameters.error());
+  Outcome outcome;
+  Listing listing(context, parameter_columns());
+  for (const catalogue::Parameter& parameter : *parameters) {
+    listing.add(parameter_record(parameter, subject->target, context.clock));
+    outcome.succeed();
+  }
+  return finish(listing, outcome);
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <span>
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::commands {
+
+/// One list of records on its way to the user. Remembers the first failure of the stream (a closed
+/// pipe) and draws nothing after it, so that the loops of commands stay straight.
+class Listing {
+ public:
+  Listing(Context& context, std::span<const report::Column> columns)
+      : context_(&context), drawn_(context.renderer.begin(columns)) {}
+
+  void add(const report::Record& record) {
+    if (drawn_) drawn_ = context_->renderer.record(record);
+  }
+  void add(const Error& error) {
+    if (drawn_) drawn_ = context_->renderer.error(error, context_->clock.wall());
+  }
+  /// Whether anybody still reads.
+  [[nodiscard]] bool open() const { return drawn_.has_value(); }
+  Result<void> end() {
+    if (drawn_) drawn_ = context_->renderer.end();
+    return drawn_;
+  }
+
+ private:
+  Context* context_;
+  Result<void> drawn_;
+};
+
+/// The outcome of a command whose list ended: the stream's failure comes first.
+inline Result<Outcome> finish(Listing& listing, const Outcome& outcome) {
+  return listing.end().map([&] { return outcome; });
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,29 @@
+#pragma once
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::commands {
+
+/// Opens sim: endpoints as tools inside this process, and everything else through the context.
+device::OpenTransport with_simulated_tools(const Context& context);
+
+/// What may be changed on a simulated tool from the command line.
+struct SimulatedToolOptions {
+  std::optional<std::size_t> identity_bytes = std::nullopt;
+  std::optional<std::uint16_t> firmware = std::nullopt;
+  std::optional<std::uint32_t> serial = std::nullopt;
+  std::optional<std::uint16_t> model = std::nullopt;
+  sim::FaultPlan faults = {};
+};
+
+/// A simulated tool and the profile that it was made from.
+struct SimulatedTool {
+  catalogue::Profile profile;
+  std::unique_ptr<sim::Server> server;
+};
+
+Result<SimulatedTool> make_simulated_tool(const std::string& profile,
+                                          const SimulatedToolOptions& options,
+                                          const Context& context);
+
+}  // namespace spindle::commands

@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <array>
+
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using report::Column;
+using report::Record;
+
+const std::array<Column, 5> profile_columns = {{{"PROFILE", "profile"},
+                                                {"TITLE", "title"},
+                                                {"PARAMETERS", "parameters", report::Align::right},
+                                                {"ACTIONS", "actions", report::Align::right},
+                                                {"FILE", "file"}}};
+
+const std::array<Column, 2> finding_columns = {{{"PLACE", "place"}, {"FINDING", "message"}}};
+
+Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
+  return {.type = "profile",
+          .target = {},
+          .time = clock.wall(),
+          .fields = {{"profile", profile.id},
+                     {"title", profile.title},
+                     {"parameters", number(static_cast<std::int64_t>(profile.parameters.size()))},
+                     {"actions", number(static_cast<std::int64_t>(profile.actions.size()))},
+                     {"file", profile.path}}};
+}
+
+Record finding_record(const files::Finding& finding, const Clock& clock) {
+  return {.type = "finding",
+          .target = {},
+          .time = clock.wall(),
+          .fields = {{"place", fmt::format("{}:{}:{}", finding.file, finding.line, finding.column)},
+                     {"file", finding.file},
+                     {"line", number(finding.line)},
+                     {"column", number(finding.column)},
+                     {"message", finding.message}}};
+}
+
+}  // namespace
+
+Result<Outcome> profile_list(Context& context) {
+  Outcome outcome;
+  Listing listing(context, profile_columns);
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto profile = context.profiles.load(entry.id);
+    if (profile) {
+      outcome.succeed();
+      listing.add(profile_record(*profile, context.clock));
+    } else {
+      outcome.fail(profile.error());
+      listing.add(profile.error());
+    }
+  }
+  return finish(listing, outcome);
+}
+
+Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context) {
+  const auto profile = context.profiles.load(options.profile);
+  if (!profile) return tl::unexpected(profile.error());
+  Outcome outcome;
+  outcome.succeed();
+  Listing head(context, profile_columns);
+  head.add(profile_record(*profile, context.clock));
+  if (auto ended = head.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  Listing parameters(context, parameter_columns());
+  for (const catalogue::Parameter& parameter : profile->parameters) {
+    parameters.add(parameter_record(parameter, {}, context.clock));
+  }
+  if (auto ended = parameters.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  Listing actions(context, action_columns());
+  for (const catalogue::Action& action : profile->actions) {
+    actions.add(action_record(action, {}, context.clock));
+  }
+  return finish(actions, outcome);
+}
+
+Result<Outcome> profile_check(const ProfileNameOptions& options, Context& context) {
+  const auto findings = context.profiles.check(options.profile);
+  if (!findings) return tl::unexpected(findings.error());
+  Outcome outcome;
+  outcome.succeed();
+  Listing listing(context, finding_columns);
+  for (const files::Finding& finding : *findings) {
+    listing.add(finding_record(finding, context.clock));
+  }
+  if (findings->empty()) return finish(listing, outcome);
+  if (auto ended = listing.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  return tl::unexpected(Error{.code = Errc::bad_file,
+                              .message = fmt::format("{} fault{} in this profile", findings->size(),
+                                                     findings->size() == 1 ? "" : "s"),
+                              .name = options.profile});
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,190 @@
+#include "records.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using report::Align;
+using report::Cell;
+using report::Column;
+using report::Field;
+
+Cell number_or_null(const std::optional<Decimal>& value) {
+  return value ? Cell(*value) : Cell(std::monostate());
+}
+
+Cell number_or_null(const std::optional<catalogue::Value>& value) {
+  return value ? Cell(value->number) : Cell(std::monostate());
+}
+
+/// What it means, with the labels of an enumeration behind it.
+std::string meaning_of(const Parameter& parameter) {
+  if (parameter.labels.empty()) return parameter.title;
+  std::vector<std::string> texts;
+  for (const auto& label : parameter.labels) {
+    texts.push_back(fmt::format("{} {}", label.number, label.text));
+  }
+  return fmt::format("{} ({})", parameter.title, fmt::join(texts, ", "));
+}
+
+/// What may be given: nothing (a fixed value), labels, or a range.
+std::string values_of(const catalogue::Action& action) {
+  if (!action.labels.empty()) {
+    std::vector<std::string> texts;
+    for (const auto& label : action.labels) {
+      texts.push_back(fmt::format("{} {}", label.number, label.text));
+    }
+    return fmt::format("{}", fmt::join(texts, ", "));
+  }
+  if (action.value) return std::to_string(*action.value);
+  return fmt::format("{}..{}", action.minimum, action.maximum);
+}
+
+/// The type as people read it: "u16", "u16 * 0.01".
+std::string type_of(const catalogue::Encoding& encoding) {
+  const std::string_view kind = catalogue::to_text(encoding.kind);
+  if (encoding.scale == Decimal(1)) return std::string(kind);
+  return fmt::format("{} * {}", kind, encoding.scale.to_string());
+}
+
+}  // namespace
+
+std::string unit_of(const Parameter& parameter, const Target& target) {
+  return parameter.unit == "torque" ? target.torque_unit : parameter.unit;
+}
+
+Cell text_or_null(std::string text) {
+  return text.empty() ? Cell(std::monostate()) : Cell(std::move(text));
+}
+
+Cell number(std::int64_t value) { return Decimal(value); }
+
+Cell milliseconds(Duration duration) {
+  const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(duration);
+  return Decimal(micros.count(), -3);
+}
+
+report::Record value_record(const device::Reading& reading, const Target& target,
+                            const Clock& clock, device::Limits limits) {
+  const Parameter& parameter = reading.parameter;
+  report::Record record{
+      .type = "value", .target = target.shown, .time = clock.wall(), .fields = {}};
+  record.fields = {{"name", parameter.name},
+                   {"table", std::string(catalogue::to_text(parameter.table))},
+                   {"register", number(parameter.address.value)},
+                   {"raw", *reading.registers},
+                   {"value", reading.value->number, reading.value->to_string()},
+                   {"label", text_or_null(reading.value->label)},
+                   {"unit", text_or_null(unit_of(parameter, target))}};
+  if (limits == device::Limits::read) {
+    record.fields.push_back({"minimum", number_or_null(reading.minimum)});
+    record.fields.push_back({"maximum", number_or_null(reading.maximum)});
+  }
+  return record;
+}
+
+std::span<const Column> value_columns(device::Limits limits) {
+  static const std::array<Column, 5> columns = {{{"NAME", "name"},
+                                                 {"VALUE", "value", Align::right},
+                                                 {"UNIT", "unit"},
+                                                 {"MINIMUM", "minimum", Align::right},
+                                                 {"MAXIMUM", "maximum", Align::right}}};
+  return std::span(columns).first(limits == device::Limits::read ? 5 : 3);
+}
+
+report::Record parameter_record(const Parameter& parameter, const std::string& target,
+                                const Clock& clock) {
+  report::Pairs labels;
+  for (const auto& label : parameter.labels) {
+    labels.emplace_back(std::to_string(label.number), label.text);
+  }
+  return {.type = "parameter",
+          .target = target,
+          .time = clock.wall(),
+          .fields = {{"name", parameter.name},
+                     {"title", parameter.title, meaning_of(parameter)},
+                     {"table", std::string(catalogue::to_text(parameter.table))},
+                     {"register", number(parameter.address.value)},
+                     {"encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
+                      type_of(parameter.encoding)},
+                     {"scale", parameter.encoding.scale},
+                     {"unit", text_or_null(parameter.unit)},
+                     {"minimum", number_or_null(parameter.range.minimum)},
+                     {"maximum", number_or_null(parameter.range.maximum)},
+                     {"default", number_or_null(parameter.default_value)},
+                     {"labels", labels},
+                     {"access", std::string(catalogue::to_text(parameter.access))},
+                     {"evidence", std::string(catalogue::to_text(parameter.evidence))},
+                     {"source", parameter.source},
+                     {"note", text_or_null(parameter.note)}}};
+}
+
+std::span<const Column> parameter_columns() {
+  static const std::array<Column, 10> columns = {{{"NAME", "name"},
+                                                  {"TABLE", "table"},
+                                                  {"REGISTER", "register", Align::right},
+                                                  {"TYPE", "encoding"},
+                                                  {"MINIMUM", "minimum", Align::right},
+                                                  {"MAXIMUM", "maximum", Align::right},
+                                                  {"UNIT", "unit"},
+                                                  {"ACCESS", "access"},
+                                                  {"EVIDENCE", "evidence"},
+                                                  {"MEANING", "title"}}};
+  return columns;
+}
+
+std::string_view hazard_text(catalogue::Hazard hazard) {
+  switch (hazard) {
+    case catalogue::Hazard::none:
+      return "none";
+    case catalogue::Hazard::moves:
+      return "moves";
+    case catalogue::Hazard::locks:
+      return "locks";
+    case catalogue::Hazard::unclear:
+      return "unclear";
+    case catalogue::Hazard::erases:
+      return "erases";
+  }
+  return "";
+}
+
+report::Record action_record(const catalogue::Action& action, const std::string& target,
+                             const Clock& clock) {
+  return {.type = "action",
+          .target = target,
+          .time = clock.wall(),
+          .fields = {{"action", action.name},
+                     {"title", action.title},
+                     {"register", number(action.address.value)},
+                     {"value", values_of(action)},
+                     {"hazard", std::string(hazard_text(action.hazard))},
+                     {"evidence", std::string(catalogue::to_text(action.evidence))},
+                     {"source", action.source},
+                     {"check", text_or_null(action.check)},
+                     {"confirm", text_or_null(action.confirm)}}};
+}
+
+std::span<const Column> action_columns() {
+  static const std::array<Column, 7> columns = {{{"ACTION", "action"},
+                                                 {"REGISTER", "register", Align::right},
+                                                 {"VALUE", "value"},
+                                                 {"HAZARD", "hazard"},
+                                                 {"EVIDENCE", "evidence"},
+                                                 {"SOURCE", "source"},
+                                                 {"MEANING", "title"}}};
+  return columns;
+}
+
+report::Record summary_record(std::vector<Field> counts, ExitStatus status,
+                              const std::string& target, const Clock& clock) {
+  counts.push_back({"exit_status", number(static_cast<std::int64_t>(status))});
+  return {.type = "summary", .target = target, .time = clock.wall(), .fields = std::move(counts)};
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "spindle/commands/context.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+
+/// The unit as shown: the tool's own torque unit where a parameter is a torque, empty when unknown.
+std::string unit_of(const catalogue::Parameter& parameter, const Target& target);
+
+report::Cell text_or_null(std::string text);
+report::Cell number(std::int64_t value);
+/// Milliseconds with microseconds behind the point.
+report::Cell milliseconds(Duration duration);
+
+/// The `value` record of a reading that succeeded.
+report::Record value_record(const device::Reading& reading, const Target& target,
+                            const Clock& clock, device::Limits limits);
+std::span<const report::Column> value_columns(device::Limits limits);
+
+report::Record parameter_record(const catalogue::Parameter& parameter, const std::string& target,
+                                const Clock& clock);
+std::span<const report::Column> parameter_columns();
+
+/// An action as a catalogue entry, for lists.
+report::Record action_record(const catalogue::Action& action, const std::string& target,
+                             const Clock& clock);
+std::span<const report::Column> action_columns();
+
+/// A summary record: the given counts and the exit status.
+report::Record summary_record(std::vector<report::Field> counts, ExitStatus status,
+                              const std::string& target, const Clock& clock);
+
+}  // namespace spindle::commands

@@ -1,0 +1,287 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/catalogue/value.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using catalogue::Profile;
+using catalogue::Value;
+using report::Align;
+using report::Column;
+
+struct Assignment {
+  Parameter parameter;
+  Value value;
+};
+
+/// How one assignment ended, as in the contract's record `write`.
+enum class Ending : std::uint8_t { planned, written, unchanged, coerced, mismatch, refused };
+
+std::string_view to_text(Ending ending) {
+  switch (ending) {
+    case Ending::planned:
+      return "planned";
+    case Ending::written:
+      return "written";
+    case Ending::unchanged:
+      return "unchanged";
+    case Ending::coerced:
+      return "coerced";
+    case Ending::mismatch:
+      return "mismatch";
+    case Ending::refused:
+      return "refused";
+  }
+  return "";
+}
+
+Result<Assignment> parse_assignment(const std::string& text, const Profile& profile) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
+                                .hint = "such as preset.1.target-torque=2.71"});
+  }
+  auto parameter = profile.find(text.substr(0, equals));
+  if (!parameter) return tl::unexpected(std::move(parameter.error()));
+  if (parameter->access == catalogue::Access::read_only) {
+    return tl::unexpected(Error{.code = Errc::read_only,
+                                .name = parameter->name,
+                                .register_address = parameter->address.value});
+  }
+  auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
+  if (!value) {
+    value.error().name = parameter->name;
+    value.error().register_address = parameter->address.value;
+    return tl::unexpected(std::move(value.error()));
+  }
+  return Assignment{std::move(*parameter), std::move(*value)};
+}
+
+bool overlap(const Parameter& a, const Parameter& b) {
+  const auto end = [](const Parameter& p) {
+    return p.address.value + catalogue::register_count(p.encoding.kind);
+  };
+  return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
+}
+
+Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
+                                                  const Profile& profile) {
+  std::vector<Assignment> assignments;
+  for (const std::string& text : texts) {
+    auto assignment = parse_assignment(text, profile);
+    if (!assignment) return tl::unexpected(std::move(assignment.error()));
+    for (const Assignment& earlier : assignments) {
+      if (!overlap(earlier.parameter, assignment->parameter)) continue;
+      return tl::unexpected(Error{.code = Errc::usage,
+                                  .message = "its register is assigned twice",
+                                  .name = assignment->parameter.name,
+                                  .register_address = assignment->parameter.address.value});
+    }
+    assignments.push_back(std::move(*assignment));
+  }
+  return assignments;
+}
+
+Error beyond(const Assignment& assignment, std::string_view side, const Value& limit,
+             std::string_view which, modbus::RegisterAddress address) {
+  return {.code = Errc::out_of_range,
+          .message = fmt::format("{} is {} {}, the {} that the tool itself reports (register {})",
+                                 assignment.value.number.to_string(), side,
+                                 limit.number.to_string(), which, address.value),
+          .name = assignment.parameter.name,
+          .register_address = assignment.parameter.address.value};
+}
+
+/// The tool's own limits; a parameter whose limits should exist but can not be read is not written.
+Result<void> check_own_limits(const Assignment& assignment, const device::Reading& reading,
+                              const Profile& profile) {
+  if (reading.limits_error) return tl::unexpected(*reading.limits_error);
+  const auto own = profile.limit_registers(assignment.parameter);
+  const Decimal& number = assignment.value.number;
+  if (reading.minimum && number < reading.minimum->number) {
+    return tl::unexpected(beyond(assignment, "below", *reading.minimum, "minimum", own->minimum));
+  }
+  if (reading.maximum && number > reading.maximum->number) {
+    return tl::unexpected(beyond(assignment, "above", *reading.maximum, "maximum", own->maximum));
+  }
+  return {};
+}
+
+/// One assignment with what the tool holds now.
+struct Step {
+  const Assignment* assignment;
+  Value before;
+
+  [[nodiscard]] bool changes() const { return !(before == assignment->value); }
+};
+
+Result<std::vector<Step>> check_against_tool(const std::vector<Assignment>& assignments,
+                                             device::Device& device) {
+  std::vector<Parameter> parameters;
+  for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
+  const auto readings = device.read_each(parameters, device::Limits::read);
+  if (!readings) return tl::unexpected(readings.error());
+  std::vector<Step> steps;
+  for (std::size_t index = 0; index < assignments.size(); ++index) {
+    const device::Reading& reading = (*readings)[index];
+    if (!reading.value) return tl::unexpected(reading.value.error());
+    auto allowed = check_own_limits(assignments[index], reading, device.profile());
+    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    steps.push_back({&assignments[index], *reading.value});
+  }
+  return steps;
+}
+
+const std::array<Column, 5> columns = {{{"NAME", "name"},
+                                        {"OLD", "old", Align::right},
+                                        {"NEW", "new", Align::right},
+                                        {"UNIT", "unit"},
+                                        {"RESULT", "result"}}};
+
+report::Record step_record(const Step& step, Ending ending, const Value& now, const Target& target,
+                           const Clock& clock) {
+  const Parameter& parameter = step.assignment->parameter;
+  report::Record record{.type = ending == Ending::planned ? "plan" : "write",
+                        .target = target.shown,
+                        .time = clock.wall(),
+                        .fields = {}};
+  record.fields = {{"name", parameter.name},
+                   {"register", number(parameter.address.value)},
+                   {"old", step.before.number, step.before.to_string()},
+                   {"new", now.number, now.to_string()},
+                   {"unit", text_or_null(unit_of(parameter, target))}};
+  if (ending == Ending::planned) {
+    record.fields.push_back({"changes", step.changes()});
+  } else {
+    record.fields.push_back({"result", std::string(to_text(ending))});
+  }
+  return record;
+}
+
+Error not_stored(const Step& step, const device::Written& written, const Target& target) {
+  const std::string asked = step.assignment->value.to_string();
+  const std::string holds = written.now.to_string();
+  return {.code = Errc::mismatch,
+          .message = written.result == device::WriteResult::mismatch
+                         ? fmt::format("the tool acknowledged {} but still holds {}", asked, holds)
+                         : fmt::format("the tool acknowledged {} but now holds {}", asked, holds),
+          .hint = "is the tool running, locked, or set to refuse changes?",
+          .target = target.endpoint.text,
+          .name = step.assignment->parameter.name,
+          .register_address = step.assignment->parameter.address.value};
+}
+
+/// Carries out one plan, and stops at the first write that fails.
+class Writer {
+ public:
+  Writer(OpenTool& tool, Context& context)
+      : tool_(&tool), context_(&context), listing_(context, columns) {}
+
+  Result<Outcome> plan(const std::vector<Step>& steps) {
+    for (const Step& step : steps) {
+      note(step, Ending::planned, step.assignment->value);
+      step.changes() ? ++changed_ : ++unchanged_;
+      outcome_.succeed();
+    }
+    return end(fmt::format("{} to write, {} unchanged; nothing was written (dry run)", changed_,
+                           unchanged_));
+  }
+
+  Result<Outcome> write(const std::vector<Step>& steps) {
+    for (const Step& step : steps) {
+      if (outcome_.failed() > 0) break;
+      step.changes() ? write_one(step) : keep(step);
+    }
+    const std::size_t left = steps.size() - outcome_.succeeded() - outcome_.failed();
+    std::string sentence = fmt::format("{} written, {} unchanged", changed_, unchanged_);
+    if (outcome_.failed() > 0) {
+      sentence += fmt::format(", {} failed, {} not tried", outcome_.failed(), left);
+    }
+    return end(sentence);
+  }
+
+ private:
+  void note(const Step& step, Ending ending, const Value& now) {
+    listing_.add(step_record(step, ending, now, tool_->target, context_->clock));
+  }
+
+  void keep(const Step& step) {
+    note(step, Ending::unchanged, step.before);
+    ++unchanged_;
+    outcome_.succeed();
+  }
+
+  void fail(const Error& error) {
+    outcome_.fail(error);
+    listing_.add(error);
+  }
+
+  void write_one(const Step& step) {
+    const Value& wanted = step.assignment->value;
+    const auto written = tool_->device.write(step.assignment->parameter, step.before, wanted);
+    if (!written) {
+      if (written.error().code == Errc::exception_response) {
+        note(step, Ending::refused, step.before);
+      }
+      fail(written.error());
+      return;
+    }
+    if (written->result == device::WriteResult::written) {
+      note(step, Ending::written, written->now);
+      ++changed_;
+      outcome_.succeed();
+      return;
+    }
+    const bool same = written->result == device::WriteResult::mismatch;
+    note(step, same ? Ending::mismatch : Ending::coerced, written->now);
+    fail(not_stored(step, *written, tool_->target));
+  }
+
+  Result<Outcome> end(const std::string& sentence) {
+    auto drawn = listing_.end();
+    if (drawn) {
+      drawn = context_->renderer.summary(
+          summary_record({{"written", number(static_cast<std::int64_t>(changed_))},
+                          {"unchanged", number(static_cast<std::int64_t>(unchanged_))},
+                          {"failed", number(static_cast<std::int64_t>(outcome_.failed()))}},
+                         outcome_.status(), tool_->target.shown, context_->clock),
+          sentence);
+    }
+    return drawn.map([&] { return outcome_; });
+  }
+
+  OpenTool* tool_;
+  Context* context_;
+  Listing listing_;
+  Outcome outcome_ = {};
+  std::size_t changed_ = 0;
+  std::size_t unchanged_ = 0;
+};
+
+}  // namespace
+
+Result<Outcome> set(const SetOptions& options, Context& context) {
+  const auto target = resolve_target(options.target, context);
+  if (!target) return tl::unexpected(target.error());
+  auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
+    return parse_assignments(options.assignments, profile);
+  });
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  const auto steps = check_against_tool(opened->prepared, opened->tool.device);
+  if (!steps) return tl::unexpected(steps.error());
+  Writer writer(opened->tool, context);
+  return options.execution == Execution::dry_run ? writer.plan(*steps) : writer.write(*steps);
+}
+
+}  // namespace spindle::commands

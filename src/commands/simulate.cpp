@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include "listing.hpp"
+#include "open_sim.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+Result<sim::FaultPlan> parse_faults(const std::vector<std::string>& texts) {
+  sim::FaultPlan plan;
+  for (const std::string& text : texts) {
+    auto fault = sim::parse_fault(text);
+    if (!fault) {
+      fault.error().name = "--fault";
+      return tl::unexpected(std::move(fault.error()));
+    }
+    plan.push_back(*fault);
+  }
+  return plan;
+}
+
+Result<link::Endpoint> listen_endpoint(const std::string& text) {
+  // Port 0 asks the system for a free one; as a target it would make no sense.
+  const bool any_port = text.ends_with(":0");
+  auto endpoint = link::parse_endpoint(any_port ? text.substr(0, text.size() - 2) : text);
+  if (!endpoint) return endpoint;
+  if (endpoint->medium != link::Medium::tcp) {
+    return tl::unexpected(Error{.code = Errc::bad_target,
+                                .message = "a simulated tool of this kind listens on tcp://",
+                                .hint = "such as tcp://127.0.0.1:0",
+                                .target = text});
+  }
+  if (any_port) endpoint->port = 0;
+  endpoint->text = text;
+  return endpoint;
+}
+
+report::Record simulation_record(const std::string& profile, const std::string& url,
+                                 const Clock& clock) {
+  return {.type = "simulation",
+          .target = url,
+          .time = clock.wall(),
+          .fields = {{"endpoint", url}, {"profile", profile}}};
+}
+
+/// The first line of output, which scripts read to know where to connect.
+Result<void> announce(const std::string& profile, const std::string& url, Context& context) {
+  return context.renderer.line(simulation_record(profile, url, context.clock), url);
+}
+
+/// What was heard while the tool was served.
+struct Traffic {
+  std::int64_t connections = 0;
+  std::int64_t requests = 0;
+
+  void count(sim::Heard heard) {
+    if (heard == sim::Heard::connected) ++connections;
+    if (heard == sim::Heard::request) ++requests;
+  }
+};
+
+std::string_view words_of(sim::Heard heard) {
+  switch (heard) {
+    case sim::Heard::connected:
+      return "connected";
+    case sim::Heard::request:
+      return "->";
+    case sim::Heard::response:
+      return "<-";
+    case sim::Heard::disconnected:
+      return "disconnected";
+  }
+  return "";
+}
+
+void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Context& context) {
+  context.io.err(fmt::format("{} client {} {} {}\n", report::to_text(context.clock.wall()),
+                             connection, words_of(heard), to_hex(bytes)));
+}
+
+Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& context) {
+  return context.renderer.summary(
+      summary_record(
+          {{"connections", number(traffic.connections)}, {"requests", number(traffic.requests)}},
+          outcome.status(), {}, context.clock),
+      fmt::format("{} connections, {} requests", traffic.connections, traffic.requests));
+}
+
+}  // namespace
+
+Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
+  auto faults = parse_faults(options.faults);
+  if (!faults) return tl::unexpected(std::move(faults.error()));
+  auto listen = listen_endpoint(options.listen);
+  if (!listen) return tl::unexpected(std::move(listen.error()));
+  auto tool = make_simulated_tool(options.profile,
+                                  {.identity_bytes = options.identity_bytes,
+                                   .firmware = options.firmware,
+                                   .serial = options.serial,
+                                   .model = options.model,
+                                   .faults = *faults},
+                                  context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (!listen->port) listen->port = tool->profile.link.port;
+  Outcome outcome;
+  outcome.succeed();
+  Traffic traffic;
+  sim::ServeOptions serve{.host = listen->host,
+                          .port = *listen->port,
+                          .framing = tool->profile.link.framing,
+                          .faults = std::move(*faults)};
+  serve.listening = [&](std::uint16_t port) {
+    listen->port = port;
+    return announce(tool->profile.id, link::to_url(*listen), context);
+  };
+  serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
+    traffic.count(heard);
+    if (context.common.verbosity == Verbosity::frames) tell(heard, connection, bytes, context);
+  };
+  auto served = context.serve(*tool->server, serve);
+  // Being stopped is how it ends; the status still says by what.
+  if (served && context.interrupt.raised()) outcome.fail(context.interrupt.error());
+  return served.and_then([&] { return summarise(traffic, outcome, context); }).map([&] {
+    return outcome;
+  });
+}
+
+}  // namespace spindle::commands

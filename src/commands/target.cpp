@@ -1,0 +1,249 @@
+#include "spindle/commands/target.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "open_sim.hpp"
+#include "spindle/base/text.hpp"
+#include "trace.hpp"
+
+namespace spindle::commands {
+namespace {
+
+const files::Tool* find_tool(const files::Tools& tools, std::string_view name) {
+  const auto found = std::find_if(tools.tools.begin(), tools.tools.end(),
+                                  [&](const files::Tool& tool) { return tool.name == name; });
+  return found == tools.tools.end() ? nullptr : &*found;
+}
+
+Error unknown_target(const std::string& text, const files::Tools& tools) {
+  std::vector<std::string> known;
+  for (const files::Tool& tool : tools.tools) known.push_back(tool.name);
+  for (const auto& [group, members] : tools.groups) known.push_back("@" + group);
+  std::string hint = suggestion(text, known);
+  if (hint.empty()) {
+    hint = tools.path.empty()
+               ? "no tools file was found, so a target is a URL: tcp://HOST, sim:doga-bm, …"
+               : fmt::format("name a tool of {}, or a URL such as tcp://HOST", tools.path);
+  }
+  return {.code = Errc::unknown_name,
+          .message = fmt::format("unknown target '{}'", text),
+          .hint = std::move(hint)};
+}
+
+Result<Target> target_of_url(const std::string& url, const Context& context) {
+  auto endpoint = link::parse_endpoint(url);
+  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
+  Target target{.shown = url, .endpoint = std::move(*endpoint)};
+  target.profile =
+      context.common.profile.empty() ? target.endpoint.profile : context.common.profile;
+  return target;
+}
+
+Result<Target> target_of_tool(const files::Tool& tool, const Context& context) {
+  auto target = target_of_url(tool.url, context);
+  if (!target) {
+    target.error().name = tool.name;
+    target.error().code = Errc::bad_file;
+    return target;
+  }
+  target->shown = tool.name;
+  if (context.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
+  target->torque_unit = tool.torque_unit;
+  target->verified = tool.verified;
+  return target;
+}
+
+Result<Target> single_target(const std::string& text, const Context& context) {
+  if (const files::Tool* tool = find_tool(context.tools, text)) {
+    return target_of_tool(*tool, context);
+  }
+  if (link::looks_like_url(text)) return target_of_url(text, context);
+  return tl::unexpected(unknown_target(text, context.tools));
+}
+
+device::LinkOptions link_options(const Target& target, const Context& context) {
+  return {.answer_timeout = context.common.timeout,
+          .connect_timeout = context.common.connect_timeout,
+          .retries = context.common.retries,
+          .trace = make_trace(target.shown, context)};
+}
+
+Error no_profile(const Target& target, std::string why) {
+  return {.code = Errc::usage,
+          .message = std::move(why),
+          .hint =
+              "name the profile with --profile or in the tools file; 'spindle profile list' "
+              "shows all",
+          .target = target.endpoint.text};
+}
+
+/// A tool whose profile was not named: ask it, and go on with what its answer fits.
+Result<void> find_profile(OpenTool& tool, const Context& context) {
+  if (tool.target.endpoint.medium != link::Medium::tcp) {
+    return tl::unexpected(
+        no_profile(tool.target, "a tool on a serial line can not prove what it is"));
+  }
+  auto answer = tool.device.report_server_id();
+  if (!answer) return tl::unexpected(std::move(answer.error()));
+  auto identification = match_identity(*answer, {}, context);
+  if (!identification) return tl::unexpected(std::move(identification.error()));
+  if (identification->candidates.empty()) {
+    return tl::unexpected(
+        no_profile(tool.target, fmt::format("no profile fits what the tool says of itself ({})",
+                                            fmt::join(identification->identity.notes, "; "))));
+  }
+  // Products that their answer does not tell apart share the register map of their common base.
+  auto profile = context.profiles.load(identification->candidates.front());
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  tool.device.use(std::move(*profile));
+  return {};
+}
+
+/// What one profile makes of an answer.
+struct Match {
+  catalogue::Profile profile;
+  catalogue::Identity identity;
+  catalogue::Generation generation;
+
+  [[nodiscard]] bool is_product() const {
+    return identity.product_profile.empty() || identity.product_profile == profile.id;
+  }
+  [[nodiscard]] bool fits() const {
+    return generation == catalogue::Generation::known && is_product();
+  }
+};
+
+Result<std::vector<Match>> matches_of(ByteView answer, const std::string& only,
+                                      const Context& context) {
+  std::vector<std::string> ids;
+  if (!only.empty()) ids.push_back(only);
+  if (only.empty()) {
+    for (const files::ProfileEntry& entry : context.profiles.list()) ids.push_back(entry.id);
+  }
+  std::vector<Match> matches;
+  for (const std::string& id : ids) {
+    auto profile = context.profiles.load(id);
+    if (!profile && !only.empty()) return tl::unexpected(std::move(profile.error()));
+    // A user's broken file must not hide the other profiles.
+    if (!profile || !profile->identity) continue;
+    auto identity = catalogue::decode_identity(*profile->identity, answer);
+    const auto generation = catalogue::generation_of(*profile->identity, identity);
+    if (generation == catalogue::Generation::unknown) continue;
+    matches.push_back({std::move(*profile), std::move(identity), generation});
+  }
+  return matches;
+}
+
+const Match* best_of(const std::vector<Match>& matches) {
+  const auto fitting =
+      std::find_if(matches.begin(), matches.end(), [](const Match& match) { return match.fits(); });
+  if (fitting != matches.end()) return &*fitting;
+  return matches.empty() ? nullptr : &matches.front();
+}
+
+/// Why a product of a known maker fits none of the profiles that were asked.
+std::string misfit_of(const Match& match) {
+  if (match.generation == catalogue::Generation::later) {
+    return fmt::format(
+        "firmware {} has another register map than {} (below {}): only raw "
+        "registers can be read",
+        match.identity.firmware.value_or(0), match.profile.id,
+        match.profile.identity->firmware_below);
+  }
+  return fmt::format("the serial number is that of a {}, not of a {}",
+                     match.identity.product_profile, match.profile.id);
+}
+
+}  // namespace
+
+bool is_target(std::string_view text, const Context& context) {
+  if (link::looks_like_url(text) || find_tool(context.tools, text) != nullptr) return true;
+  return text.starts_with('@') && context.tools.groups.contains(std::string(text.substr(1)));
+}
+
+Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
+                                            const Context& context) {
+  std::vector<std::string> names;
+  for (const std::string& text : texts) {
+    const auto group = text.starts_with('@') ? context.tools.groups.find(text.substr(1))
+                                             : context.tools.groups.end();
+    if (group == context.tools.groups.end()) {
+      names.push_back(text);
+    } else {
+      names.insert(names.end(), group->second.begin(), group->second.end());
+    }
+  }
+  std::vector<Target> targets;
+  for (const std::string& name : names) {
+    auto target = single_target(name, context);
+    if (!target) return tl::unexpected(std::move(target.error()));
+    targets.push_back(std::move(*target));
+  }
+  return targets;
+}
+
+Result<Target> resolve_target(const std::string& text, const Context& context) {
+  auto targets = resolve_targets({text}, context);
+  if (!targets) return tl::unexpected(std::move(targets.error()));
+  if (targets->size() == 1) return std::move(targets->front());
+  return tl::unexpected(Error{.code = Errc::usage,
+                              .message = fmt::format("'{}' is {} tools, and this command takes one",
+                                                     text, targets->size())});
+}
+
+Result<catalogue::Profile> load_profile(const Target& target, const Context& context) {
+  if (target.profile.empty()) return catalogue::Profile();
+  return context.profiles.load(target.profile);
+}
+
+Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context) {
+  const device::OpenTransport open = with_simulated_tools(context);
+  Target resolved = target;
+  if (resolved.endpoint.medium == link::Medium::tcp && !resolved.endpoint.port) {
+    resolved.endpoint.port = profile.link.port;
+    resolved.endpoint.text = link::to_url(resolved.endpoint);
+  }
+  auto device = device::Device::open(resolved.endpoint, std::move(profile),
+                                     link_options(resolved, context), open, context.clock);
+  if (!device) return tl::unexpected(std::move(device.error()));
+  return OpenTool{std::move(resolved), std::move(*device)};
+}
+
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Context& context) {
+  auto tool = connect(target, std::move(profile), context);
+  if (!tool || need == Need::raw_registers) return tool;
+  auto known = target.profile.empty() ? find_profile(*tool, context)
+                                      : tool->device.require_known_registers();
+  if (!known) return tl::unexpected(std::move(known.error()));
+  return tool;
+}
+
+Result<Identification> match_identity(ByteView answer, const std::string& only,
+                                      const Context& context) {
+  auto matches = matches_of(answer, only, context);
+  if (!matches) return tl::unexpected(std::move(matches.error()));
+  Identification result;
+  for (const Match& match : *matches) {
+    if (!match.fits()) continue;
+    result.candidates.push_back(match.profile.id);
+    if (result.candidates.size() > 1) result.series += " or ";
+    result.series += match.profile.series;
+  }
+  if (result.candidates.size() == 1) result.profile = result.candidates.front();
+  const Match* best = best_of(*matches);
+  if (best == nullptr) {
+    result.identity.raw.assign(answer.begin(), answer.end());
+    result.identity.notes.emplace_back("this is not the identity of any known product");
+    return result;
+  }
+  result.maker = best->profile.maker;
+  result.identity = best->identity;
+  if (result.candidates.empty()) result.identity.notes.push_back(misfit_of(*best));
+  return result;
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,52 @@
+#include "trace.hpp"
+
+#include <fmt/format.h>
+
+namespace spindle::commands {
+namespace {
+
+std::string_view to_text(link::Decision decision) {
+  switch (decision) {
+    case link::Decision::request:
+      return "request";
+    case link::Decision::answer:
+      return "answer";
+    case link::Decision::exception_response:
+      return "exception response";
+    case link::Decision::spontaneous:
+      return "event, kept";
+    case link::Decision::broken:
+      return "not the answer to our request, ignored";
+    case link::Decision::stray:
+      return "stray frame, ignored";
+    case link::Decision::late:
+      return "late answer, ignored";
+    case link::Decision::junk:
+      return "no frame";
+    case link::Decision::retry:
+      return "asking again";
+    case link::Decision::quarantine:
+      return "quarantine";
+  }
+  return "";
+}
+
+}  // namespace
+
+link::Trace make_trace(const std::string& target, const Context& context) {
+  if (context.common.verbosity == Verbosity::normal) return {};
+  const auto line = [&context, target](const std::string& text) {
+    context.io.err(fmt::format("{} {} {}\n", report::to_text(context.clock.wall()), target, text));
+  };
+  return {.bytes =
+              [line](link::Direction direction, ByteView bytes) {
+                const std::string_view arrow = direction == link::Direction::sent ? "->" : "<-";
+                line(fmt::format("{} {}", arrow, to_hex(bytes)));
+              },
+          .decision =
+              [line](link::Decision decision, std::string_view text) {
+                line(fmt::format("   {}: {}", to_text(decision), text));
+              }};
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,302 @@
+#include "spindle/device/device.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace spindle::device {
+namespace {
+
+/// How often a confirming parameter is read while its effect is awaited.
+constexpr Duration confirm_interval = std::chrono::milliseconds(20);
+
+using catalogue::Area;
+using catalogue::Parameter;
+using catalogue::Value;
+using link::RegisterRange;
+
+RegisterRange range_of(const Parameter& parameter) {
+  return {parameter.table, parameter.address.value,
+          catalogue::register_count(parameter.encoding.kind)};
+}
+
+RegisterRange range_at(const Parameter& parameter, modbus::RegisterAddress address) {
+  return {parameter.table, address.value, catalogue::register_count(parameter.encoding.kind)};
+}
+
+/// The parts of an area that are left when the registers said to be absent are taken out.
+void append_without_absent(const Area& area, const std::vector<Area>& absent,
+                           std::vector<RegisterRange>& ranges) {
+  std::uint32_t from = area.from;
+  const auto append = [&](std::uint32_t until) {
+    if (from < until) {
+      ranges.push_back(
+          {area.table, static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(until - from)});
+    }
+  };
+  for (const Area& hole : absent) {
+    if (hole.table != area.table || hole.to < from || hole.from > area.to) continue;
+    append(hole.from);
+    from = std::uint32_t{hole.to} + 1;
+  }
+  append(std::uint32_t{area.to} + 1);
+}
+
+link::ReadLimits read_limits(const catalogue::Profile& profile) {
+  link::ReadLimits limits;
+  limits.max_read = profile.link.max_read;
+  std::vector<Area> absent = profile.link.absent;
+  std::sort(absent.begin(), absent.end(),
+            [](const Area& a, const Area& b) { return a.from < b.from; });
+  for (const Area& area : profile.link.contiguous) {
+    append_without_absent(area, absent, limits.contiguous);
+  }
+  if (profile.events) {
+    const bool input = profile.events->function ==
+                       static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
+    limits.forbidden_shape =
+        RegisterRange{input ? modbus::RegisterTable::input : modbus::RegisterTable::holding, 0,
+                      profile.events->count};
+  }
+  return limits;
+}
+
+Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
+  for (const catalogue::GapRule& rule : serial.gaps) {
+    if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
+  }
+  return Duration::zero();
+}
+
+link::DemuxRules demux_rules(const catalogue::Profile& profile) {
+  link::DemuxRules rules{.framing = profile.link.framing, .spontaneous = {}};
+  if (profile.events) {
+    rules.spontaneous.push_back(
+        {profile.events->function, static_cast<std::uint8_t>(2 * profile.events->count)});
+  }
+  return rules;
+}
+
+link::SessionOptions session_options(const catalogue::Profile& profile,
+                                     const link::Endpoint& endpoint, const LinkOptions& options) {
+  link::SessionOptions session;
+  session.rules = demux_rules(profile);
+  session.unit = endpoint.unit.value_or(modbus::UnitId{profile.link.unit});
+  session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
+  if (profile.link.framing == modbus::Framing::rtu) {
+    const unsigned baud = endpoint.baud.value_or(profile.link.serial.baud);
+    session.gap = gap_of(profile.link.serial, baud);
+    session.broadcast_gap = profile.link.serial.broadcast_pause;
+  }
+  if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
+  return session;
+}
+
+}  // namespace
+
+Device::Device(std::string target, catalogue::Profile profile,
+               std::unique_ptr<link::Session> session, unsigned retries)
+    : target_(std::move(target)),
+      profile_(std::move(profile)),
+      session_(std::move(session)),
+      retries_(retries),
+      client_(*session_, read_limits(profile_), retries) {}
+
+Result<Device> Device::open(const link::Endpoint& endpoint, catalogue::Profile profile,
+                            const LinkOptions& options, const OpenTransport& open_transport,
+                            Clock& clock) {
+  const Duration connect_timeout = options.connect_timeout.value_or(profile.link.connect);
+  auto transport = open_transport(endpoint, profile.link, connect_timeout);
+  if (!transport) {
+    Error error = std::move(transport.error());
+    error.target = endpoint.text;
+    return tl::unexpected(std::move(error));
+  }
+  auto session = std::make_unique<link::Session>(
+      std::move(*transport), clock, session_options(profile, endpoint, options), options.trace);
+  const unsigned retries = options.retries.value_or(profile.link.retries);
+  return Device(endpoint.text, std::move(profile), std::move(session), retries);
+}
+
+Error Device::located(Error error) const {
+  error = with_exception_text(std::move(error));
+  error.target = target_;
+  return error;
+}
+
+/// The maker's own words for an exception code are better than the standard's.
+Error Device::with_exception_text(Error error) const {
+  if (!error.exception) return error;
+  const auto text = profile_.exceptions.find(*error.exception);
+  if (text == profile_.exceptions.end()) return error;
+  error.message = fmt::format("the tool refused '{}' with exception {:02X} ({})", error.tried,
+                              *error.exception, text->second.text);
+  if (error.hint.empty()) error.hint = text->second.remedy;
+  return error;
+}
+
+Result<Bytes> Device::report_server_id() {
+  return client_.report_server_id().map_error([this](Error error) { return located(error); });
+}
+
+void Device::use(catalogue::Profile profile) {
+  profile_ = std::move(profile);
+  session_->set_rules(demux_rules(profile_));
+  client_ = link::Client(*session_, read_limits(profile_), retries_);
+  registers_known_ = true;
+}
+
+Result<void> Device::require_known_registers() {
+  if (!profile_.identity || registers_known_) return {};
+  auto answer = report_server_id();
+  if (!answer && answer.error().code != Errc::exception_response) {
+    return tl::unexpected(std::move(answer.error()));
+  }
+  const auto& facts = *profile_.identity;
+  const auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
+  const auto generation = catalogue::generation_of(facts, identity);
+  registers_known_ = generation == catalogue::Generation::known;
+  if (registers_known_) return {};
+  Error error{.code = Errc::wrong_generation, .target = target_};
+  error.message =
+      generation == catalogue::Generation::later
+          ? fmt::format("firmware {} has other registers than profile {} (below {})",
+                        *identity.firmware, profile_.id, facts.firmware_below)
+          : fmt::format(
+                "the tool does not identify itself as profile {} expects, so its registers "
+                "are not known",
+                profile_.id);
+  return tl::unexpected(std::move(error));
+}
+
+Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& parameters,
+                                               Limits limits, const link::Progress& progress) {
+  std::vector<RegisterRange> wanted;
+  wanted.reserve(parameters.size());
+  for (const Parameter& parameter : parameters) {
+    wanted.push_back(range_of(parameter));
+    const auto own = limits == Limits::read ? profile_.limit_registers(parameter) : std::nullopt;
+    if (!own) continue;
+    wanted.push_back(range_at(parameter, own->minimum));
+    wanted.push_back(range_at(parameter, own->maximum));
+  }
+  auto image = client_.read_each(wanted, progress);
+  if (!image) return tl::unexpected(located(std::move(image.error())));
+  std::vector<Reading> readings;
+  readings.reserve(parameters.size());
+  for (const Parameter& parameter : parameters) {
+    readings.push_back(reading_of(parameter, limits, *image));
+  }
+  return readings;
+}
+
+Reading Device::reading_of(const Parameter& parameter, Limits limits,
+                           const link::RegisterImage& image) const {
+  const auto with_name = [&](Error error) {
+    error = located(std::move(error));
+    error.name = parameter.name;
+    return error;
+  };
+  const auto value_at = [&](const RegisterRange& range) {
+    return image.get(range)
+        .and_then([&](const Registers& registers) { return decode(parameter, registers); })
+        .map_error(with_name);
+  };
+  Reading reading{.parameter = parameter,
+                  .registers = image.get(range_of(parameter)).map_error(with_name),
+                  .value = value_at(range_of(parameter))};
+  const auto own = limits == Limits::read ? profile_.limit_registers(parameter) : std::nullopt;
+  if (!own) return reading;
+  auto minimum = value_at(range_at(parameter, own->minimum));
+  auto maximum = value_at(range_at(parameter, own->maximum));
+  if (minimum) reading.minimum = *minimum;
+  if (maximum) reading.maximum = *maximum;
+  if (!minimum) reading.limits_error = minimum.error();
+  if (!maximum) reading.limits_error = maximum.error();
+  return reading;
+}
+
+Result<Value> Device::read_value(const Parameter& parameter) {
+  return client_.read(range_of(parameter))
+      .and_then([&](const Registers& registers) { return decode(parameter, registers); })
+      .map_error([&](Error error) {
+        error = located(std::move(error));
+        error.name = parameter.name;
+        return error;
+      });
+}
+
+Result<void> Device::send_write(const Parameter& parameter, const Registers& registers) {
+  auto sent = registers.size() == 1 ? client_.write(parameter.address, registers.front())
+                                    : client_.write(parameter.address, RegisterView(registers));
+  return sent.map_error([&](Error error) {
+    error = located(std::move(error));
+    error.name = parameter.name;
+    error.register_address = parameter.address.value;
+    return error;
+  });
+}
+
+Result<Written> Device::write(const Parameter& parameter, const Value& before, const Value& value) {
+  const auto registers = catalogue::encode(parameter, value.number);
+  if (!registers) return tl::unexpected(registers.error());
+  auto sent = send_write(parameter, *registers);
+  // A refusal or a lost line is final; a missing or broken answer leaves open what the tool did.
+  const auto leaves_open = [](const Error& error) {
+    return error.code == Errc::no_answer || error.code == Errc::malformed_answer ||
+           error.code == Errc::bad_checksum;
+  };
+  if (!sent && !leaves_open(sent.error())) return tl::unexpected(sent.error());
+  auto now = read_value(parameter);
+  if (!now) return tl::unexpected(sent ? now.error() : sent.error());
+  if (!sent && *now == before && !(*now == value)) {
+    sent = send_write(parameter, *registers);
+    now = read_value(parameter);
+    if (!now) return tl::unexpected(now.error());
+    if (!sent && !(*now == value)) return tl::unexpected(sent.error());
+  }
+  if (*now == value) return Written{WriteResult::written, *now};
+  return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
+}
+
+Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint16_t value) {
+  Parameter confirming;
+  if (!action.confirm.empty()) {
+    auto found = profile_.find(action.confirm);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    confirming = std::move(*found);
+  }
+  auto sent = client_.write(action.address, value).map_error([&](Error error) {
+    error = located(std::move(error));
+    error.name = action.name;
+    error.register_address = action.address.value;
+    return error;
+  });
+  if (!sent) return tl::unexpected(std::move(sent.error()));
+  if (action.confirm.empty()) return ActionResult::sent;
+  const Value expected{Decimal(action.confirm_value.value_or(value)), {}};
+  Clock& clock = session_->clock();
+  const TimePoint deadline = clock.now() + session_->options().answer_timeout;
+  while (true) {
+    const auto now = read_value(confirming);
+    if (!now) return tl::unexpected(now.error());
+    if (*now == expected) return ActionResult::confirmed;
+    const TimePoint next = clock.now() + confirm_interval;
+    if (next > deadline) return ActionResult::not_confirmed;
+    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+  }
+}
+
+Result<Duration> Device::ping() {
+  const Clock& clock = session_->clock();
+  const auto word = static_cast<std::uint16_t>(session_->counters().requests);
+  const auto request =
+      profile_.link.loopback ? modbus::loopback_request(word) : modbus::report_server_id_request();
+  const TimePoint start = clock.now();
+  auto response = session_->transact(request);
+  if (!response) return tl::unexpected(located(std::move(response.error())));
+  return clock.now() - start;
+}
+
+}  // namespace spindle::device

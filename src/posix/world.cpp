@@ -1,0 +1,42 @@
+#include "spindle/posix/world.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "spindle/posix/tcp.hpp"
+
+namespace spindle::posix {
+
+std::function<Result<std::unique_ptr<link::Transport>>(const link::Endpoint&,
+                                                       const catalogue::LinkFacts&, Duration)>
+line_opener(Clock& clock, const Interrupt& interrupt) {
+  return
+      [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
+                           Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
+        if (endpoint.medium == link::Medium::tcp) {
+          return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
+                          interrupt);
+        }
+        return tl::unexpected(Error{.code = Errc::port_unusable,
+                                    .message = "serial lines are not supported by this version",
+                                    .hint = "reach the tool by tcp://"});
+      };
+}
+
+std::optional<std::string> environment(std::string_view name) {
+  const char* value = std::getenv(std::string(name).c_str());
+  return value == nullptr ? std::nullopt : std::optional<std::string>(value);
+}
+
+bool file_exists(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+std::string program_folder() {
+  std::error_code failed;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", failed);
+  return failed ? std::string(".") : program.parent_path().string();
+}
+
+}  // namespace spindle::posix

@@ -1,0 +1,298 @@
+// Runs transcripts: what a user types and what the program prints, in one readable file. The whole
+// program runs in this process, against simulated tools on a clock that is moved by hand.
+//
+//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [FAULT=SPEC]...   a tool that lives as long
+//   as the file %file NAME … %end                                   a file in the transcript's own
+//   folder %answer TEXT                                        what the user types at the next
+//   question $ spindle ARGUMENTS                                 followed by what it prints
+//
+// Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
+// fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status.
+// With SPINDLE_UPDATE=1 the file is rewritten with what was really printed.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "spindle/base/text.hpp"
+#include "spindle/cli/run.hpp"
+#include "spindle/posix/world.hpp"
+#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/peer.hpp"
+#include "spindle/sim/sim_transport.hpp"
+#include "support/fake_clock.hpp"
+
+namespace {
+
+using namespace spindle;
+namespace fs = std::filesystem;
+
+using Lines = std::vector<std::string>;
+
+Lines read_lines(const fs::path& path) {
+  std::ifstream file(path);
+  Lines lines;
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  return lines;
+}
+
+/// Words as a shell would split them: single and double quotes, backslash outside of them.
+std::vector<std::string> shell_words(const std::string& line) {
+  std::vector<std::string> words;
+  std::optional<std::string> word;
+  char quote = 0;
+  for (std::size_t index = 0; index < line.size(); ++index) {
+    const char c = line[index];
+    if (quote != 0) {
+      if (c == quote) {
+        quote = 0;
+      } else {
+        *word += c;
+      }
+    } else if (c == ' ') {
+      if (word) words.push_back(*word);
+      word.reset();
+    } else if (c == '\'' || c == '"') {
+      quote = c;
+      word = word.value_or("");
+    } else {
+      word = word.value_or("") + (c == '\\' && index + 1 < line.size() ? line[++index] : c);
+    }
+  }
+  if (word) words.push_back(*word);
+  return words;
+}
+
+enum class Marking { mark_stderr, plain };
+
+/// A simulated tool behind an address, alive from one command to the next.
+struct Tool {
+  catalogue::Profile profile;
+  sim::FaultPlan faults;
+  std::unique_ptr<sim::Server> server;
+  sim::AnswerCounter answers;
+  std::uint32_t connections = 0;
+};
+
+class Stage {
+ public:
+  Stage() : profiles_({std::string(SPINDLE_SOURCE_DIR) + "/profiles"}) {}
+
+  void add_tool(const std::vector<std::string>& words) {
+    auto profile = profiles_.load(words.at(1));
+    auto start = profiles_.load_simulation(words.at(1));
+    if (!profile || !start) throw std::runtime_error("no such profile: " + words.at(1));
+    auto tool = std::make_unique<Tool>();
+    sim::BmOptions options;
+    for (std::size_t index = 2; index < words.size(); ++index) {
+      const auto equals = words[index].find('=');
+      const std::string key = words[index].substr(0, equals);
+      const std::string value = words[index].substr(equals + 1);
+      if (key == "FIRMWARE") options.firmware = static_cast<std::uint16_t>(std::stoul(value));
+      if (key == "MODEL") options.tool_model = static_cast<std::uint16_t>(std::stoul(value));
+      if (key == "BYTES") options.identity_bytes = std::stoul(value);
+      if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
+    }
+    options.faults = tool->faults;
+    tool->server = sim::make_bm_tool(*profile, *start, options);
+    tool->profile = std::move(*profile);
+    const auto endpoint = link::parse_endpoint(words.at(0)).value();
+    tools_[address(endpoint.host, endpoint.port.value_or(tool->profile.link.port))] =
+        std::move(tool);
+  }
+
+  void answer(std::string text) { answers_.push_back(std::move(text)); }
+
+  /// Runs one command line (without "spindle") and returns what a terminal would show.
+  Lines run(const std::vector<std::string>& arguments, Marking marking) {
+    std::string shown;
+    bool fresh_line = true;
+    const auto show = [&](std::string_view text, bool is_error) {
+      for (const char c : text) {
+        if (c == '\r') continue;
+        if (fresh_line && is_error && marking == Marking::mark_stderr) shown += "! ";
+        shown += c;
+        fresh_line = c == '\n';
+      }
+    };
+    cli::World world{.io = {.out =
+                                [&](std::string_view text) {
+                                  show(text, false);
+                                  return Result<void>();
+                                },
+                            .err = [&](std::string_view text) { show(text, true); },
+                            .read_line = [&] { return next_answer(show); },
+                            .in_is_terminal = !answers_.empty(),
+                            .err_is_terminal = !answers_.empty()},
+                     .clock = clock_,
+                     .interrupt = interrupt_,
+                     .open = [this](const auto& endpoint, const auto& facts,
+                                    Duration) { return open(endpoint, facts); },
+                     .serve = {},
+                     .environment = [](std::string_view) { return std::optional<std::string>(); },
+                     .file_exists = posix::file_exists,
+                     .program_folder = SPINDLE_SOURCE_DIR};
+    status_ = cli::run(arguments, world);
+    Lines lines;
+    std::istringstream stream(shown);
+    for (std::string line; std::getline(stream, line);) lines.push_back(line);
+    if (status_ != 0 && marking == Marking::mark_stderr)
+      lines.push_back(fmt::format("[{}]", status_));
+    return lines;
+  }
+
+  [[nodiscard]] int status() const { return status_; }
+
+ private:
+  static std::string address(const std::string& host, std::uint16_t port) {
+    return fmt::format("{}:{}", host, port);
+  }
+
+  template <typename Show>
+  std::optional<std::string> next_answer(const Show& show) {
+    if (answers_.empty()) return std::nullopt;
+    std::string answer = answers_.front();
+    answers_.erase(answers_.begin());
+    show(answer + "\n", true);
+    return answer;
+  }
+
+  Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
+                                                const catalogue::LinkFacts& facts) {
+    const auto found = tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)));
+    if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
+    Tool& tool = *found->second;
+    return sim::make_sim_transport(*tool.server, {++tool.connections}, tool.profile.link.framing,
+                                   tool.faults, tool.answers, clock_, interrupt_);
+  }
+
+  files::ProfileStore profiles_;
+  test::FakeClock clock_;
+  Interrupt interrupt_;
+  std::map<std::string, std::unique_ptr<Tool>> tools_;
+  std::vector<std::string> answers_;
+  int status_ = 0;
+};
+
+/// Plays one file and returns it as it should read.
+class Player {
+ public:
+  explicit Player(bool markdown) : markdown_(markdown) {}
+
+  Lines play(const Lines& lines) {
+    for (std::size_t index = 0; index < lines.size(); ++index) index = play_line(lines, index);
+    return played_;
+  }
+  [[nodiscard]] int commands() const { return commands_; }
+
+ private:
+  std::size_t play_line(const Lines& lines, std::size_t index) {
+    const std::string& line = lines[index];
+    played_.push_back(line);
+    if (markdown_ && line.starts_with("```")) in_block_ = line.starts_with("```console");
+    if (markdown_ && line.starts_with("<!-- %")) directive(line.substr(5, line.rfind(" -->") - 5));
+    if (markdown_ && !in_block_) return index;
+    if (line.starts_with("%file ")) return write_file(lines, index);
+    if (line.starts_with("%")) directive(line);
+    if (line.starts_with("$ spindle")) return run(lines, index, true);
+    if (line.starts_with("$ echo $?")) return run(lines, index, false);
+    return index;
+  }
+
+  void directive(const std::string& line) {
+    const auto words = shell_words(line.substr(1));
+    if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
+    if (words.at(0) == "answer") stage_.answer(words.at(1));
+  }
+
+  std::size_t write_file(const Lines& lines, std::size_t index) {
+    std::ofstream file(lines[index].substr(6));
+    while (++index < lines.size()) {
+      played_.push_back(lines[index]);
+      if (lines[index] == "%end") break;
+      file << lines[index] << '\n';
+    }
+    return index;
+  }
+
+  std::size_t run(const Lines& lines, std::size_t index, bool is_spindle) {
+    Lines printed = {std::to_string(stage_.status())};
+    if (is_spindle) {
+      ++commands_;
+      const auto words = shell_words(lines[index].substr(2));
+      printed = stage_.run({words.begin() + 1, words.end()},
+                           markdown_ ? Marking::plain : Marking::mark_stderr);
+    }
+    played_.insert(played_.end(), printed.begin(), printed.end());
+    // The old output ends where the next thing begins.
+    std::size_t next = index + 1;
+    const auto ends = [&](const std::string& line) {
+      return line.starts_with("$ ") || line.starts_with("%") || line.starts_with("```") ||
+             (!markdown_ && line.starts_with("#"));
+    };
+    std::size_t last = next;
+    while (last < lines.size() && !ends(lines[last])) ++last;
+    // An empty line before the next command is layout, not output.
+    while (last > next && lines[last - 1].empty()) --last;
+    return last - 1;
+  }
+
+  bool markdown_;
+  bool in_block_ = false;
+  int commands_ = 0;
+  Stage stage_;
+  Lines played_;
+};
+
+int report_difference(const Lines& expected, const Lines& played) {
+  const std::size_t count = std::max(expected.size(), played.size());
+  for (std::size_t index = 0; index < count; ++index) {
+    const std::string want = index < expected.size() ? expected[index] : "(end of file)";
+    const std::string have = index < played.size() ? played[index] : "(end of output)";
+    if (want == have) continue;
+    std::cerr << fmt::format("line {}:\n  expected: {}\n  printed:  {}\n", index + 1, want, have);
+    for (std::size_t more = index + 1; more < std::min(index + 6, played.size()); ++more) {
+      std::cerr << "            " << played[more] << '\n';
+    }
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  if (count != 2) {
+    std::cerr << "usage: spindle_transcripts FILE\n";
+    return 2;
+  }
+  const fs::path path = fs::absolute(arguments[1]);
+  const Lines expected = read_lines(path);
+  std::string folder = (fs::temp_directory_path() / "spindle-transcript-XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) return 2;
+  fs::current_path(folder);
+  Player player(path.extension() == ".md");
+  const Lines played = player.play(expected);
+  fs::current_path("/");
+  fs::remove_all(folder);
+  if (player.commands() == 0) {
+    std::cerr << path << ": no command in it\n";
+    return 1;
+  }
+  if (std::getenv("SPINDLE_UPDATE") != nullptr) {
+    std::ofstream file(path);
+    for (const std::string& line : played) file << line << '\n';
+    return 0;
+  }
+  return report_difference(expected, played);
+}
