@@ -1,7 +1,5 @@
 #include "bm_identity.hpp"
 
-#include <limits>
-
 namespace spindle::sim {
 namespace {
 
@@ -37,17 +35,31 @@ std::uint64_t get_pairs(ByteView bytes, Slice slice) {
   return number;
 }
 
-bool is_long(const IdentityFacts& facts, std::size_t size) {
-  return facts.long_serial_bytes > 0 && size >= facts.long_serial_bytes;
+std::uint64_t get_number(ByteView bytes, Slice slice) {
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < slice.size; ++i) number = number << 8U | bytes[slice.offset + i];
+  return number;
 }
 
-std::optional<std::uint64_t> serial_of(const IdentityFacts& facts, const Bytes& longest,
-                                       const BmOptions& options) {
-  if (options.serial) return *options.serial;
-  if (!is_long(facts, longest.size()) || !holds(longest, facts.long_serial)) return std::nullopt;
-  const std::uint64_t serial = get_pairs(longest, facts.long_serial);
-  if (serial > std::numeric_limits<std::uint32_t>::max()) return std::nullopt;
-  return serial;
+enum class SerialForm : std::uint8_t { number, pairs };
+
+SerialForm form_of(const IdentityFacts& facts, std::size_t size) {
+  const bool is_long = facts.long_serial_bytes > 0 && size >= facts.long_serial_bytes;
+  return is_long ? SerialForm::pairs : SerialForm::number;
+}
+
+std::uint64_t get_serial(const IdentityFacts& facts, ByteView bytes, SerialForm form) {
+  const Slice slice = form == SerialForm::pairs ? facts.long_serial : facts.serial;
+  if (!holds(bytes, slice)) return 0;
+  return form == SerialForm::pairs ? get_pairs(bytes, slice) : get_number(bytes, slice);
+}
+
+void put_serial(const IdentityFacts& facts, Bytes& bytes, std::uint64_t serial) {
+  if (form_of(facts, bytes.size()) == SerialForm::pairs) {
+    put_pairs(bytes, facts.long_serial, serial);
+  } else {
+    put_number(bytes, facts.serial, serial);
+  }
 }
 
 }  // namespace
@@ -60,12 +72,11 @@ Bytes make_identity(const std::optional<IdentityFacts>& facts,
   if (!facts) return identity;
   if (options.firmware) put_number(identity, facts->firmware, *options.firmware);
   if (options.tool_model) put_number(identity, facts->tool_model, *options.tool_model);
-  if (const auto serial = serial_of(*facts, start.identity, options)) {
-    if (is_long(*facts, identity.size())) {
-      put_pairs(identity, facts->long_serial, *serial);
-    } else {
-      put_number(identity, facts->serial, *serial);
-    }
+  const SerialForm written = form_of(*facts, usual);
+  if (options.serial) {
+    put_serial(*facts, identity, *options.serial);
+  } else if (written != form_of(*facts, identity.size())) {
+    put_serial(*facts, identity, get_serial(*facts, start.identity, written));
   }
   return identity;
 }

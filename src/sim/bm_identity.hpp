@@ -8,7 +8,8 @@ namespace spindle::sim {
 
 /// The device-specific bytes of a simulated tool's answer to FC 11h: those of the start state, cut
 /// or padded to the length asked for, with the options' numbers in the places that the profile
-/// names. The serial number is the same in the short and in the long form.
+/// names. The start state has its serial number in the form of its usual length; another length
+/// gets the same serial in its own form.
 Bytes make_identity(const std::optional<catalogue::IdentityFacts>& facts,
                     const catalogue::SimulationFacts& start, const BmOptions& options);
 

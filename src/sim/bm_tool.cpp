@@ -21,7 +21,7 @@ using modbus::Pdu;
 using modbus::RegisterTable;
 
 // How long a screw turns freely before it is snug. The real time depends on the screw.
-constexpr Duration free_run = std::chrono::milliseconds(700);
+constexpr Duration free_run = std::chrono::milliseconds(900);
 
 constexpr std::uint16_t yes = 1;
 constexpr std::uint16_t no = 0;
