@@ -121,6 +121,7 @@ Result<const KindInfo*> find_kind(std::string_view text, std::string_view name) 
                                        [name](const KindInfo& info) { return info.name == name; });
   if (row != kinds.end()) return row;
   std::vector<std::string> names;
+  names.reserve(kinds.size());
   for (const KindInfo& info : kinds) names.emplace_back(info.name);
   return tl::unexpected(bad(text, "there is none of that name", suggestion(name, names)));
 }

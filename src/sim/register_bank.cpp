@@ -33,13 +33,11 @@ RegisterBank::RegisterBank(const catalogue::Profile& profile,
   if (profile.numbered) add_numbered(*profile.numbered);
   if (profile.events) add_event_block(*profile.events);
   for (const auto& value : start.values) {
-    for (const auto& [name, place] : places_) {
-      if (glob_match(value.pattern, name)) start_value(place, value.raw);
-    }
+    for (const Place& place : matching(value.pattern)) start_value(place, value.raw);
   }
   for (const auto& limits : start.limits) {
-    for (const auto& [name, place] : places_) {
-      if (glob_match(limits.pattern, name)) start_limits(place, limits.minimum, limits.maximum);
+    for (const Place& place : matching(limits.pattern)) {
+      start_limits(place, limits.minimum, limits.maximum);
     }
   }
   if (profile.limits) add_mirrors(*profile.limits);
@@ -126,6 +124,14 @@ void RegisterBank::add_event_block(const catalogue::EventFacts& facts) {
     const auto address = static_cast<std::uint16_t>(facts.first + i);
     words(table_of(facts.function)).try_emplace(address, std::uint16_t{0});
   }
+}
+
+std::vector<RegisterBank::Place> RegisterBank::matching(std::string_view pattern) const {
+  std::vector<Place> found;
+  for (const auto& [name, place] : places_) {
+    if (glob_match(pattern, name)) found.push_back(place);
+  }
+  return found;
 }
 
 void RegisterBank::start_value(const Place& place, std::int64_t raw) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/catalogue/profile.hpp"
@@ -54,6 +55,7 @@ class RegisterBank {
   void add_parameter(const catalogue::Parameter& parameter);
   void add_numbered(const catalogue::NumberedFacts& facts);
   void add_event_block(const catalogue::EventFacts& facts);
+  [[nodiscard]] std::vector<Place> matching(std::string_view pattern) const;
   void start_value(const Place& place, std::int64_t raw);
   void start_limits(const Place& place, std::int64_t minimum, std::int64_t maximum);
   void add_mirrors(const catalogue::LimitFacts& facts);

@@ -51,7 +51,6 @@ class ScriptedServer final : public Server {
 struct Sent {
   Duration at;
   Bytes bytes;
-  friend bool operator==(const Sent&, const Sent&) = default;
 };
 
 // Everything that the peer sends, each piece at the time it asks to be woken for.
