@@ -116,9 +116,8 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
   auto found = match_named(profile, name);
   if (found.empty() && profile.numbered) found = match_numbered(*profile.numbered, name);
   if (found.empty()) {
-    return tl::unexpected(unknown(name,
-                                  fmt::format("matches no parameter of profile {}", profile.id),
-                                  "'spindle list' shows all names"));
+    return tl::unexpected(
+        unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {}));
   }
   return found;
 }
@@ -194,8 +193,10 @@ Result<Action> Profile::find_action(std::string_view name) const {
   for (const Action& action : actions) {
     if (action.name == name) return action;
   }
-  return tl::unexpected(unknown(name, fmt::format("no such action in profile {}", id),
-                                suggestion(name, names_of(actions))));
+  std::string hint = suggestion(name, names_of(actions));
+  if (hint.empty()) hint = "'spindle do TARGET' lists the actions";
+  return tl::unexpected(
+      unknown(name, fmt::format("no such action in profile {}", id), std::move(hint)));
 }
 
 bool Profile::writable(RegisterAddress address) const {

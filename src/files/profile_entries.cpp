@@ -117,7 +117,8 @@ void read_repetition(YamlMap& map, Template& entry) {
   const auto stride = map.number<std::uint16_t>("stride");
   entry.repeats = map.word<Evidence>("repeats", "evidence", evidence_words);
   const bool has_counter = entry.parameter.name.find(counter) != std::string::npos;
-  if (has_counter != numbers.has_value()) {
+  const bool has_range = map.get("n") != nullptr;
+  if (has_counter != has_range) {
     map.findings().add(map.node().at, has_counter ? "the name has {n}, but key 'n' is missing"
                                                   : "key 'n' is given, but the name has no {n}");
     return;

@@ -111,7 +111,7 @@ Result<Tools> load_tools(const std::string& path) {
   Tools tools;
   tools.path = path;
   if (!documents.empty()) read_tools(documents.front(), tools, findings);
-  if (documents.empty()) findings.add_once({file, 1, 1}, "the file is empty");
+  if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
   if (!findings.empty()) return tl::unexpected(findings.error());
   return tools;

@@ -26,6 +26,10 @@ constexpr std::size_t read_step = 16384;
 /// No format of ours nests deeper than six; bounds recursion over the tree.
 constexpr std::size_t deepest_nesting = 32;
 
+/// An explicit end: without it the parser takes a quoted text that is never closed for complete.
+/// Behind an empty text it makes an empty document.
+constexpr std::string_view end_of_text = "\n...\n";
+
 Position to_position(const YAML::Mark& mark, std::size_t file) {
   return {file, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
 }
@@ -53,7 +57,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
     findings_.add(to_position(mark, file_), "aliases are not supported; write the value out");
-    add(make(YamlNode::Kind::nothing, mark));
+    add(make(YamlNode::Kind::scalar, mark));
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
@@ -184,12 +188,15 @@ std::string_view cause_of(std::string_view complaint) {
 
 void parse_documents(std::string_view text, std::size_t file, Documents wanted, Findings& findings,
                      std::vector<YamlNode>& documents) {
-  std::istringstream stream{std::string(text)};
+  std::istringstream stream(std::string(text).append(end_of_text));
   YAML::Parser parser(stream);
   TreeBuilder builder(file, findings);
   while (parser.HandleNextDocument(builder)) {
     documents.push_back(builder.take());
-    if (wanted == Documents::first) return;
+    if (wanted == Documents::first) break;
+  }
+  while (!documents.empty() && documents.back().kind == YamlNode::Kind::nothing) {
+    documents.pop_back();
   }
 }
 
@@ -227,7 +234,8 @@ bool check_characters(std::string_view text, std::size_t file, Findings& finding
       findings.add(at, "a NUL byte; this is not a text file");
       return false;
     }
-    at = text[i] == '\n' ? Position{file, at.line + 1, 1} : Position{file, at.line, at.column + 1};
+    at = text[i] == '\n' ? Position{file, at.line + 1, 1}
+                         : Position{file, at.line, at.column + static_cast<int>(length)};
     i += length;
   }
   return true;

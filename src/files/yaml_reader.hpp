@@ -10,7 +10,8 @@
 
 namespace spindle::files {
 
-/// A place in one of the files that are read together; line and column count from 1.
+/// A place in one of the files that are read together; line and column count from 1, columns in
+/// bytes as compilers do.
 struct Position {
   std::size_t file = 0;  ///< as given by Findings::add_file()
   int line = 1;
@@ -73,7 +74,7 @@ Result<std::string> read_text_file(const std::string& path);
 
 /// The documents of a YAML text. Strict: aliases, anchors, tags, duplicate keys, keys that are no
 /// plain text, deep nesting, NUL and invalid UTF-8 are findings. After a syntax error the documents
-/// before it are returned.
+/// before it are returned; empty ones at the end are dropped.
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
                                  Findings& findings);
 

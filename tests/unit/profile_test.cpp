@@ -1,0 +1,235 @@
+#include "spindle/catalogue/profile.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+#include <vector>
+
+using namespace spindle;
+using namespace spindle::catalogue;
+using modbus::RegisterAddress;
+using modbus::RegisterTable;
+
+namespace {
+
+Parameter named(std::string name, RegisterTable table, std::uint16_t address, Kind kind,
+                Access access) {
+  return {.name = std::move(name),
+          .title = {},
+          .table = table,
+          .address = {address},
+          .encoding = {.kind = kind},
+          .unit = {},
+          .access = access,
+          .source = {},
+          .note = {}};
+}
+
+Profile example() {
+  constexpr auto holding = RegisterTable::holding;
+  constexpr auto input = RegisterTable::input;
+  Profile profile;
+  profile.id = "example";
+  profile.numbered = NumberedFacts{.prefix = "p",
+                                   .table = holding,
+                                   .from = 1,
+                                   .to = 725,
+                                   .access = Access::read_write,
+                                   .evidence = Evidence::manual,
+                                   .source = "manual"};
+  profile.limits = LimitFacts{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
+  profile.parameters = {
+      named("preset.1.speed", holding, 8, Kind::u16, Access::read_write),
+      named("preset.1.target-torque", holding, 2, Kind::u16, Access::read_write),
+      named("preset.2.target-torque", holding, 17, Kind::u16, Access::read_write),
+      named("status.alarm", input, 3308, Kind::u16, Access::read_only),
+      named("drive.speed", holding, 1152, Kind::i32, Access::read_write),
+      named("drive.state", holding, 126, Kind::u32, Access::read_only),
+  };
+  profile.actions = {
+      Action{.name = "alarm-reset", .title = {}, .source = {}, .check = {}, .confirm = {}},
+      Action{.name = "start", .title = {}, .source = {}, .check = {}, .confirm = {}}};
+  return profile;
+}
+
+std::vector<std::string> selected(const std::vector<std::string>& names) {
+  const auto found = example().select(names);
+  if (!found) return {describe(found.error())};
+  std::vector<std::string> result;
+  for (const Parameter& parameter : *found) result.push_back(parameter.name);
+  return result;
+}
+
+std::string find_error(std::string_view name) {
+  const auto found = example().find(name);
+  return found ? "found" : describe(found.error());
+}
+
+using Names = std::vector<std::string>;
+
+}  // namespace
+
+TEST_CASE("find: named parameters") {
+  CHECK(example().find("preset.1.speed")->address.value == 8);
+  CHECK(find_error("preset.1.speeed") ==
+        "preset.1.speeed: no such parameter in profile example; did you mean 'preset.1.speed'?");
+  CHECK(example().find("").error().code == Errc::unknown_name);
+}
+
+TEST_CASE("find: numbered parameters, also where a named one has the register") {
+  const auto p2 = example().find("p2");
+  REQUIRE(p2.has_value());
+  CHECK(p2->name == "p2");
+  CHECK(p2->address.value == 2);
+  CHECK(p2->encoding.kind == Kind::u16);
+  CHECK(p2->encoding.scale == Decimal(1));
+  CHECK(p2->access == Access::read_write);
+  CHECK(p2->evidence == Evidence::manual);
+  CHECK(example().find("p725")->address.value == 725);
+  CHECK(example().find("p007")->name == "p7");
+  CHECK(find_error("p0") == "p0: no such parameter in profile example; numbers go from p1 to p725");
+  CHECK(find_error("p726") ==
+        "p726: no such parameter in profile example; numbers go from p1 to p725");
+  CHECK(find_error("p99999999999999999999").find("numbers go from") != std::string::npos);
+  CHECK(example().find("p").error().code == Errc::unknown_name);
+  CHECK(example().find("p0x1").error().code == Errc::unknown_name);
+  CHECK(example().find("p-1").error().code == Errc::unknown_name);
+}
+
+TEST_CASE("find: raw registers may be written where a parameter may") {
+  struct Row {
+    const char* text;
+    const char* name;
+    RegisterTable table;
+    std::uint16_t address;
+    Kind kind;
+    Access access;
+  };
+  constexpr auto holding = RegisterTable::holding;
+  constexpr auto input = RegisterTable::input;
+  const std::vector<Row> rows = {
+      {"@holding:2", "@holding:2", holding, 2, Kind::u16, Access::read_write},
+      {"@holding:0x0480", "@holding:1152", holding, 1152, Kind::u16, Access::read_write},
+      {"@holding:1153", "@holding:1153", holding, 1153, Kind::u16, Access::read_write},
+      {"@holding:1154", "@holding:1154", holding, 1154, Kind::u16, Access::read_only},
+      {"@holding:1152/i32", "@holding:1152/i32", holding, 1152, Kind::i32, Access::read_write},
+      {"@holding:725/u32", "@holding:725/u32", holding, 725, Kind::u32, Access::read_only},
+      {"@holding:4500", "@holding:4500", holding, 4500, Kind::u16, Access::read_only},
+      {"@input:3204/i16", "@input:3204/i16", input, 3204, Kind::i16, Access::read_only},
+      {"@input:2/u16", "@input:2", input, 2, Kind::u16, Access::read_only},
+      {"@input:65535", "@input:65535", input, 65535, Kind::u16, Access::read_only},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.text);
+    const auto found = example().find(row.text);
+    REQUIRE(found.has_value());
+    CHECK(found->name == row.name);
+    CHECK(found->table == row.table);
+    CHECK(found->address.value == row.address);
+    CHECK(found->encoding.kind == row.kind);
+    CHECK(found->access == row.access);
+  }
+}
+
+TEST_CASE("parse_raw_register: what is none") {
+  CHECK_FALSE(parse_raw_register("holding:2").has_value());
+  CHECK_FALSE(parse_raw_register("").has_value());
+  for (const char* text :
+       {"@", "@holding", "@holding:", "@coil:1", "@holding:65536", "@holding:-1", "@holding:2/",
+        "@holding:2/f32", "@holding:2/i16/u16", "@:2", "@holding: 2", "@input:65535/u32"}) {
+    CAPTURE(text);
+    const auto raw = parse_raw_register(text);
+    REQUIRE(raw.has_value());
+    REQUIRE_FALSE(raw->has_value());
+    CHECK(raw->error().code == Errc::unknown_name);
+    CHECK(raw->error().name == text);
+  }
+}
+
+TEST_CASE("select: order asked for, catalogue order in patterns, each once") {
+  CHECK(selected({}) == Names{"preset.1.speed", "preset.1.target-torque", "preset.2.target-torque",
+                              "status.alarm", "drive.speed", "drive.state"});
+  CHECK(
+      selected({"status.alarm", "preset.*.target-torque", "preset.1.*"}) ==
+      Names{"status.alarm", "preset.1.target-torque", "preset.2.target-torque", "preset.1.speed"});
+  CHECK(selected({"p2", "p2", "@holding:2", "@holding:0x2", "p02"}) == Names{"p2", "@holding:2"});
+}
+
+TEST_CASE("select: patterns mean numbered parameters only when they match no named one") {
+  CHECK(selected({"p72?"}) == Names{"p720", "p721", "p722", "p723", "p724", "p725"});
+  CHECK(selected({"p[12]"}) == Names{"p1", "p2"});
+  CHECK(selected({"p*"}) ==
+        Names{"preset.1.speed", "preset.1.target-torque", "preset.2.target-torque"});
+}
+
+TEST_CASE("select: the first thing that does not exist is the error") {
+  CHECK(selected({"preset.1.speed", "preset.9.*"}) ==
+        Names{"preset.9.*: matches no parameter of profile example; 'spindle list' shows the names "
+              "that the profile knows"});
+  CHECK(selected({"nothing.like.it.at.all", "preset.9.*"}) ==
+        Names{"nothing.like.it.at.all: no such parameter in profile example; 'spindle list' shows "
+              "the names that the profile knows"});
+}
+
+TEST_CASE("find_action") {
+  CHECK(example().find_action("start")->name == "start");
+  const auto misspelt = example().find_action("alarm-rest");
+  REQUIRE_FALSE(misspelt.has_value());
+  CHECK(describe(misspelt.error()) ==
+        "alarm-rest: no such action in profile example; did you mean 'alarm-reset'?");
+}
+
+TEST_CASE("find_action without a similar name says where they are listed") {
+  const auto none = example().find_action("quite-another-thing");
+  REQUIRE_FALSE(none.has_value());
+  CHECK(none.error().hint == "'spindle do TARGET' lists the actions");
+}
+
+TEST_CASE("writable: parameters only, both halves of a pair") {
+  const Profile profile = example();
+  for (const std::uint16_t address : std::vector<std::uint16_t>{1, 564, 725, 1152, 1153}) {
+    CAPTURE(address);
+    CHECK(profile.writable({address}));
+  }
+  for (const std::uint16_t address :
+       std::vector<std::uint16_t>{0, 726, 1001, 1151, 1154, 3308, 4002, 4500, 65535}) {
+    CAPTURE(address);
+    CHECK_FALSE(profile.writable({address}));
+  }
+  Profile nothing_numbered = example();
+  nothing_numbered.numbered.reset();
+  CHECK_FALSE(nothing_numbered.writable({126}));  // named, but read-only
+  CHECK_FALSE(nothing_numbered.writable({3}));
+  CHECK(nothing_numbered.writable({2}));
+}
+
+TEST_CASE("limit_registers: parameter n at n + offset (DOGA 60427 §3.1: 1001-1724, 2001-2724)") {
+  const Profile profile = example();
+  const auto limits = profile.limit_registers(*profile.find("p724"));
+  REQUIRE(limits.has_value());
+  CHECK(limits->minimum.value == 1724);
+  CHECK(limits->maximum.value == 2724);
+  CHECK(profile.limit_registers(*profile.find("preset.2.target-torque"))->minimum.value == 1017);
+  CHECK_FALSE(profile.limit_registers(*profile.find("p725")).has_value());
+  CHECK_FALSE(profile.limit_registers(*profile.find("status.alarm")).has_value());
+  CHECK_FALSE(profile.limit_registers(*profile.find("drive.state")).has_value());  // 32 bits
+  Profile without = example();
+  without.limits.reset();
+  CHECK_FALSE(without.limit_registers(*without.find("p1")).has_value());
+}
+
+TEST_CASE("kinds: sizes, bounds and names") {
+  CHECK(register_count(Kind::i16) == 1);
+  CHECK(register_count(Kind::u32) == 2);
+  CHECK(lowest(Kind::i32) == -2147483648LL);
+  CHECK(highest(Kind::u32) == 4294967295LL);
+  for (const Kind kind : {Kind::u16, Kind::i16, Kind::u32, Kind::i32}) {
+    CHECK(parse_kind(to_text(kind)) == kind);
+  }
+  CHECK_FALSE(parse_kind("f32").has_value());
+  for (const Evidence evidence :
+       {Evidence::manual, Evidence::transcribed, Evidence::sibling, Evidence::inferred}) {
+    CHECK(parse_evidence(to_text(evidence)) == evidence);
+  }
+  CHECK_FALSE(parse_evidence("rumour").has_value());
+}

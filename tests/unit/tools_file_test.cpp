@@ -1,0 +1,124 @@
+#include "spindle/files/tools_file.hpp"
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+using namespace spindle;
+using files::load_tools;
+using files::Tools;
+
+namespace {
+
+/// A tools file that lives as long as the object.
+class ToolsFile {
+ public:
+  explicit ToolsFile(const std::string& text)
+      : path_((std::filesystem::temp_directory_path() /
+               ("spindle-tools-" + std::to_string(::getpid()) + ".yaml"))
+                  .string()) {
+    std::ofstream(path_) << text;
+  }
+  ToolsFile(const ToolsFile&) = delete;
+  ToolsFile& operator=(const ToolsFile&) = delete;
+  ~ToolsFile() { std::filesystem::remove(path_); }
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// What is wrong, without the file's name.
+std::string fault(const std::string& text) {
+  const ToolsFile file(text);
+  const auto tools = load_tools(file.path());
+  if (tools) return "nothing";
+  CHECK(tools.error().code == Errc::bad_file);
+  REQUIRE(tools.error().message.starts_with(file.path() + ":"));
+  return tools.error().message.substr(file.path().size() + 1);
+}
+
+}  // namespace
+
+TEST_CASE("the example of the contract, section 2.1") {
+  const ToolsFile file(
+      "tools:\n"
+      "  station3:  {url: \"tcp://192.168.10.23\", profile: doga-bmt, torque-unit: \"N.m\", "
+      "verified: [start, select-preset]}\n"
+      "  conveyor1: {url: \"rtu:///dev/ttyUSB0?unit=3&baud=115200\", profile: orientalmotor-blv}\n"
+      "groups:\n"
+      "  line1: [station3, conveyor1]\n");
+  const auto tools = load_tools(file.path());
+  REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
+  CHECK(tools->path == file.path());
+  REQUIRE(tools->tools.size() == 2);
+  CHECK(tools->tools[0].name == "station3");
+  CHECK(tools->tools[0].url == "tcp://192.168.10.23");
+  CHECK(tools->tools[0].profile == "doga-bmt");
+  CHECK(tools->tools[0].torque_unit == "N.m");
+  CHECK(tools->tools[0].verified == std::vector<std::string>{"start", "select-preset"});
+  CHECK(tools->tools[1].url == "rtu:///dev/ttyUSB0?unit=3&baud=115200");
+  CHECK(tools->tools[1].torque_unit.empty());
+  CHECK(tools->tools[1].verified.empty());
+  REQUIRE(tools->groups.size() == 1);
+  CHECK(tools->groups.at("line1") == std::vector<std::string>{"station3", "conveyor1"});
+}
+
+TEST_CASE("all torque units of the manual's family are known") {
+  for (const char* unit : {"kgf.cm", "kgf.m", "N.m", "cN.m", "lbf.in", "ozf.in", "lbf.ft"}) {
+    CAPTURE(unit);
+    const ToolsFile file(std::string("tools: {a: {url: u, torque-unit: ") + unit + "}}\n");
+    const auto tools = load_tools(file.path());
+    REQUIRE(tools.has_value());
+    CHECK(tools->tools[0].torque_unit == unit);
+  }
+}
+
+TEST_CASE("faults are told with their place") {
+  struct Row {
+    const char* text;
+    const char* fault;
+  };
+  const std::vector<Row> rows = {
+      {"", "1:1: the file is empty"},
+      {"groups: {}\n", "1:1: key 'tools' is missing"},
+      {"tools: {a: {url: x}}\ntoolz: {}\n", "2:1: unknown key 'toolz'; did you mean 'tools'?"},
+      {"tools: [a]\n", "1:8: a mapping of keys to values is expected here, not a list"},
+      {"tools:\n  a: {profile: x}\n", "2:6: key 'url' is missing"},
+      {"tools:\n  a: {url: \"\"}\n", "2:12: key 'url' is empty"},
+      {"tools:\n  a: {url: x, profil: y}\n", "2:15: unknown key 'profil'; did you mean 'profile'?"},
+      {"tools:\n  a: {url: x}\n  a: {url: y}\n", "3:3: key 'a' is given twice"},
+      {"tools:\n  a: {url: x, torque-unit: Nm}\n",
+       "2:28: unknown torque unit 'Nm'; did you mean 'N.m'?"},
+      {"tools:\n  a: {url: x, verified: start}\n",
+       "2:25: a list is expected here, not a single value"},
+      {"tools:\n  a: {url: x, verified: [start, start]}\n", "2:33: 'start' is given twice"},
+      {"tools:\n  \"@a\": {url: x}\n", "2:3: name '@a' is not made of letters"},
+      {"tools:\n  -a: {url: x}\n", "2:3: name '-a' is not made of letters"},
+      {"tools: {a: {url: x}}\ngroups: {g: [a, b]}\n", "2:17: unknown tool 'b'; did you mean 'a'?"},
+      {"tools: {a: {url: x}}\ngroups: {g: [a, a]}\n", "2:17: 'a' is given twice"},
+      {"tools: {a: {url: x}}\ngroups: {g: []}\n", "2:13: group 'g' has no tools"},
+      {"tools: {a: {url: x}}\ngroups: {g: a}\n",
+       "2:13: a list is expected here, not a single value"},
+      {"tools: {a: {url: x}}\ngroups: {g/h: [a]}\n", "2:10: name 'g/h' is not made of letters"},
+      {"tools: {a: {url: x}\n", "not valid YAML here: a '}' is missing"},
+      {"tools: {a: {url: x}}\n---\nmore: 1\n", "3:1: a second document has no meaning here"},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.text);
+    const std::string found = fault(row.text);
+    CAPTURE(found);
+    CHECK(found.find(row.fault) != std::string::npos);
+  }
+}
+
+TEST_CASE("a file that is not there") {
+  const auto tools = load_tools("/no/such/spindle.yaml");
+  REQUIRE_FALSE(tools.has_value());
+  CHECK(describe(tools.error()) == "/no/such/spindle.yaml: no such file");
+}

@@ -1,0 +1,171 @@
+#include "files/yaml_reader.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+using namespace spindle;
+using namespace spindle::files;
+
+namespace {
+
+using namespace std::string_literals;
+
+struct Parsed {
+  std::vector<YamlNode> documents;
+  std::vector<std::string> findings;
+};
+
+Parsed parse(std::string_view text, Documents wanted = Documents::all) {
+  Findings findings;
+  const std::size_t file = findings.add_file("f");
+  Parsed parsed{parse_yaml(text, file, wanted, findings), {}};
+  for (const Finding& finding : findings.list()) parsed.findings.push_back(finding.to_string());
+  return parsed;
+}
+
+using Texts = std::vector<std::string>;
+
+}  // namespace
+
+TEST_CASE("scalars stay as they were written") {
+  const Parsed parsed = parse("{a: 010, b: yes, c: 1e3, d: \"no\", e: 1.50, f: ~, g: }");
+  REQUIRE(parsed.findings.empty());
+  REQUIRE(parsed.documents.size() == 1);
+  const YamlNode& map = parsed.documents[0];
+  REQUIRE(map.kind == YamlNode::Kind::map);
+  CHECK(map.find("a")->text == "010");
+  CHECK(map.find("b")->text == "yes");
+  CHECK(map.find("c")->text == "1e3");
+  CHECK(map.find("d")->text == "no");
+  CHECK(map.find("e")->text == "1.50");
+  CHECK(map.find("f")->kind == YamlNode::Kind::nothing);
+  CHECK(map.find("g")->kind == YamlNode::Kind::nothing);
+  CHECK(map.find("h") == nullptr);
+}
+
+TEST_CASE("order and places are kept; lines and columns count from 1") {
+  const Parsed parsed = parse("# first\nz: 1\na:\n  - {x: [2, 3]}\n");
+  REQUIRE(parsed.documents.size() == 1);
+  const YamlNode& map = parsed.documents[0];
+  REQUIRE(map.entries.size() == 2);
+  CHECK(map.entries[0].key == "z");
+  CHECK(map.entries[0].key_at == Position{0, 2, 1});
+  CHECK(map.entries[0].value.at == Position{0, 2, 4});
+  const YamlNode& inner = map.entries[1].value.items.at(0);
+  CHECK(inner.at == Position{0, 4, 5});
+  CHECK(inner.find("x")->items.at(1).at == Position{0, 4, 13});
+}
+
+TEST_CASE("columns count bytes, as compilers do") {
+  const Parsed parsed = parse("{ä: §, b: 1, b: 2}");
+  CHECK(parsed.findings == Texts{"f:1:16: key 'b' is given twice"});
+}
+
+TEST_CASE("documents: the first alone, or all") {
+  const std::string text = "a: 1\n---\nb: 2\n---\nc: [\n";
+  const Parsed first = parse(text, Documents::first);
+  CHECK(first.documents.size() == 1);
+  CHECK(first.findings.empty());  // what is behind is not even scanned
+  const Parsed all = parse(text);
+  CHECK(all.documents.size() == 2);
+  CHECK(all.documents[1].find("b")->text == "2");
+  CHECK(all.findings.size() == 1);
+  for (const char* nothing : {"", "\n", "# only a remark\n", "---\n"}) {
+    CAPTURE(nothing);
+    CHECK(parse(nothing).documents.empty());
+    CHECK(parse(nothing).findings.empty());
+  }
+}
+
+TEST_CASE("what YAML allows and we do not") {
+  struct Row {
+    std::string text;
+    std::string finding;
+  };
+  const std::vector<Row> rows = {
+      {"a: 1\na: 2\n", "f:2:1: key 'a' is given twice"},
+      {"m: {x: 1, y: 2, x: 3}\n", "f:1:17: key 'x' is given twice"},
+      {"a: &x 1\n", "f:1:4: anchors are not supported; write the value out"},
+      {"a: !number 1\n", "f:1:4: tags are not supported"},
+      {"a: !!int 1\n", "f:1:4: tags are not supported"},
+      {"a: !x [1]\n", "f:1:4: tags are not supported"},
+      {"[a]: 1\n", "f:1:1: a key must be a plain word"},
+      {"~: 1\n", "f:1:1: a key must be a plain word"},
+      {"a: b\n\xFF\n", "f:2:1: not valid UTF-8"},
+      {"a: \xC0\xAF\n", "f:1:4: not valid UTF-8"},      // overlong
+      {"a: \xED\xA0\x80\n", "f:1:4: not valid UTF-8"},  // surrogate
+      {"a: \xF4\x90\x80\x80\n", "f:1:4: not valid UTF-8"},
+      {"a: \xE2\x82", "f:1:4: not valid UTF-8"},  // cut off
+      {"a: x\0y\n"s, "f:1:5: a NUL byte; this is not a text file"},
+      {std::string(33, '[') + std::string(33, ']'), "f:1:33: nested more than 32 levels deep"},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.finding);
+    CHECK(parse(row.text).findings == Texts{row.finding});
+  }
+  CHECK(parse(std::string(32, '[') + std::string(32, ']')).findings.empty());
+}
+
+TEST_CASE("syntax errors are told in our words, at their place") {
+  struct Row {
+    const char* text;
+    const char* finding;
+  };
+  const std::vector<Row> rows = {
+      {"a: {b: 1\n", "a '}' is missing"},
+      {"a: [1, 2\n", "a ']' is missing"},
+      {"a: \"open\n", "a quoted text is never closed"},
+      {"a: b: c\n", "a ':' where no key is"},
+      {"a: 1\n  b: 2\n", "a ':' where no key is"},
+      {"a: 'open", "a quoted text is never closed"},
+      {"a: [\"open]\n\n", "a quoted text is never closed"},
+      {"a:\n  - 1\n b: 2\n", "a line is indented differently"},
+      {"a: ]\n", "a '}' or ']' that closes nothing"},
+      {"a: \"\\q\"\n", "an unknown escape"},
+      {"a: %b\n", "a character that cannot begin a value"},
+      {"a:\n\t- b\n", "a '-' where no list is"},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.text);
+    const Parsed parsed = parse(row.text);
+    REQUIRE(parsed.findings.size() == 1);
+    CHECK(parsed.findings[0].find("not valid YAML here: ") != std::string::npos);
+    CHECK(parsed.findings[0].find(row.finding) != std::string::npos);
+  }
+}
+
+TEST_CASE("nesting without end neither crashes nor hangs") {
+  CHECK_FALSE(parse(std::string(100'000, '[')).findings.empty());
+  CHECK_FALSE(parse(std::string(100'000, '{')).findings.empty());
+}
+
+TEST_CASE("findings: sorted by place, the same fault once") {
+  Findings findings;
+  const std::size_t file = findings.add_file("f");
+  const std::size_t other = findings.add_file("g");
+  findings.add({other, 1, 1}, "last");
+  findings.add({file, 2, 1}, "second");
+  findings.add({file, 2, 1}, "second");
+  findings.add({file, 2, 1}, "third");
+  findings.add_once({file, 2, 1}, "dropped");
+  findings.add({file, 1, 9}, "first");
+  Texts texts;
+  for (const Finding& finding : findings.list()) texts.push_back(finding.to_string());
+  CHECK(texts == Texts{"f:1:9: first", "f:2:1: second", "f:2:1: third", "g:1:1: last"});
+  CHECK(findings.error().code == Errc::bad_file);
+  CHECK(findings.error().message == "f:1:9: first (and 3 more faults)");
+}
+
+TEST_CASE("read_text_file: what cannot be read is bad_file") {
+  const auto missing = read_text_file("/no/such/file.yaml");
+  REQUIRE_FALSE(missing.has_value());
+  CHECK(missing.error().code == Errc::bad_file);
+  CHECK(describe(missing.error()) == "/no/such/file.yaml: no such file");
+  const auto folder = read_text_file(SPINDLE_SOURCE_DIR);
+  REQUIRE_FALSE(folder.has_value());
+  CHECK(folder.error().message == "is a folder, not a file");
+  CHECK(read_text_file(SPINDLE_SOURCE_DIR "/CMakeLists.txt")->starts_with("cmake_minimum"));
+}
