@@ -129,6 +129,7 @@ struct Step {
 Result<std::vector<Step>> check_against_tool(const std::vector<Assignment>& assignments,
                                              device::Device& device) {
   std::vector<Parameter> parameters;
+  parameters.reserve(assignments.size());
   for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
   const auto readings = device.read_each(parameters, device::Limits::read);
   if (!readings) return tl::unexpected(readings.error());

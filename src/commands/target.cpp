@@ -98,7 +98,8 @@ Result<void> find_profile(OpenTool& tool, const Context& context) {
   // Products that their answer does not tell apart share the register map of their common base.
   auto profile = context.profiles.load(identification->candidates.front());
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  tool.device.use(std::move(*profile));
+  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*profile));
+  tool.device.use(*tool.profile);
   return {};
 }
 
@@ -206,10 +207,11 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const
     resolved.endpoint.port = profile.link.port;
     resolved.endpoint.text = link::to_url(resolved.endpoint);
   }
-  auto device = device::Device::open(resolved.endpoint, std::move(profile),
-                                     link_options(resolved, context), open, context.clock);
+  auto kept = std::make_unique<const catalogue::Profile>(std::move(profile));
+  auto device = device::Device::open(resolved.endpoint, *kept, link_options(resolved, context),
+                                     open, context.clock);
   if (!device) return tl::unexpected(std::move(device.error()));
-  return OpenTool{std::move(resolved), std::move(*device)};
+  return OpenTool{std::move(resolved), std::move(kept), std::move(*device)};
 }
 
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,

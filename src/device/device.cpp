@@ -93,17 +93,24 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   return session;
 }
 
+/// After a write: a refusal or a lost line is final, a missing or broken answer leaves open what
+/// the tool did.
+bool leaves_open(const Error& error) {
+  return error.code == Errc::no_answer || error.code == Errc::malformed_answer ||
+         error.code == Errc::bad_checksum;
+}
+
 }  // namespace
 
-Device::Device(std::string target, catalogue::Profile profile,
+Device::Device(std::string target, const catalogue::Profile& profile,
                std::unique_ptr<link::Session> session, unsigned retries)
     : target_(std::move(target)),
-      profile_(std::move(profile)),
+      profile_(&profile),
       session_(std::move(session)),
       retries_(retries),
-      client_(*session_, read_limits(profile_), retries) {}
+      client_(*session_, read_limits(*profile_), retries) {}
 
-Result<Device> Device::open(const link::Endpoint& endpoint, catalogue::Profile profile,
+Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                             const LinkOptions& options, const OpenTransport& open_transport,
                             Clock& clock) {
   const Duration connect_timeout = options.connect_timeout.value_or(profile.link.connect);
@@ -116,7 +123,7 @@ Result<Device> Device::open(const link::Endpoint& endpoint, catalogue::Profile p
   auto session = std::make_unique<link::Session>(
       std::move(*transport), clock, session_options(profile, endpoint, options), options.trace);
   const unsigned retries = options.retries.value_or(profile.link.retries);
-  return Device(endpoint.text, std::move(profile), std::move(session), retries);
+  return Device(endpoint.text, profile, std::move(session), retries);
 }
 
 Error Device::located(Error error) const {
@@ -128,8 +135,8 @@ Error Device::located(Error error) const {
 /// The maker's own words for an exception code are better than the standard's.
 Error Device::with_exception_text(Error error) const {
   if (!error.exception) return error;
-  const auto text = profile_.exceptions.find(*error.exception);
-  if (text == profile_.exceptions.end()) return error;
+  const auto text = profile_->exceptions.find(*error.exception);
+  if (text == profile_->exceptions.end()) return error;
   error.message = fmt::format("the tool refused '{}' with exception {:02X} ({})", error.tried,
                               *error.exception, text->second.text);
   if (error.hint.empty()) error.hint = text->second.remedy;
@@ -137,23 +144,24 @@ Error Device::with_exception_text(Error error) const {
 }
 
 Result<Bytes> Device::report_server_id() {
-  return client_.report_server_id().map_error([this](Error error) { return located(error); });
+  return client_.report_server_id().map_error(
+      [this](Error error) { return located(std::move(error)); });
 }
 
-void Device::use(catalogue::Profile profile) {
-  profile_ = std::move(profile);
-  session_->set_rules(demux_rules(profile_));
-  client_ = link::Client(*session_, read_limits(profile_), retries_);
+void Device::use(const catalogue::Profile& profile) {
+  profile_ = &profile;
+  session_->set_rules(demux_rules(*profile_));
+  client_ = link::Client(*session_, read_limits(*profile_), retries_);
   registers_known_ = true;
 }
 
 Result<void> Device::require_known_registers() {
-  if (!profile_.identity || registers_known_) return {};
+  if (!profile_->identity || registers_known_) return {};
   auto answer = report_server_id();
   if (!answer && answer.error().code != Errc::exception_response) {
     return tl::unexpected(std::move(answer.error()));
   }
-  const auto& facts = *profile_.identity;
+  const auto& facts = *profile_->identity;
   const auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
   const auto generation = catalogue::generation_of(facts, identity);
   registers_known_ = generation == catalogue::Generation::known;
@@ -162,11 +170,11 @@ Result<void> Device::require_known_registers() {
   error.message =
       generation == catalogue::Generation::later
           ? fmt::format("firmware {} has other registers than profile {} (below {})",
-                        *identity.firmware, profile_.id, facts.firmware_below)
+                        *identity.firmware, profile_->id, facts.firmware_below)
           : fmt::format(
                 "the tool does not identify itself as profile {} expects, so its registers "
                 "are not known",
-                profile_.id);
+                profile_->id);
   return tl::unexpected(std::move(error));
 }
 
@@ -176,7 +184,7 @@ Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& par
   wanted.reserve(parameters.size());
   for (const Parameter& parameter : parameters) {
     wanted.push_back(range_of(parameter));
-    const auto own = limits == Limits::read ? profile_.limit_registers(parameter) : std::nullopt;
+    const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
     if (!own) continue;
     wanted.push_back(range_at(parameter, own->minimum));
     wanted.push_back(range_at(parameter, own->maximum));
@@ -206,7 +214,7 @@ Reading Device::reading_of(const Parameter& parameter, Limits limits,
   Reading reading{.parameter = parameter,
                   .registers = image.get(range_of(parameter)).map_error(with_name),
                   .value = value_at(range_of(parameter))};
-  const auto own = limits == Limits::read ? profile_.limit_registers(parameter) : std::nullopt;
+  const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
   if (!own) return reading;
   auto minimum = value_at(range_at(parameter, own->minimum));
   auto maximum = value_at(range_at(parameter, own->maximum));
@@ -242,28 +250,23 @@ Result<Written> Device::write(const Parameter& parameter, const Value& before, c
   const auto registers = catalogue::encode(parameter, value.number);
   if (!registers) return tl::unexpected(registers.error());
   auto sent = send_write(parameter, *registers);
-  // A refusal or a lost line is final; a missing or broken answer leaves open what the tool did.
-  const auto leaves_open = [](const Error& error) {
-    return error.code == Errc::no_answer || error.code == Errc::malformed_answer ||
-           error.code == Errc::bad_checksum;
-  };
-  if (!sent && !leaves_open(sent.error())) return tl::unexpected(sent.error());
+  if (!sent && !leaves_open(sent.error())) return tl::unexpected(std::move(sent.error()));
   auto now = read_value(parameter);
-  if (!now) return tl::unexpected(sent ? now.error() : sent.error());
-  if (!sent && *now == before && !(*now == value)) {
+  const bool did_not_take = !sent && now && *now == before && !(*now == value);
+  if (did_not_take) {
     sent = send_write(parameter, *registers);
     now = read_value(parameter);
-    if (!now) return tl::unexpected(now.error());
-    if (!sent && !(*now == value)) return tl::unexpected(sent.error());
   }
+  if (!now) return tl::unexpected(sent ? std::move(now.error()) : std::move(sent.error()));
   if (*now == value) return Written{WriteResult::written, *now};
+  if (!sent) return tl::unexpected(std::move(sent.error()));
   return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
 }
 
 Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint16_t value) {
   Parameter confirming;
   if (!action.confirm.empty()) {
-    auto found = profile_.find(action.confirm);
+    auto found = profile_->find(action.confirm);
     if (!found) return tl::unexpected(std::move(found.error()));
     confirming = std::move(*found);
   }
@@ -292,7 +295,7 @@ Result<Duration> Device::ping() {
   const Clock& clock = session_->clock();
   const auto word = static_cast<std::uint16_t>(session_->counters().requests);
   const auto request =
-      profile_.link.loopback ? modbus::loopback_request(word) : modbus::report_server_id_request();
+      profile_->link.loopback ? modbus::loopback_request(word) : modbus::report_server_id_request();
   const TimePoint start = clock.now();
   auto response = session_->transact(request);
   if (!response) return tl::unexpected(located(std::move(response.error())));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,6 +24,7 @@ struct Target {
 /// A target that was connected.
 struct OpenTool {
   Target target;
+  std::unique_ptr<const catalogue::Profile> profile;  ///< what the device refers to
   device::Device device;
 };
 
@@ -72,7 +74,7 @@ auto open_prepared(const Target& target, Need need, const Context& context, Prep
   if (prepared && !*prepared) return tl::unexpected(std::move(prepared->error()));
   auto tool = open_tool(target, std::move(*profile), need, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
-  if (!prepared) prepared = prepare(tool->device.profile());
+  if (!prepared) prepared = prepare(*tool->profile);
   if (!*prepared) return tl::unexpected(std::move(prepared->error()));
   return Opened<typename Attempt::value_type>{std::move(*tool), std::move(**prepared)};
 }

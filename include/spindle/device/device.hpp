@@ -62,19 +62,20 @@ enum class ActionResult : std::uint8_t {
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
 class Device {
  public:
-  /// Connects. Errors carry the endpoint's text as target, here and in every other function.
-  static Result<Device> open(const link::Endpoint& endpoint, catalogue::Profile profile,
+  /// Connects. `profile` must outlive the device. Errors carry the endpoint's text as target, here
+  /// and in every other function.
+  static Result<Device> open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                              const LinkOptions& options, const OpenTransport& open_transport,
                              Clock& clock);
 
-  [[nodiscard]] const catalogue::Profile& profile() const { return profile_; }
+  [[nodiscard]] const catalogue::Profile& profile() const { return *profile_; }
   [[nodiscard]] link::Session& session() { return *session_; }
 
   /// The bytes of FC 11h. An exception response is an error like any other.
   Result<Bytes> report_server_id();
 
   /// Goes on with a profile that was found by the answer to FC 11h.
-  void use(catalogue::Profile profile);
+  void use(const catalogue::Profile& profile);
 
   /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
   /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
@@ -99,8 +100,8 @@ class Device {
   Result<Duration> ping();
 
  private:
-  Device(std::string target, catalogue::Profile profile, std::unique_ptr<link::Session> session,
-         unsigned retries);
+  Device(std::string target, const catalogue::Profile& profile,
+         std::unique_ptr<link::Session> session, unsigned retries);
 
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
@@ -110,7 +111,7 @@ class Device {
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
 
   std::string target_;
-  catalogue::Profile profile_;
+  const catalogue::Profile* profile_;
   std::unique_ptr<link::Session> session_;
   unsigned retries_;
   link::Client client_;

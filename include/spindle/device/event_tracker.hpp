@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string_view>
+
+#include "spindle/base/bytes.hpp"
+
+namespace spindle::device {
+
+/// What the number of an event says about it.
+enum class Novelty : std::uint8_t {
+  baseline,  ///< the first number seen: an old event, not a result
+  repeat,    ///< seen before
+  next,      ///< one more than the last
+  jump,      ///< more than one more: `missed` events were not seen
+  wrap,      ///< the 16-bit counter began again behind 65535; `missed` may be 0
+  restart,   ///< smaller, and not by wrapping: the tool began to count anew; what was missed is
+             ///< unknown
+};
+
+struct Tracked {
+  Novelty novelty = Novelty::baseline;
+  std::uint32_t missed = 0;  ///< for `jump` and `wrap`
+
+  /// Whether the event is a result that nobody has had yet.
+  [[nodiscard]] bool is_new() const {
+    return novelty != Novelty::baseline && novelty != Novelty::repeat;
+  }
+};
+
+/// Decides by event numbers alone what is new: nothing lost silently, nothing told twice. Numbers
+/// are 16-bit counters that go up by one per event. A block that equals one of the last few in
+/// every register is a repeat even when its number is not the last one. Pure.
+class EventTracker {
+ public:
+  /// `block` is the whole event block; `number` its counter.
+  Tracked track(std::uint16_t number, RegisterView block);
+
+  /// A number that was read without its block: the next event is judged against it.
+  void set_baseline(std::uint16_t number) { last_ = number; }
+
+  [[nodiscard]] std::optional<std::uint16_t> last() const { return last_; }
+
+ private:
+  [[nodiscard]] Tracked judge(std::uint16_t number) const;
+
+  std::optional<std::uint16_t> last_ = std::nullopt;
+  std::deque<Registers> recent_ = {};
+};
+
+}  // namespace spindle::device
