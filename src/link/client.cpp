@@ -17,15 +17,17 @@ RegisterRange span_of(const RegisterRange& front, std::uint32_t end) {
 }
 
 bool is_forbidden(const RegisterRange& range, const ReadLimits& limits) {
-  return limits.forbidden_shape && limits.forbidden_shape->table == range.table &&
+  return range.count > 1 && limits.forbidden_shape &&
+         limits.forbidden_shape->table == range.table &&
          limits.forbidden_shape->count == range.count;
 }
 
 /// Cuts what alone is too long for one request or has the forbidden shape.
 void append_pieces(RegisterRange range, const ReadLimits& limits,
                    std::vector<RegisterRange>& pieces) {
-  while (range.count > limits.max_read || is_forbidden(range, limits)) {
-    std::uint16_t size = std::min(range.count, limits.max_read);
+  const std::uint16_t longest = std::max<std::uint16_t>(limits.max_read, 1);
+  while (range.count > longest || is_forbidden(range, limits)) {
+    std::uint16_t size = std::min(range.count, longest);
     if (size == range.count || is_forbidden({range.table, range.first, size}, limits)) --size;
     pieces.push_back({range.table, range.first, size});
     range = {range.table, static_cast<std::uint16_t>(range.first + size),
@@ -62,7 +64,7 @@ void add(std::vector<PlannedRead>& plan, const RegisterRange& piece, const ReadL
   plan.push_back({piece, {piece}});
 }
 
-/// Splits so that `head` keeps all but the last `keep` wanted ranges.
+/// Splits so that the first part keeps the wanted ranges in front of `at`.
 std::pair<PlannedRead, PlannedRead> split_at(const PlannedRead& planned, std::size_t at) {
   const auto middle = planned.wanted.begin() + static_cast<std::ptrdiff_t>(at);
   PlannedRead head{.range = {}, .wanted = {planned.wanted.begin(), middle}};
@@ -172,7 +174,15 @@ Result<Registers> Client::read(const RegisterRange& range) {
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
                                         const Progress& progress) {
   RegisterImage image;
-  const auto plan = plan_reads(wanted, limits_, absent_);
+  std::vector<RegisterRange> pieces;
+  for (const RegisterRange& range : wanted) append_pieces(range, limits_, pieces);
+  const auto asked = std::partition(pieces.begin(), pieces.end(), [&](const RegisterRange& piece) {
+    return known_absent(piece) == nullptr;
+  });
+  for (auto piece = asked; piece != pieces.end(); ++piece)
+    image.fail(*piece, *known_absent(*piece));
+  pieces.erase(asked, pieces.end());
+  const auto plan = plan_reads(pieces, limits_, absent_registers());
   std::size_t done = 0;
   for (const PlannedRead& planned : plan) {
     if (auto read = read_or_bisect(planned, image); !read) return tl::unexpected(read.error());
@@ -209,10 +219,27 @@ void Client::remember(const PlannedRead& refused, const Error& error, RegisterIm
     Error located = error;
     located.register_address = range.first;
     image.fail(range, located);
-    if (!is_missing_register(error)) continue;
-    const std::uint32_t first = register_key(range.table, range.first);
-    for (std::uint32_t key = first; key < first + range.count; ++key) absent_.insert(key);
+    if (is_missing_register(error)) absent_.insert_or_assign(range, located);
   }
+}
+
+/// The refusal of a range that lies within this one.
+const Error* Client::known_absent(const RegisterRange& range) const {
+  const auto last =
+      absent_.lower_bound({range.table, static_cast<std::uint16_t>(end_of(range) - 1), 0xFFFF});
+  for (auto absent = absent_.lower_bound({range.table, range.first, 0}); absent != last; ++absent) {
+    if (end_of(absent->first) <= end_of(range)) return &absent->second;
+  }
+  return nullptr;
+}
+
+std::set<std::uint32_t> Client::absent_registers() const {
+  std::set<std::uint32_t> registers;
+  for (const auto& [range, error] : absent_) {
+    const std::uint32_t first = register_key(range.table, range.first);
+    for (std::uint32_t key = first; key < first + range.count; ++key) registers.insert(key);
+  }
+  return registers;
 }
 
 Result<void> Client::write(modbus::RegisterAddress address, std::uint16_t value) {

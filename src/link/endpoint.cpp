@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <functional>
@@ -38,6 +39,7 @@ constexpr std::array<Scheme, 4> schemes = {{
 
 std::vector<std::string> scheme_names() {
   std::vector<std::string> names;
+  names.reserve(schemes.size());
   for (const Scheme& scheme : schemes) names.emplace_back(scheme.name);
   return names;
 }
@@ -79,6 +81,21 @@ bool is_host_character(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '-' || c == '_';
 }
 
+bool is_address_character(char c) {
+  return std::isxdigit(static_cast<unsigned char>(c)) != 0 || c == ':' || c == '.';
+}
+
+/// By its characters only; the resolver knows the rest. A zone may stand behind '%'.
+bool is_ipv6_address(std::string_view host) {
+  const auto percent = host.find('%');
+  const std::string_view address = host.substr(0, percent);
+  if (address.find(':') == std::string_view::npos) return false;
+  if (!std::all_of(address.begin(), address.end(), is_address_character)) return false;
+  if (percent == std::string_view::npos) return true;
+  const std::string_view zone = host.substr(percent + 1);
+  return !zone.empty() && std::all_of(zone.begin(), zone.end(), is_host_character);
+}
+
 Result<void> parse_bracketed_host(Endpoint& endpoint, std::string_view authority) {
   const auto bracket = authority.find(']');
   if (bracket == std::string_view::npos) {
@@ -86,10 +103,7 @@ Result<void> parse_bracketed_host(Endpoint& endpoint, std::string_view authority
         bad_target(endpoint.text, "the bracket of the IPv6 address is not closed"));
   }
   endpoint.host = authority.substr(1, bracket - 1);
-  for (const char c : endpoint.host) {
-    if (std::isxdigit(static_cast<unsigned char>(c)) != 0 || c == ':' || c == '.' || c == '%')
-      continue;
-    if (endpoint.host.find('%') != std::string::npos && is_host_character(c)) continue;
+  if (!endpoint.host.empty() && !is_ipv6_address(endpoint.host)) {
     return tl::unexpected(
         bad_target(endpoint.text, fmt::format("'{}' is not an IPv6 address", endpoint.host)));
   }
@@ -189,7 +203,8 @@ Error bad_option(const Endpoint& endpoint, std::string_view name, std::string_vi
 }
 
 Result<void> set_unit(Endpoint& endpoint, std::string_view value) {
-  const std::uint8_t maximum = endpoint.medium == Medium::tcp ? 255 : max_serial_unit;
+  const bool is_rtu = endpoint.medium == Medium::serial || endpoint.medium == Medium::rtu_over_tcp;
+  const std::uint8_t maximum = is_rtu ? max_serial_unit : std::uint8_t{255};
   const auto unit = parse_unsigned(value, maximum);
   if (!unit) {
     return tl::unexpected(
@@ -284,8 +299,10 @@ Result<Endpoint> parse_endpoint(std::string_view url) {
 }
 
 std::string to_url(const Endpoint& endpoint) {
-  const bool is_ipv6 = endpoint.host.find(':') != std::string::npos;
-  std::string url = "tcp://" + (is_ipv6 ? "[" + endpoint.host + "]" : endpoint.host);
+  const bool bracketed = endpoint.host.find(':') != std::string::npos;
+  std::string url =
+      fmt::format("{}://{}", endpoint.medium == Medium::rtu_over_tcp ? "rtu+tcp" : "tcp",
+                  bracketed ? "[" + endpoint.host + "]" : endpoint.host);
   if (endpoint.port) url += fmt::format(":{}", *endpoint.port);
   if (endpoint.unit) url += fmt::format("?unit={}", endpoint.unit->value);
   return url;

@@ -18,14 +18,42 @@ std::string describe_frame(const modbus::Adu& adu) {
                      adu.unit.value, adu.pdu.function, to_hex(adu.pdu.data));
 }
 
+/// Whether the answer is a copy of the request, so that only an echo can be mistaken for it.
+bool is_repeated_by_answer(const modbus::Pdu& request) {
+  const auto function = static_cast<modbus::FunctionCode>(request.function);
+  return function == modbus::FunctionCode::write_single_register ||
+         function == modbus::FunctionCode::diagnostics;
+}
+
+/// How long an RTU frame is that answers the request, judged by what has come of it.
+std::size_t whole_answer_size(const modbus::Pdu& request, ByteView begun) {
+  constexpr std::size_t around_count = 5;  // unit, function, byte count, CRC; an exception likewise
+  constexpr std::size_t two_words = 8;
+  if (begun.size() > 1 && (begun[1] & modbus::exception_bit) != 0) return around_count;
+  switch (static_cast<modbus::FunctionCode>(request.function)) {
+    case modbus::FunctionCode::read_holding_registers:
+    case modbus::FunctionCode::read_input_registers:
+      return around_count + std::size_t{get_u16(request.data, 2)} * 2;
+    case modbus::FunctionCode::report_server_id:
+      return around_count + (begun.size() > 2 ? begun[2] : 1U);
+    case modbus::FunctionCode::write_single_register:
+    case modbus::FunctionCode::diagnostics:
+    case modbus::FunctionCode::write_multiple_registers:
+      break;
+  }
+  return two_words;
+}
+
 }  // namespace
 
 struct Session::Outstanding {
   modbus::Adu request;
-  TimePoint sent;
-  TimePoint deadline;
+  Bytes bytes;  ///< the request as sent
+  TimePoint sent = {};
+  TimePoint deadline = {};
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
+  std::size_t echoes = 0;   ///< copies of the request that came back
 };
 
 Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -36,26 +64,20 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       trace_(std::move(trace)) {}
 
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
-  if (quarantined_) {
-    if (auto left = leave_quarantine(); !left) return tl::unexpected(left.error());
+  // An answer that repeats its request cannot be another one's, so a stop need not wait here.
+  if (quarantined_until_ && !is_repeated_by_answer(request)) {
+    if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   return exchange(request);
 }
 
 Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
-  Outstanding outstanding{
-      .request = {.transaction = {next_transaction_}, .unit = options_.unit, .pdu = request},
-      .sent = {},
-      .deadline = {}};
+  const modbus::Adu adu{.transaction = {next_transaction_}, .unit = options_.unit, .pdu = request};
   next_transaction_ = next_transaction_ == 0xFFFF
                           ? first_transaction
                           : static_cast<std::uint16_t>(next_transaction_ + 1);
-  ++counters_.requests;
-  auto answer = send(outstanding.request).and_then([&] {
-    outstanding.sent = clock_->now();
-    outstanding.deadline = std::max(outstanding.sent, last_activity_) + options_.answer_timeout;
-    return await(outstanding);
-  });
+  Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
+  auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {
     last_round_trip_ = clock_->now() - outstanding.sent;
     return answer;
@@ -65,66 +87,87 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   return tl::unexpected(std::move(error));
 }
 
+Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
+  auto answer = send(outstanding.request, outstanding.bytes).and_then([&] {
+    outstanding.sent = clock_->now();
+    outstanding.deadline = std::max(outstanding.sent, last_activity_) + options_.answer_timeout;
+    return await(outstanding);
+  });
+  if (!is_rtu()) return answer;
+  if (!answer) {
+    quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
+    buffer_.clear();
+  } else if (!is_repeated_by_answer(outstanding.request.pdu)) {
+    echoing_ = outstanding.echoes > 0;
+  }
+  return answer;
+}
+
 Result<void> Session::broadcast(const modbus::Pdu& request) {
-  if (quarantined_) {
+  if (quarantined_until_) {
     if (auto left = leave_quarantine(); !left) return left;
   }
-  ++counters_.requests;
-  return send({.transaction = {}, .unit = {}, .pdu = request}).map([&] {
-    last_activity_ += options_.broadcast_gap;
-  });
+  const modbus::Adu adu{.transaction = {}, .unit = {}, .pdu = request};
+  return keep_gap()
+      .and_then([&] { return send(adu, modbus::frame(options_.rules.framing, adu)); })
+      .map([&] {
+        last_activity_ += std::max(Duration::zero(), options_.broadcast_gap - options_.gap);
+      });
 }
 
 Result<std::optional<Spontaneous>> Session::next_spontaneous(TimePoint deadline) {
-  while (queue_.empty()) {
-    auto frame = take_frame();
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    if (*frame) {
-      sort(**frame, nullptr);
-      continue;
-    }
+  bool expired = false;
+  while (true) {
+    auto sorted = sort_buffered(nullptr);
+    if (!queue_.empty()) break;
+    if (!sorted) return tl::unexpected(std::move(sorted.error()));
+    if (expired) return std::nullopt;
     auto more = fill(deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
-    if (!*more) return std::nullopt;
+    expired = !*more || clock_->now() >= deadline;
   }
   std::optional<Spontaneous> oldest = std::move(queue_.front());
   queue_.pop_front();
   return oldest;
 }
 
-Result<void> Session::send(const modbus::Adu& adu) {
-  if (auto kept = keep_gap(); !kept) return kept;
-  const Bytes bytes = modbus::frame(options_.rules.framing, adu);
+Result<void> Session::send(const modbus::Adu& adu, ByteView bytes) {
+  ++counters_.requests;
   if (trace_.bytes) trace_.bytes(Direction::sent, bytes);
   decide(Decision::request, adu);
-  auto sent = transport_->send(bytes, clock_->now() + options_.answer_timeout);
+  const TimePoint began = clock_->now();
+  auto sent = transport_->send(bytes, began + options_.answer_timeout);
   // Where the port returns before the last bit has left, the time on the wire is the lower bound.
-  last_activity_ =
-      clock_->now() + options_.character_time * static_cast<Duration::rep>(bytes.size());
+  const Duration on_the_wire = options_.character_time * static_cast<Duration::rep>(bytes.size());
+  last_activity_ = std::max(clock_->now(), began + on_the_wire);
   return sent;
 }
 
 Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
+  // Strays, noise or single bytes without end must not keep the caller beyond the deadline; what
+  // was already there when the deadline passed still counts.
+  bool expired = false;
   while (true) {
-    auto frame = take_frame();
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    if (*frame) {
-      sort(**frame, &outstanding);
-      if (outstanding.answer) return std::move(*outstanding.answer);
-      // An endless stream of strays must not keep the caller beyond the deadline.
-      if (clock_->now() < outstanding.deadline) continue;
-      return tl::unexpected(timeout_error(outstanding));
-    }
+    strip_echo(outstanding);
+    auto sorted = sort_buffered(&outstanding);
+    if (!sorted) return tl::unexpected(std::move(sorted.error()));
+    if (outstanding.answer) return std::move(*outstanding.answer);
+    if (expired) return tl::unexpected(timeout_error(outstanding));
     auto more = fill(outstanding.deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
-    if (*more) continue;
-    const Error error = timeout_error(outstanding);
-    if (options_.rules.framing == modbus::Framing::rtu) {
-      quarantined_ = true;
-      buffer_.clear();
-    }
-    return tl::unexpected(error);
+    expired = !*more || clock_->now() >= outstanding.deadline;
   }
+}
+
+/// Takes away the copy of the request that some adapters receive of all that they send.
+void Session::strip_echo(Outstanding& outstanding) {
+  const Bytes& sent = outstanding.bytes;
+  const bool ambiguous = is_repeated_by_answer(outstanding.request.pdu) && !echoing_;
+  if (!is_rtu() || ambiguous || outstanding.echoes > 0 || buffer_.size() < sent.size()) return;
+  const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(sent.size());
+  if (!std::equal(sent.begin(), sent.end(), buffer_.begin(), end)) return;
+  buffer_.erase(buffer_.begin(), end);
+  ++outstanding.echoes;
 }
 
 /// Appends what has arrived; false at the deadline.
@@ -135,7 +178,7 @@ Result<bool> Session::fill(TimePoint deadline) {
   if (*count == 0) return false;
   const ByteView bytes = ByteView(chunk).first(*count);
   if (trace_.bytes) trace_.bytes(Direction::received, bytes);
-  if (options_.rules.framing == modbus::Framing::rtu) last_activity_ = clock_->now();
+  last_activity_ = std::max(last_activity_, clock_->now());
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
   return true;
 }
@@ -167,6 +210,18 @@ Result<std::optional<modbus::Adu>> Session::take_frame() {
   return std::nullopt;
 }
 
+/// Sorts every complete frame, so that each is kept with the time of its own arrival.
+Result<void> Session::sort_buffered(Outstanding* outstanding) {
+  const auto answered = [&] { return outstanding != nullptr && outstanding->answer; };
+  while (true) {
+    auto frame = take_frame();
+    // Junk behind the answer is left for the next who asks.
+    if (!frame && !answered()) return tl::unexpected(std::move(frame.error()));
+    if (!frame || !*frame) return {};
+    sort(**frame, answered() ? nullptr : outstanding);
+  }
+}
+
 void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
   const modbus::Adu* request = outstanding == nullptr ? nullptr : &outstanding->request;
   switch (judge(request, received, options_.rules)) {
@@ -188,7 +243,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       ++counters_.strays;
       return;
     case Verdict::stray:
-      decide(Decision::stray, received);
+      decide(is_late(received) ? Decision::late : Decision::stray, received);
       ++counters_.strays;
       return;
   }
@@ -203,40 +258,48 @@ void Session::keep(const modbus::Pdu& pdu) {
   queue_.push_back({.pdu = pdu, .arrival = clock_->now(), .wall = clock_->wall()});
 }
 
-Result<void> Session::keep_gap() {
-  if (options_.gap == Duration::zero()) return {};
-  const TimePoint earliest = last_activity_ + options_.gap;
-  return clock_->now() < earliest ? clock_->sleep_until(earliest) : Result<void>();
-}
+/// RTU: returns when the line was silent for the gap. What arrives meanwhile answers nothing.
+Result<void> Session::keep_gap() { return is_rtu() ? wait_for_silence({}) : Result<void>(); }
 
-/// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
-/// then prove the line.
-Result<void> Session::leave_quarantine() {
-  const TimePoint end = clock_->now() + options_.answer_timeout;
-  if (trace_.decision)
-    trace_.decision(Decision::quarantine, "waiting until no late answer can come");
-  const TimePoint limit = end + options_.answer_timeout * 4;  // a line that never falls silent
+/// Waits by receiving, because a frame that is still unread (an answer sent twice) would be taken
+/// for the next answer, and because a shielded transport waits on where the clock is interrupted.
+Result<void> Session::wait_for_silence(TimePoint not_before) {
+  const auto silent = [&] { return std::max(not_before, last_activity_ + options_.gap); };
+  const TimePoint limit = std::max(clock_->now(), silent()) + options_.answer_timeout;
   while (true) {
-    const TimePoint silent = std::max(end, last_activity_ + options_.gap);
-    auto more = fill(silent);
+    auto more = fill(silent());
     if (!more) return tl::unexpected(std::move(more.error()));
-    buffer_.clear();
     if (!*more) break;
+    if (auto sorted = sort_buffered(nullptr); !sorted) return sorted;
     if (clock_->now() > limit) {
       return tl::unexpected(Error{.code = Errc::malformed_answer,
                                   .message = "the line never falls silent",
                                   .hint = "another master, noise or a wrong rate?"});
     }
   }
-  quarantined_ = false;
-  if (options_.proof == SessionOptions::Proof::none) return {};
-  // The word changes with every request, so an old answer can not pass for this one.
-  auto proved = exchange(modbus::loopback_request(next_transaction_));
-  if (!proved) {
-    quarantined_ = true;
-    return tl::unexpected(std::move(proved.error()));
-  }
+  counters_.noise_bytes += buffer_.size();
+  buffer_.clear();
   return {};
+}
+
+/// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
+/// then prove the line.
+Result<void> Session::leave_quarantine() {
+  if (trace_.decision)
+    trace_.decision(Decision::quarantine, "waiting until no late answer can come");
+  if (auto silent = wait_for_silence(*quarantined_until_); !silent) return silent;
+  if (options_.proof == SessionOptions::Proof::loopback) {
+    // The word changes with every request, so an old answer can not pass for this one.
+    auto proved = exchange(modbus::loopback_request(next_transaction_));
+    if (!proved) return tl::unexpected(std::move(proved.error()));
+  }
+  quarantined_until_.reset();
+  return {};
+}
+
+/// Whether the frame has an id that only our own requests have had.
+bool Session::is_late(const modbus::Adu& stray) const {
+  return !is_rtu() && stray.transaction.value >= first_transaction;
 }
 
 Error Session::timeout_error(const Outstanding& outstanding) const {
@@ -248,10 +311,13 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
         fmt::format("the answer to '{}' does not fit the request ({})", tried, outstanding.broken);
     return error;
   }
-  if (buffer_.empty()) return error;
+  if (buffer_.empty()) {
+    if (outstanding.echoes > 0) error.code = Errc::local_echo;
+    return error;
+  }
   error.code = Errc::incomplete_answer;
   error.message = fmt::format("only part of an answer to '{}' came ({})", tried, to_hex(buffer_));
-  if (options_.rules.framing == modbus::Framing::rtu && buffer_.size() >= 5) {
+  if (is_rtu() && buffer_.size() >= whole_answer_size(outstanding.request.pdu, buffer_)) {
     error.code = Errc::bad_checksum;
     error.message =
         fmt::format("no answer to '{}' with a right checksum ({})", tried, to_hex(buffer_));

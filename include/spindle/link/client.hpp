@@ -74,7 +74,7 @@ class Client {
   Result<Registers> read(const RegisterRange& range);
 
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
-  /// bisected, and the registers that do not exist are remembered for later calls. Other exception
+  /// bisected, and what does not exist is remembered and not asked for again. Other exception
   /// responses stand in the image at the registers concerned; anything else ends it at once and is
   /// the result. `progress` hears how many of how many requests of the plan are done.
   Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted,
@@ -96,11 +96,15 @@ class Client {
   Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
   Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image);
   void remember(const PlannedRead& refused, const Error& error, RegisterImage& image);
+  [[nodiscard]] const Error* known_absent(const RegisterRange& range) const;
+  [[nodiscard]] std::set<std::uint32_t> absent_registers() const;
 
   Session* session_;
   ReadLimits limits_;
   unsigned retries_;
-  std::set<std::uint32_t> absent_ = {};
+  /// Ranges that were refused alone with exception 02. Of a refused pair it is not known which half
+  /// is missing.
+  std::map<RegisterRange, Error> absent_ = {};
 };
 
 }  // namespace spindle::link

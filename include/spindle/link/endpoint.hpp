@@ -15,16 +15,16 @@ enum class Parity : std::uint8_t { none, even, odd };
 /// Where a tool is, as the user wrote it (contract, section 2.1). What a URL leaves out is empty
 /// here and filled from the profile later.
 struct Endpoint {
-  std::string text;  ///< the URL as given, for messages and records
+  std::string text = {};  ///< the URL as given, for messages and records
   Medium medium = Medium::tcp;
-  std::string host;  ///< name or address without brackets (tcp, rtu+tcp)
-  std::optional<std::uint16_t> port;
-  std::string device;   ///< path of the serial line (rtu)
-  std::string profile;  ///< profile of a simulated tool (sim)
-  std::optional<modbus::UnitId> unit;
-  std::optional<unsigned> baud;
-  std::optional<Parity> parity;
-  std::optional<unsigned> stop_bits;
+  std::string host = {};  ///< name or address without brackets (tcp, rtu+tcp)
+  std::optional<std::uint16_t> port = std::nullopt;
+  std::string device = {};   ///< path of the serial line (rtu)
+  std::string profile = {};  ///< profile of a simulated tool (sim)
+  std::optional<modbus::UnitId> unit = std::nullopt;
+  std::optional<unsigned> baud = std::nullopt;
+  std::optional<Parity> parity = std::nullopt;
+  std::optional<unsigned> stop_bits = std::nullopt;
 };
 
 /// Whether the text can only be meant as a URL: it begins with "WORD:".
@@ -33,11 +33,11 @@ bool looks_like_url(std::string_view text);
 /// Parses tcp://HOST[:PORT][?unit=N], rtu:///PATH[?unit=&baud=&parity=&stop=],
 /// rtu+tcp://HOST:PORT[?unit=] and sim:PROFILE[?unit=]. IPv6 addresses stand in brackets. Error
 /// `bad_target` names the part that is wrong: unknown scheme (with a suggestion), empty host, port
-/// outside 1…65535, unit outside 0…255 (0…247 on RTU), unknown or repeated option.
+/// outside 1…65535, unit outside 0…255 (0…247 on rtu and rtu+tcp), unknown or repeated option.
 Result<Endpoint> parse_endpoint(std::string_view url);
 
-/// "tcp://HOST:PORT", with brackets around an IPv6 address: a network endpoint whose port has been
-/// filled in, for messages.
+/// "tcp://HOST:PORT" or "rtu+tcp://HOST:PORT", with brackets around an IPv6 address: a network
+/// endpoint whose port has been filled in, for messages.
 std::string to_url(const Endpoint& endpoint);
 
 }  // namespace spindle::link

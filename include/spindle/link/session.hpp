@@ -16,9 +16,10 @@ struct SessionOptions {
   DemuxRules rules = {};
   modbus::UnitId unit = {};
   Duration answer_timeout = std::chrono::seconds(1);
-  /// RTU: silence kept before each request, from the last byte in either direction.
+  /// RTU: silence kept before each request, from the last byte in either direction. What is
+  /// received meanwhile is sorted like any frame that nobody asked for.
   Duration gap = Duration::zero();
-  /// RTU: silence after a broadcast before the next request.
+  /// RTU: silence after a broadcast before the next request; the gap is part of it.
   Duration broadcast_gap = Duration::zero();
   /// RTU: time that one character needs on the line; a lower bound where the port cannot tell when
   /// sending ended.
@@ -53,7 +54,12 @@ class Session {
   /// Sends the request and waits for its answer. An exception response is returned as a PDU, not as
   /// an error. Errors: those of Transport; `no_answer`; `incomplete_answer` (part of a frame);
   /// `malformed_answer` (a frame with our id that is no answer, or a stream without frame
-  /// boundaries); `bad_checksum` (RTU). All within the answer timeout.
+  /// boundaries); `bad_checksum` and `local_echo` (RTU). All within the answer timeout, counted
+  /// from the end of sending.
+  ///
+  /// RTU: after a failure the line is in quarantine. A read then waits until no late answer can
+  /// come any more and the line is proved; only FC 06 and FC 08, whose answers repeat them, go out
+  /// at once.
   Result<modbus::Pdu> transact(const modbus::Pdu& request);
 
   /// RTU: sends to unit 0. Nobody answers, so success means "sent", never "done".
@@ -78,14 +84,20 @@ class Session {
   struct Outstanding;
 
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
-  Result<void> send(const modbus::Adu& adu);
+  Result<modbus::Pdu> send_and_await(Outstanding& outstanding);
+  Result<void> send(const modbus::Adu& adu, ByteView bytes);
   Result<modbus::Pdu> await(Outstanding& outstanding);
   Result<bool> fill(TimePoint deadline);
   Result<std::optional<modbus::Adu>> take_frame();
+  void strip_echo(Outstanding& outstanding);
+  Result<void> sort_buffered(Outstanding* outstanding);
   void sort(const modbus::Adu& received, Outstanding* outstanding);
   void keep(const modbus::Pdu& pdu);
   Result<void> keep_gap();
+  Result<void> wait_for_silence(TimePoint not_before);
   Result<void> leave_quarantine();
+  [[nodiscard]] bool is_rtu() const { return options_.rules.framing == modbus::Framing::rtu; }
+  [[nodiscard]] bool is_late(const modbus::Adu& stray) const;
   Error timeout_error(const Outstanding& outstanding) const;
   void decide(Decision decision, const modbus::Adu& adu) const;
 
@@ -98,7 +110,9 @@ class Session {
   std::deque<Spontaneous> queue_ = {};
   std::uint16_t next_transaction_ = 0x8000;
   TimePoint last_activity_ = {};
-  bool quarantined_ = false;
+  /// RTU: when no answer to an abandoned request can come any more.
+  std::optional<TimePoint> quarantined_until_ = std::nullopt;
+  bool echoing_ = false;  ///< the adapter returns what it sends
   Duration last_round_trip_ = {};
 };
 

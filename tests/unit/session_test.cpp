@@ -1,0 +1,882 @@
+#include "spindle/link/session.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/modbus/crc16.hpp"
+#include "spindle/modbus/pdu.hpp"
+#include "support/scripted_transport.hpp"
+#include "unit/hex.hpp"
+
+using namespace spindle;
+using namespace spindle::link;
+using namespace std::chrono_literals;
+using modbus::Framing;
+using modbus::Pdu;
+using modbus::RegisterTable;
+using spindle::test::answer;
+using spindle::test::Arrival;
+using spindle::test::FakeClock;
+using spindle::test::hex;
+using spindle::test::Reaction;
+using spindle::test::say;
+using spindle::test::Script;
+using spindle::test::silence;
+
+namespace {
+
+constexpr Duration timeout = 1s;
+constexpr Duration gap = 5500us;  // BLV manual: silence up to 19200 baud
+
+// bm-bmt.md, section 9.
+const Bytes pushed_event =
+    hex("0001 0000 001F 00 04 1C 07AA 058D 0001 0834 084F 00EB 0422 018F 05B1 0003 0000 0000 0001 "
+        "0000");
+
+/// The same event with another transaction id and event number.
+Bytes event_frame(std::uint16_t transaction, std::uint16_t number) {
+  Bytes bytes = pushed_event;
+  for (const auto& [at, value] : {std::pair{0U, transaction}, std::pair{9U, number}}) {
+    bytes[at] = static_cast<std::uint8_t>(value >> 8U);
+    bytes[at + 1] = static_cast<std::uint8_t>(value & 0xFFU);
+  }
+  return bytes;
+}
+
+std::uint16_t number_of(const Spontaneous& event) { return get_u16(event.pdu.data, 1); }
+
+Pdu holding(const Registers& values) {
+  return modbus::read_response(RegisterTable::holding, values);
+}
+
+const Pdu read_two = modbus::read_request(RegisterTable::holding, {2}, 2);
+const Pdu two_values = holding({271, 1000});
+const Pdu arm = modbus::write_request(modbus::RegisterAddress{4002}, 1);
+
+Bytes operator+(Bytes head, const Bytes& tail) {
+  head.insert(head.end(), tail.begin(), tail.end());
+  return head;
+}
+
+Bytes part(const Bytes& bytes, std::size_t from, std::size_t to) {
+  return {bytes.begin() + static_cast<std::ptrdiff_t>(from),
+          bytes.begin() + static_cast<std::ptrdiff_t>(to)};
+}
+
+/// A session, its peer and their clock.
+struct Line {
+  explicit Line(SessionOptions options)
+      : session(transport_to(script), clock, std::move(options), trace()) {
+    script.interrupt = &interrupt;
+  }
+
+  Trace trace() {
+    return {.bytes = {}, .decision = [this](Decision decision, std::string_view) {
+              decisions.push_back(decision);
+            }};
+  }
+  [[nodiscard]] Duration elapsed() const { return clock.now() - FakeClock::start; }
+  [[nodiscard]] Duration sent_at(std::size_t index) const {
+    return script.sent.at(index).at - FakeClock::start;
+  }
+  [[nodiscard]] std::size_t count(Decision decision) const {
+    return static_cast<std::size_t>(std::count(decisions.begin(), decisions.end(), decision));
+  }
+  /// What is in the queue or has arrived.
+  std::vector<std::uint16_t> events() {
+    std::vector<std::uint16_t> numbers;
+    while (true) {
+      auto next = session.next_spontaneous(clock.now() + 1ms);
+      if (!next || !*next) return numbers;
+      numbers.push_back(number_of(**next));
+    }
+  }
+
+  Interrupt interrupt;
+  FakeClock clock{interrupt};
+  Script script{clock};
+  std::vector<Decision> decisions = {};
+  Session session;
+};
+
+SessionOptions tcp() {
+  return {.rules = {.framing = Framing::tcp, .spontaneous = {{0x04, 28}}},
+          .unit = {0},
+          .answer_timeout = timeout};
+}
+
+SessionOptions rtu(SessionOptions::Proof proof = SessionOptions::Proof::none) {
+  return {.rules = {.framing = Framing::rtu, .spontaneous = {}},
+          .unit = {1},
+          .answer_timeout = timeout,
+          .gap = gap,
+          .broadcast_gap = 10ms,
+          .proof = proof};
+}
+
+Reaction tcp_answer(Duration after, Pdu pdu) { return answer(Framing::tcp, after, std::move(pdu)); }
+Reaction rtu_answer(Duration after, Pdu pdu) { return answer(Framing::rtu, after, std::move(pdu)); }
+
+Bytes tcp_response(ByteView request, Pdu pdu) {
+  return test::response_to(Framing::tcp, request, std::move(pdu));
+}
+
+Bytes rtu_frame(std::uint8_t unit, Pdu pdu) {
+  return modbus::frame(Framing::rtu, {{}, {unit}, std::move(pdu)});
+}
+
+std::uint16_t transaction_of(const test::Sent& sent) { return get_u16(sent.bytes, 0); }
+
+}  // namespace
+
+// ---- Modbus TCP ----
+
+TEST_CASE("tcp: a request goes out as in the vectors and its answer comes back") {
+  Line line(tcp());
+  // bm-bmt.md, section 9, with the ids that a fresh session uses.
+  line.script.on_request(say(20ms, hex("8000 0000 0007 00 03 04 010F 03E8")));
+  line.script.on_request(say(20ms, hex("8001 0000 0006 01 06 0FA2 0001")));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.session.last_round_trip() == 20ms);
+  CHECK(line.session.transact(arm) == arm);
+  CHECK(line.script.sent[0].bytes == hex("8000 0000 0006 00 03 0002 0002"));
+  CHECK(line.script.sent[1].bytes == hex("8001 0000 0006 00 06 0FA2 0001"));
+  CHECK(line.elapsed() == 40ms);
+  CHECK(line.session.counters().requests == 2);
+}
+
+TEST_CASE("tcp: an exception response is an answer with its code as received") {
+  for (const std::uint8_t code : hex("01 02 07 0C 0E FF")) {
+    Line line(tcp());
+    line.script.on_request(tcp_answer(5ms, modbus::exception_response(0x03, code)));
+    const auto response = line.session.transact(read_two);
+    REQUIRE(response);
+    CHECK(modbus::exception_of(*response) == code);
+  }
+}
+
+TEST_CASE("tcp: ids begin at 8000h, count up, and wrap without ever being small") {
+  Line line(tcp());
+  line.script.otherwise = tcp_answer(0ms, two_values);
+  for (unsigned request = 0; request < 0x8002; ++request) {
+    REQUIRE(line.session.transact(read_two));
+    REQUIRE(transaction_of(line.script.sent.back()) == 0x8000 + request % 0x8000);
+  }
+}
+
+TEST_CASE("tcp: a push around the answer is queued and the answer found, however both are cut") {
+  enum class Order { push_first, answer_first };
+  for (const std::uint16_t push_id : Registers{0x0000, 0x0001, 0x00C7, 0x8000}) {
+    for (const Order order : {Order::push_first, Order::answer_first}) {
+      const Bytes push = event_frame(push_id, 1962);
+      const Bytes response = modbus::frame(Framing::tcp, {{0x8000}, {1}, two_values});
+      const Bytes glued = order == Order::push_first ? push + response : response + push;
+      for (std::size_t cut = 0; cut <= glued.size(); ++cut) {
+        CAPTURE(push_id);
+        CAPTURE(cut);
+        Line line(tcp());
+        line.script.on_request([&](ByteView) {
+          return std::vector<Arrival>{{10ms, part(glued, 0, cut)},
+                                      {11ms, part(glued, cut, glued.size())}};
+        });
+        REQUIRE(line.session.transact(read_two) == two_values);
+        const auto event = line.session.next_spontaneous(line.clock.now() + timeout);
+        REQUIRE(event.value());
+        CHECK(number_of(**event) == 1962);
+        CHECK(line.elapsed() <= 11ms);
+        CHECK(line.session.counters().strays == 0);
+      }
+    }
+  }
+}
+
+TEST_CASE("tcp: pushes and answer byte by byte") {
+  Line line(tcp());
+  line.script.chunk = 1;
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{10ms, event_frame(1, 7) + event_frame(0x8000, 8) +
+                                           tcp_response(request, two_values) + event_frame(2, 9)}};
+  });
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.events() == std::vector<std::uint16_t>{7, 8, 9});
+}
+
+TEST_CASE("tcp: events keep their order and the time of their own arrival") {
+  Line line(tcp());
+  line.script.on_request([](ByteView request) {
+    const Bytes push = event_frame(1, 2);
+    return std::vector<Arrival>{{10ms, event_frame(1, 1)},
+                                {20ms, part(push, 0, 5)},
+                                {30ms, part(push, 5, push.size())},
+                                {40ms, tcp_response(request, two_values) + event_frame(1, 3)}};
+  });
+  REQUIRE(line.session.transact(read_two) == two_values);
+  line.clock.advance(5s);  // nobody asks for a while
+  std::vector<std::pair<std::uint16_t, Duration>> got;
+  while (const auto event = line.session.next_spontaneous(line.clock.now()).value()) {
+    got.emplace_back(number_of(*event), event->arrival - FakeClock::start);
+    CHECK(event->wall - FakeClock::wall_start == event->arrival - FakeClock::start);
+  }
+  CHECK(got == std::vector<std::pair<std::uint16_t, Duration>>{{1, 10ms}, {2, 30ms}, {3, 40ms}});
+  CHECK(line.session.counters().spontaneous == 3);
+}
+
+TEST_CASE("tcp: a queue that nobody empties loses its oldest and counts them") {
+  constexpr std::uint16_t pushed = 5000;
+  Line line(tcp());
+  line.script.on_request([](ByteView request) {
+    Bytes bytes;
+    for (std::uint16_t number = 1; number <= pushed; ++number) {
+      bytes = std::move(bytes) + event_frame(1, number);
+    }
+    return std::vector<Arrival>{{1ms, bytes + tcp_response(request, two_values)}};
+  });
+  REQUIRE(line.session.transact(read_two) == two_values);
+  const auto kept = line.events();
+  const auto& counters = line.session.counters();
+  CHECK(counters.spontaneous == pushed);
+  CHECK(counters.overflowed > 0);
+  CHECK(kept.size() + counters.overflowed == pushed);
+  CHECK(kept.front() == counters.overflowed + 1);
+  CHECK(kept.back() == pushed);
+}
+
+TEST_CASE("tcp: the late answer to an abandoned request is never the next value") {
+  struct Row {
+    std::string_view what;
+    Duration late;  // after the abandoned request
+  };
+  for (const Row& row : {Row{"before the next request", 1100ms}, Row{"while it waits", 1520ms}}) {
+    CAPTURE(row.what);
+    Line line(tcp());
+    line.script.on_request(tcp_answer(row.late, holding({1, 1})));
+    line.script.on_request(tcp_answer(50ms, two_values));
+    const auto abandoned = line.session.transact(read_two);
+    REQUIRE_FALSE(abandoned);
+    CHECK(abandoned.error().code == Errc::no_answer);
+    CHECK(line.elapsed() == timeout);
+    line.clock.advance(500ms);
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.elapsed() == 1550ms);
+    CHECK(line.session.counters().strays == 1);
+    CHECK(line.count(Decision::late) == 1);
+  }
+}
+
+TEST_CASE("tcp: answers to abandoned requests in a row never shift the later ones") {
+  Line line(tcp());
+  for (std::uint16_t request = 0; request < 20; ++request) {
+    // Every third answer comes after its time, in the midst of the next exchanges.
+    const Duration after = request % 3 == 0 ? timeout + 30ms * (request + 1) : 40ms;
+    line.script.on_request(tcp_answer(after, holding({request, request})));
+  }
+  for (std::uint16_t request = 0; request < 20; ++request) {
+    CAPTURE(request);
+    const auto response = line.session.transact(read_two);
+    REQUIRE(response.has_value() == (request % 3 != 0));
+    if (response) CHECK(*response == holding({request, request}));
+  }
+}
+
+TEST_CASE("tcp: what cannot be the answer") {
+  struct Row {
+    std::string_view what;
+    Bytes bytes;
+    Errc code;
+    Duration elapsed;
+    std::uint64_t strays = 0;
+  };
+  const std::vector<Row> rows = {
+      {"nothing", {}, Errc::no_answer, timeout},
+      {"a push only", event_frame(1, 1), Errc::no_answer, timeout},
+      {"another id", hex("0001 0000 0007 00 03 04 010F 03E8"), Errc::no_answer, timeout, 1},
+      {"a foreign function", hex("0005 0000 0006 00 65 0102 0304"), Errc::no_answer, timeout, 1},
+      {"another byte count", hex("8000 0000 0005 00 03 02 010F"), Errc::malformed_answer, timeout,
+       1},
+      {"a byte count that lies", hex("8000 0000 0007 00 03 02 010F 03E8"), Errc::malformed_answer,
+       timeout, 1},
+      {"MBAP length too large by two", hex("8000 0000 0009 00 03 04 010F 03E8 0000"),
+       Errc::malformed_answer, timeout, 1},
+      {"another function with our id", hex("8000 0000 0007 00 04 04 010F 03E8"),
+       Errc::malformed_answer, timeout, 1},
+      {"an exception to another function", hex("8000 0000 0003 00 84 02"), Errc::malformed_answer,
+       timeout, 1},
+      {"half a frame", hex("8000 0000 0007 00 03 04"), Errc::incomplete_answer, timeout},
+      {"one byte", hex("80"), Errc::incomplete_answer, timeout},
+      {"half a push", part(pushed_event, 0, 20), Errc::incomplete_answer, timeout},
+      {"another protocol", hex("8000 0100 0007 00 03 04 010F 03E8"), Errc::malformed_answer, 10ms},
+      {"an impossible length", hex("8000 0000 0000 00 03"), Errc::malformed_answer, 10ms},
+      {"a length beyond every frame", hex("8000 0000 00FF 00 03"), Errc::malformed_answer, 10ms},
+      {"HTTP", hex("48 54 54 50 2F 31 2E 31 20 34 30 30"), Errc::malformed_answer, 10ms},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    Line line(tcp());
+    line.script.on_request(say(10ms, row.bytes));
+    const auto response = line.session.transact(read_two);
+    REQUIRE_FALSE(response);
+    CHECK(response.error().code == row.code);
+    CHECK(response.error().tried == "read 2 holding registers from 2");
+    CHECK(line.elapsed() == row.elapsed);
+    CHECK(line.session.counters().strays == row.strays);
+  }
+}
+
+TEST_CASE("tcp: a protocol id in the low byte and a wrong unit do not spoil an answer") {
+  Line line(tcp());
+  line.script.on_request(say(1ms, hex("8000 0007 0007 4D 03 04 010F 03E8")));
+  CHECK(line.session.transact(read_two) == two_values);
+}
+
+TEST_CASE("tcp: a broken frame does not end the wait for the right one") {
+  Line line(tcp());
+  line.script.on_request(
+      say(10ms, hex("8000 0000 0005 00 03 02 FFFF") + hex("8000 0000 0007 00 03 04 010F 03E8")));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.count(Decision::broken) == 1);
+}
+
+TEST_CASE("tcp: a write is acknowledged only by its own echo") {
+  for (const std::string_view echo : {"8000 0000 0006 00 06 0FA3 0001",     // another register
+                                      "8000 0000 0006 00 06 0FA2 0000"}) {  // another value
+    Line line(tcp());
+    line.script.on_request(say(10ms, hex(echo)));
+    const auto response = line.session.transact(arm);
+    REQUIRE_FALSE(response);
+    CHECK(response.error().code == Errc::malformed_answer);
+    CHECK(message_of(response.error()).find("write register 4002") != std::string::npos);
+  }
+}
+
+TEST_CASE("tcp: the rest of half a frame that comes late is a stray, not the next value") {
+  Line line(tcp());
+  const Bytes late = hex("8000 0000 0007 00 03 04 0001 0001");
+  line.script.on_request([&](ByteView) {
+    return std::vector<Arrival>{{10ms, part(late, 0, 9)},
+                                {timeout + 10ms, part(late, 9, late.size())}};
+  });
+  line.script.on_request(tcp_answer(50ms, two_values));
+  CHECK(line.session.transact(read_two).error().code == Errc::incomplete_answer);
+  CHECK(line.session.transact(read_two) == two_values);
+}
+
+TEST_CASE("tcp: junk behind the answer is no matter of this answer, but of the next") {
+  Line line(tcp());
+  line.script.on_request(say(1ms, hex("8000 0000 0007 00 03 04 010F 03E8") + hex("FFFF FFFF")));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.session.transact(read_two).error().code == Errc::malformed_answer);
+  CHECK(line.session.transact(read_two).error().code == Errc::malformed_answer);
+  CHECK(line.session.next_spontaneous(line.clock.now() + 1s).error().code ==
+        Errc::malformed_answer);
+  CHECK(line.elapsed() == 1ms);
+}
+
+TEST_CASE("tcp: a stream without end does not keep anybody beyond the deadline") {
+  struct Row {
+    std::string_view what;
+    Bytes flood;
+    std::size_t chunk;
+  };
+  const std::vector<Row> rows = {
+      {"whole strays", hex("0005 0000 0006 00 65 0102 0304"), 4096},
+      {"strays byte by byte", hex("0005 0000 0006 00 65 0102 0304"), 1},
+      {"broken frames", hex("8000 0000 0005 00 03 02 010F"), 11},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    Line line(tcp());
+    line.script.flood = row.flood;
+    line.script.chunk = row.chunk;
+    REQUIRE_FALSE(line.session.transact(read_two));
+    CHECK(line.elapsed() >= timeout);
+    CHECK(line.elapsed() <= timeout + line.script.flood_every);
+    const auto begun = line.clock.now();
+    CHECK(line.session.next_spontaneous(begun + 300ms).value() == std::nullopt);
+    CHECK(line.clock.now() - begun <= 300ms + line.script.flood_every);
+  }
+}
+
+TEST_CASE("tcp: pushes without end do not keep a request beyond its deadline either") {
+  Line line(tcp());
+  line.script.flood = pushed_event;
+  CHECK(line.session.transact(read_two).error().code == Errc::no_answer);
+  CHECK(line.elapsed() == timeout);
+  CHECK(line.session.next_spontaneous(line.clock.now()).value());
+}
+
+TEST_CASE("tcp: an answer that is already there when the deadline has passed still counts") {
+  Line line(tcp());
+  // The process did not run between 0.9 s and 1.2 s; push and answer were there at 0.95 s.
+  line.script.on_request([&](ByteView request) {
+    line.clock.at(FakeClock::start + 900ms, [&] { line.clock.advance(300ms); });
+    return std::vector<Arrival>{{900ms, event_frame(1, 1) + tcp_response(request, two_values)}};
+  });
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.elapsed() == 1200ms);
+}
+
+TEST_CASE("tcp: the end of the connection is told as it is") {
+  for (const Errc end : {Errc::closed, Errc::reset}) {
+    Line line(tcp());
+    line.script.on_request([&](ByteView) {
+      return std::vector<Arrival>{{10ms, hex("8000 0000 00")}, {20ms, end}};
+    });
+    const auto response = line.session.transact(read_two);
+    REQUIRE_FALSE(response);
+    CHECK(response.error().code == end);
+    CHECK(response.error().tried == "read 2 holding registers from 2");
+    CHECK(line.elapsed() == 20ms);
+    CHECK(line.session.next_spontaneous(line.clock.now() + 1s).error().code == end);
+  }
+}
+
+TEST_CASE("tcp: an answer in front of the end of the connection counts, and so does an event") {
+  Line line(tcp());
+  line.script.on_request([&](ByteView request) {
+    return std::vector<Arrival>{{10ms, tcp_response(request, two_values) + event_frame(1, 5)},
+                                {10ms, Errc::closed}};
+  });
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(number_of(*line.session.next_spontaneous(line.clock.now()).value()) == 5);
+  CHECK(line.session.next_spontaneous(line.clock.now()).error().code == Errc::closed);
+}
+
+TEST_CASE("tcp: an interrupt ends the wait at once, and a shield lets the last words out") {
+  Line line(tcp());
+  line.clock.at(FakeClock::start + 300ms, [&] { line.interrupt.raise(15); });
+  line.script.on_request(tcp_answer(500ms, two_values));
+  line.script.on_request(tcp_answer(20ms, arm));
+  CHECK(line.session.transact(read_two).error().code == Errc::terminated);
+  CHECK(line.elapsed() == 300ms);
+  CHECK(line.session.transact(arm).error().code == Errc::terminated);
+  line.session.shield();
+  CHECK(line.session.transact(arm) == arm);
+}
+
+TEST_CASE("tcp: next_spontaneous() waits for an event until the deadline and not longer") {
+  Line line(tcp());
+  line.script.arrive(FakeClock::start + 700ms, event_frame(1, 1));
+  line.script.arrive(FakeClock::start + 800ms, event_frame(1, 2));
+  line.script.arrive(FakeClock::start + 2s, hex("8005 0000 0003 00 83 02"));
+
+  CHECK(line.session.next_spontaneous(FakeClock::start + 600ms).value() == std::nullopt);
+  CHECK(line.elapsed() == 600ms);
+  CHECK(number_of(*line.session.next_spontaneous(FakeClock::start + 900ms).value()) == 1);
+  CHECK(line.elapsed() == 700ms);
+  line.clock.advance(500ms);
+  // Already there, though the deadline has passed.
+  CHECK(number_of(*line.session.next_spontaneous(FakeClock::start).value()) == 2);
+  CHECK(line.session.next_spontaneous(FakeClock::start + 3s).value() == std::nullopt);
+  CHECK(line.elapsed() == 3s);
+  CHECK(line.session.counters().strays == 1);
+}
+
+TEST_CASE("tcp: rules that become known later hold from then on") {
+  SessionOptions options = tcp();
+  options.rules.spontaneous.clear();
+  Line line(options);
+  line.script.arrive(FakeClock::start + 1ms, event_frame(1, 1));
+  line.script.arrive(FakeClock::start + 3ms, event_frame(1, 2));
+  CHECK(line.session.next_spontaneous(FakeClock::start + 2ms).value() == std::nullopt);
+  line.session.set_rules(tcp().rules);
+  CHECK(number_of(*line.session.next_spontaneous(FakeClock::start + 4ms).value()) == 2);
+}
+
+TEST_CASE("tcp: nothing is thrown away before a request") {
+  Line line(tcp());
+  line.script.arrive(FakeClock::start, event_frame(1, 1));
+  line.clock.advance(10ms);
+  line.script.on_request(tcp_answer(10ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.events() == std::vector<std::uint16_t>{1});
+}
+
+// ---- Modbus RTU ----
+
+TEST_CASE("rtu: a request goes out as in the manual, and its answer ends with its last byte") {
+  Line line(rtu());
+  line.clock.advance(1s);
+  line.script.on_request(say(20ms, hex("01 03 08 00 00 00 64 00 00 0F A0 E1 97")));  // BLV p.16
+  line.script.on_request(say(20ms, hex("01 83 02 C0 F1")));
+  const auto read_four = modbus::read_request(RegisterTable::holding, {0x0480}, 4);
+  CHECK(line.session.transact(read_four) == holding({0, 100, 0, 4000}));
+  CHECK(line.script.sent[0].bytes == hex("01 03 04 80 00 04 44 D1"));
+  CHECK(line.session.last_round_trip() == 20ms);
+  CHECK(line.session.transact(read_four) == modbus::exception_response(0x03, 2));
+}
+
+TEST_CASE("rtu: the gap is kept from the last byte in either direction, no longer") {
+  Line line(rtu());
+  line.script.sending_takes = 9ms;
+  line.script.on_request(rtu_answer(20ms, two_values));
+  line.script.on_request(rtu_answer(20ms, two_values));
+  line.script.on_request(rtu_answer(20ms, two_values));
+  REQUIRE(line.session.transact(read_two));
+  CHECK(line.sent_at(0) == 0ms);  // the line was silent before
+  CHECK(line.elapsed() == 29ms);  // complete without waiting for silence
+  REQUIRE(line.session.transact(read_two));
+  CHECK(line.sent_at(1) == 29ms + gap);
+  line.clock.advance(1s);
+  const Duration later = line.elapsed();
+  REQUIRE(line.session.transact(read_two));
+  CHECK(line.sent_at(2) == later);  // silent for long enough already
+
+  Line broadcasting(rtu());
+  broadcasting.script.sending_takes = 9ms;
+  REQUIRE(broadcasting.session.broadcast(arm));
+  CHECK(broadcasting.elapsed() == 9ms);  // nobody answers, so nobody is waited for
+  CHECK(broadcasting.script.sent[0].bytes == rtu_frame(0, arm));
+  broadcasting.script.on_request(rtu_answer(20ms, two_values));
+  REQUIRE(broadcasting.session.transact(read_two));
+  CHECK(broadcasting.sent_at(1) == 19ms);  // the pause from the last byte sent
+}
+
+TEST_CASE("rtu: other units' traffic while nobody asks moves the gap") {
+  Line line(rtu());
+  line.script.arrive(FakeClock::start + 100ms, rtu_frame(7, two_values));
+  line.script.arrive(FakeClock::start + 104ms, rtu_frame(7, two_values) + hex("FF FF"));
+  line.clock.advance(103ms);
+  line.script.on_request(rtu_answer(20ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(0) == 104ms + gap);
+  CHECK(line.session.counters().strays == 2);
+  CHECK(line.session.counters().noise_bytes == 2);
+}
+
+TEST_CASE("rtu: the answer time begins when the last byte has left") {
+  struct Row {
+    std::string_view what;
+    Duration sending_takes;
+    Duration character_time;
+    Duration deadline;
+  };
+  // 8 characters of 1.146 ms: 9600 baud, 11 bits.
+  for (const Row& row : {Row{"the port waits until all is sent", 9168us, 0us, timeout + 9168us},
+                         Row{"the port returns at once", 0us, 1146us, timeout + 9168us},
+                         Row{"both", 9168us, 1146us, timeout + 9168us},
+                         Row{"the port takes longer", 20ms, 1146us, timeout + 20ms}}) {
+    CAPTURE(row.what);
+    SessionOptions options = rtu();
+    options.character_time = row.character_time;
+    Line line(options);
+    line.script.sending_takes = row.sending_takes;
+    CHECK(line.session.transact(read_two).error().code == Errc::no_answer);
+    CHECK(line.elapsed() == row.deadline);
+  }
+}
+
+TEST_CASE("rtu: noise and other units are skipped while the timer runs") {
+  struct Row {
+    std::string_view what;
+    Bytes before;
+    std::uint64_t strays;
+    std::uint64_t noise;
+  };
+  const std::vector<Row> rows = {
+      {"a noise byte", hex("FF"), 0, 1},
+      {"noise that begins like the answer", hex("01 03"), 0, 2},
+      {"zeros", Bytes(40, 0), 0, 40},
+      {"more noise than a frame can have", Bytes(700, 0xFF), 0, 700},
+      {"another unit's answer", rtu_frame(2, holding({1, 1})), 1, 0},
+      {"another unit's answer behind noise", hex("00") + rtu_frame(2, holding({1, 1})), 1, 1},
+      {"our unit's answer to another function", rtu_frame(1, arm), 1, 0},
+      {"a frame with a wrong checksum", hex("01 03 04 0001 0001 0000"), 0, 9},
+  };
+  for (const Row& row : rows) {
+    for (const std::size_t chunk : {std::size_t{4096}, std::size_t{1}}) {
+      CAPTURE(row.what);
+      CAPTURE(chunk);
+      Line line(rtu());
+      line.script.chunk = chunk;
+      line.script.on_request(say(20ms, row.before + rtu_frame(1, two_values)));
+      CHECK(line.session.transact(read_two) == two_values);
+      CHECK(line.session.counters().strays == row.strays);
+      CHECK(line.session.counters().noise_bytes == row.noise);
+    }
+  }
+}
+
+TEST_CASE("rtu: what cannot be the answer") {
+  struct Row {
+    std::string_view what;
+    Bytes bytes;
+    Errc code;
+  };
+  const Bytes good = rtu_frame(1, two_values);
+  Bytes flipped = good;
+  flipped.back() ^= 0x01U;
+  Bytes bad_exception = rtu_frame(1, modbus::exception_response(0x03, 2));
+  bad_exception[2] = 3;
+  const std::vector<Row> rows = {
+      {"nothing", {}, Errc::no_answer},
+      {"one bit of the checksum", flipped, Errc::bad_checksum},
+      {"an exception with a wrong checksum", bad_exception, Errc::bad_checksum},
+      {"half an answer", part(good, 0, 6), Errc::incomplete_answer},
+      {"all but the last byte", part(good, 0, good.size() - 1), Errc::incomplete_answer},
+      {"a byte", hex("01"), Errc::incomplete_answer},
+      {"another unit only", rtu_frame(2, two_values), Errc::no_answer},
+      {"another count", rtu_frame(1, holding({1})), Errc::malformed_answer},
+      {"the echo of the request only", hex("01 03 0002 0002 65CB"), Errc::local_echo},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    Line line(rtu());
+    line.script.on_request(say(20ms, row.bytes));
+    const auto response = line.session.transact(read_two);
+    REQUIRE_FALSE(response);
+    CHECK(response.error().code == row.code);
+    CHECK(response.error().tried == "read 2 holding registers from 2");
+    CHECK(line.elapsed() == timeout);
+  }
+}
+
+TEST_CASE("rtu: after a failure the line is silent for one more answer time and proved by FC 08") {
+  struct Row {
+    std::string_view what;
+    Reaction reaction;
+    Errc code;
+  };
+  Bytes flipped = rtu_frame(1, two_values);
+  flipped.back() ^= 0x01U;
+  const std::vector<Row> rows = {
+      {"no answer", silence(), Errc::no_answer},
+      {"bad checksum", say(20ms, flipped), Errc::bad_checksum},
+      {"a late answer", rtu_answer(timeout + 400ms, holding({1, 1})), Errc::no_answer},
+      {"a late answer in pieces",
+       [](ByteView) {
+         const Bytes late = rtu_frame(1, holding({1, 1}));
+         return std::vector<Arrival>{{timeout + 399ms, part(late, 0, 4)},
+                                     {timeout + 401ms, part(late, 4, late.size())}};
+       },
+       Errc::no_answer},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    Line line(rtu(SessionOptions::Proof::loopback));
+    line.script.on_request(row.reaction);
+    line.script.on_request([](ByteView request) {  // FC 08 repeats its request
+      return std::vector<Arrival>{{15ms, Bytes(request.begin(), request.end())}};
+    });
+    line.script.on_request(rtu_answer(15ms, two_values));
+    CHECK(line.session.transact(read_two).error().code == row.code);
+    CHECK(line.elapsed() == timeout);
+    CHECK(line.session.transact(read_two) == two_values);
+    REQUIRE(line.script.sent.size() == 3);
+    CHECK(line.sent_at(1) == 2 * timeout);
+    CHECK(line.script.sent[1].bytes[1] == 0x08);
+    CHECK(line.sent_at(2) == 2 * timeout + 15ms + gap);
+    CHECK(line.count(Decision::quarantine) == 1);
+
+    line.script.on_request(rtu_answer(15ms, two_values));  // and then all is as before
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.script.sent.size() == 4);
+  }
+}
+
+TEST_CASE("rtu: bytes at the end of the quarantine prolong it until the line is silent") {
+  Line line(rtu());
+  line.script.on_request(say(2 * timeout - 1ms, rtu_frame(1, holding({1, 1}))));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK_FALSE(line.session.transact(read_two));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(1) == 2 * timeout - 1ms + gap);
+}
+
+TEST_CASE("rtu: the time until the next request is part of the quarantine") {
+  Line line(rtu());
+  line.script.on_request(silence());
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK_FALSE(line.session.transact(read_two));
+  line.clock.advance(10s);
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(1) == timeout + 10s);
+}
+
+TEST_CASE("rtu: a line that is not proved stays in quarantine") {
+  struct Row {
+    std::string_view what;
+    Reaction proof;
+    Errc code;
+  };
+  const std::vector<Row> rows = {
+      {"another word", rtu_answer(15ms, modbus::loopback_request(0x0BAD)), Errc::malformed_answer},
+      {"the answer to an older read", rtu_answer(15ms, holding({1, 1})), Errc::no_answer},
+      {"silence", silence(), Errc::no_answer},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    Line line(rtu(SessionOptions::Proof::loopback));
+    line.script.on_request(silence());
+    line.script.on_request(row.proof);
+    line.script.on_request(row.proof);
+    CHECK_FALSE(line.session.transact(read_two));
+    CHECK(line.session.transact(read_two).error().code == row.code);
+    CHECK(line.session.transact(read_two).error().code == row.code);
+    REQUIRE(line.script.sent.size() == 3);
+    // The read itself never went out, and every word is another.
+    CHECK(line.script.sent[1].bytes[1] == 0x08);
+    CHECK(line.script.sent[2].bytes[1] == 0x08);
+    CHECK(line.script.sent[1].bytes != line.script.sent[2].bytes);
+    CHECK(line.sent_at(2) >= line.sent_at(1) + 2 * timeout);
+  }
+}
+
+TEST_CASE("rtu: a device that refuses FC 08 has answered it all the same") {
+  Line line(rtu(SessionOptions::Proof::loopback));
+  line.script.on_request(silence());
+  line.script.on_request(rtu_answer(15ms, modbus::exception_response(0x08, 1)));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK_FALSE(line.session.transact(read_two));
+  CHECK(line.session.transact(read_two) == two_values);
+}
+
+TEST_CASE("rtu: late answers never shift later reads") {
+  for (const auto proof : {SessionOptions::Proof::none, SessionOptions::Proof::loopback}) {
+    for (const Duration late : {1ms, 100ms, 500ms, 999ms}) {
+      CAPTURE(late.count());
+      Line line(rtu(proof));
+      std::uint16_t reads = 0;
+      line.script.otherwise = [&](ByteView request) {
+        const modbus::Adu adu = test::request_of(Framing::rtu, request);
+        if (adu.pdu.function == 0x08)
+          return std::vector<Arrival>{{15ms, Bytes(request.begin(), request.end())}};
+        const Duration after = reads % 3 == 1 ? timeout + late : Duration(15ms);
+        const std::uint16_t value = reads++;
+        return std::vector<Arrival>{{after, rtu_frame(1, holding({value, value}))}};
+      };
+      for (std::uint16_t read = 0; read < 12; ++read) {
+        const auto response = line.session.transact(read_two);
+        REQUIRE(response.has_value() == (read % 3 != 1));
+        if (response) CHECK(*response == holding({read, read}));
+      }
+    }
+  }
+}
+
+TEST_CASE("rtu: an answer that comes twice is not the next value") {
+  for (const Duration again : {Duration(0ms), Duration(2ms), Duration(6ms)}) {
+    CAPTURE(again.count());
+    Line line(rtu());
+    line.script.on_request([&](ByteView) {
+      const Bytes frame = rtu_frame(1, holding({1, 1}));
+      return std::vector<Arrival>{{15ms, frame}, {15ms + again, frame}};
+    });
+    line.script.on_request(rtu_answer(15ms, two_values));
+    CHECK(line.session.transact(read_two) == holding({1, 1}));
+    if (again > gap) line.clock.advance(again);
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.sent_at(1) >= 15ms + again + gap);
+  }
+}
+
+TEST_CASE("rtu: a stop does not wait for the end of a quarantine, and does not end it") {
+  const Pdu stop = modbus::write_request(modbus::RegisterAddress{0x007D}, 0);
+  Line line(rtu());
+  line.script.on_request(rtu_answer(timeout + 10ms, holding({1, 1})));
+  line.script.on_request(rtu_answer(15ms, stop));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK_FALSE(line.session.transact(read_two));
+  CHECK(line.session.transact(stop) == stop);  // in spite of the late answer in between
+  CHECK(line.sent_at(1) == timeout);
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(2) == 2 * timeout);
+}
+
+TEST_CASE("rtu: an interrupted read is abandoned, the shielded stop goes out with its gap") {
+  const Pdu stop = modbus::write_request(modbus::RegisterAddress{0x007D}, 0);
+  Line line(rtu());
+  line.clock.at(FakeClock::start + 10ms, [&] { line.interrupt.raise(2); });
+  line.script.on_request(rtu_answer(12ms, holding({1, 1})));
+  line.script.on_request(rtu_answer(15ms, stop));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(line.session.transact(read_two).error().code == Errc::interrupted);
+  CHECK(line.session.transact(stop).error().code == Errc::interrupted);
+  CHECK(line.elapsed() == 10ms);
+  line.session.shield();
+  line.script.arrive(FakeClock::start + 11ms, hex("00"));
+  CHECK(line.session.transact(stop) == stop);
+  CHECK(line.sent_at(1) == 10ms);
+  CHECK(line.session.transact(read_two) == two_values);  // not the answer that came at 12 ms
+}
+
+TEST_CASE("rtu: the adapter's echo of the request is told from the answer") {
+  Line line(rtu());
+  bool present = true;
+  line.script.otherwise = [&](ByteView request) {
+    const Bytes echo(request.begin(), request.end());
+    const bool write = request[1] == 0x06;
+    std::vector<Arrival> arrivals = {{1ms, part(echo, 0, 3)}, {2ms, part(echo, 3, echo.size())}};
+    if (present) arrivals.push_back({20ms, write ? echo : rtu_frame(1, two_values)});
+    return arrivals;
+  };
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.session.last_round_trip() == 20ms);
+  CHECK(line.session.transact(arm) == arm);
+  CHECK(line.session.last_round_trip() == 20ms);  // the answer, not the echo
+  CHECK(line.session.counters().noise_bytes == 0);
+  present = false;
+  CHECK(line.session.transact(arm).error().code == Errc::local_echo);
+  CHECK(line.session.transact(read_two).error().code == Errc::local_echo);
+}
+
+TEST_CASE("rtu: without an echo a write's only answer is its answer") {
+  Line line(rtu());
+  line.script.on_request(rtu_answer(15ms, two_values));
+  line.script.on_request(rtu_answer(15ms, arm));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.session.transact(arm) == arm);
+}
+
+TEST_CASE("rtu: a line that never falls silent keeps nobody for ever") {
+  struct Row {
+    std::string_view what;
+    Bytes flood;
+  };
+  Bytes hopeful;  // every second byte might begin a frame of 245 bytes
+  while (hopeful.size() < 300) hopeful = std::move(hopeful) + hex("03 F0");
+  const std::vector<Row> rows = {{"noise", Bytes(520, 0xFF)},
+                                 {"noise like frames", hopeful},
+                                 {"other units", rtu_frame(9, two_values)}};
+  for (const Row& row : rows) {
+    for (const std::size_t chunk : {std::size_t{4096}, std::size_t{1}}) {
+      CAPTURE(row.what);
+      CAPTURE(chunk);
+      Line busy(rtu());
+      busy.script.flood = row.flood;
+      busy.script.chunk = chunk;
+      const auto before_sending = busy.session.transact(read_two);
+      REQUIRE_FALSE(before_sending);
+      CHECK(message_of(before_sending.error()) == "the line never falls silent");
+      CHECK(busy.script.sent.empty());
+      CHECK(busy.elapsed() <= timeout + gap + 2 * busy.script.flood_every);
+
+      Line line(rtu());
+      line.script.chunk = chunk;
+      line.script.on_request([&](ByteView) {
+        line.script.flood = row.flood;
+        return std::vector<Arrival>();
+      });
+      REQUIRE_FALSE(line.session.transact(read_two));
+      CHECK(line.elapsed() <= timeout + 2 * line.script.flood_every);
+      const auto in_quarantine = line.session.transact(read_two);
+      CHECK(message_of(in_quarantine.error()) == "the line never falls silent");
+      CHECK(line.elapsed() <= 3 * timeout + 3 * line.script.flood_every);
+      CHECK(line.script.sent.size() == 1);
+    }
+  }
+}
+
+TEST_CASE("rtu: spontaneous frames are kept while the gap is waited for") {
+  SessionOptions options = rtu();
+  options.rules.spontaneous = {{0x04, 28}};
+  Line line(options);
+  const Pdu push = {0x04, part(pushed_event, 8, pushed_event.size())};
+  line.script.arrive(FakeClock::start, rtu_frame(1, push));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.events() == std::vector<std::uint16_t>{1962});
+}
