@@ -74,6 +74,47 @@ std::size_t distance(std::string_view a, std::string_view b) {
   return previous[b.size()];
 }
 
+/// Length of the dotted head that both texts share: "preset.1." of "preset.1.speed".
+std::size_t shared_head(std::string_view a, std::string_view b) {
+  std::size_t head = 0;
+  for (std::size_t at = 0; at < a.size() && at < b.size() && a[at] == b[at]; ++at) {
+    if (a[at] == '.') head = at + 1;
+  }
+  return head;
+}
+
+std::size_t whole_distance(std::string_view word, std::string_view candidate) {
+  return distance(word, candidate);
+}
+
+/// Distance to the nearest of the candidate's hyphenated parts: "torqe" is near "target-torque".
+std::size_t part_distance(std::string_view word, std::string_view candidate) {
+  std::size_t nearest = candidate.size() + word.size();
+  for (const std::string_view part : split(candidate, '-')) {
+    nearest = std::min(nearest, distance(word, part));
+  }
+  return nearest;
+}
+
+/// The first of the nearest candidates that is near enough. What both names share up to a dot says
+/// nothing about how near the rest is.
+template <typename Distance>
+const std::string* nearest_by(std::string_view word, const std::vector<std::string>& candidates,
+                              Distance distance_of) {
+  const std::string* nearest = nullptr;
+  std::size_t best = word.size();
+  for (const std::string& candidate : candidates) {
+    const std::size_t head = shared_head(word, candidate);
+    const std::string_view rest = word.substr(head);
+    const std::size_t far = distance_of(rest, std::string_view(candidate).substr(head));
+    if (far > std::max<std::size_t>(1, rest.size() / 3)) continue;
+    if (nearest != nullptr && far >= best) continue;
+    nearest = &candidate;
+    best = far;
+  }
+  return nearest;
+}
+
 }  // namespace
 
 bool glob_match(std::string_view pattern, std::string_view text) {
@@ -103,17 +144,9 @@ bool is_pattern(std::string_view text) {
 
 std::optional<std::string> closest(std::string_view word,
                                    const std::vector<std::string>& candidates) {
-  const std::string* nearest = nullptr;
-  std::size_t limit = std::max<std::size_t>(1, word.size() / 3) + 1;
-  for (const std::string& candidate : candidates) {
-    const std::size_t far = distance(word, candidate);
-    if (far < limit) {
-      nearest = &candidate;
-      limit = far;
-    }
-  }
-  if (nearest == nullptr) return std::nullopt;
-  return *nearest;
+  if (const std::string* nearest = nearest_by(word, candidates, whole_distance)) return *nearest;
+  if (const std::string* nearest = nearest_by(word, candidates, part_distance)) return *nearest;
+  return std::nullopt;
 }
 
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {

@@ -466,6 +466,8 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
   }
   if (const YamlNode* node = map.get("values")) read_simulated_values(*node, facts, findings);
   if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
+  assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
+  assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
   assign(facts.absent, read_areas(map.get("absent"), findings));
   map.finish();
   return facts;

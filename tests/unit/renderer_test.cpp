@@ -329,7 +329,7 @@ TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is sh
   for (const Row& row : rows) CHECK(csv_cell(row.text) == "f\r\n" + row.field + "\r\n");
 }
 
-TEST_CASE("CSV: shown texts, the target, and a header only when the columns change") {
+TEST_CASE("CSV: cells as they are, the target, and a header only when the columns change") {
   Caught caught;
   const auto renderer = make_renderer(Format::csv, caught.streams, Talk::normal);
   const std::vector<Column> columns = {{"TARGET", "target"}, {"F", "f"}};
@@ -342,7 +342,24 @@ TEST_CASE("CSV: shown texts, the target, and a header only when the columns chan
     REQUIRE(renderer->end());
   }
   REQUIRE(renderer->begin(std::vector<Column>{{"F", "f"}}));
-  CHECK(caught.out() == "target,f\r\nstation3,0.1 ms\r\nstation3,0.1 ms\r\nf\r\n");
+  CHECK(caught.out() == "target,f\r\nstation3,0.1\r\nstation3,0.1\r\nf\r\n");
+}
+
+TEST_CASE("a line stands for itself at once, a note is for people only") {
+  const Record record = one_field(Decimal(1));
+  for (const Format format : {Format::table, Format::csv, Format::json}) {
+    Caught caught;
+    const auto renderer = make_renderer(format, caught.streams, Talk::normal);
+    REQUIRE(renderer->line(record, "tcp://127.0.0.1:5000"));
+    const bool json = format == Format::json;
+    CHECK(caught.out().starts_with(json ? "{\"schema\"" : "tcp://127.0.0.1:5000\n"));
+    renderer->note("mind the gap");
+    CHECK(caught.err() == "mind the gap\n");
+
+    Caught hushed;
+    make_renderer(format, hushed.streams, Talk::quiet)->note("mind the gap");
+    CHECK(hushed.err().empty());
+  }
 }
 
 TEST_CASE("a summary is a line on stdout for JSON, and a sentence on stderr for people") {

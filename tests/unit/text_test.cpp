@@ -99,6 +99,16 @@ TEST_CASE("a misspelt word finds its neighbour") {
   CHECK_FALSE(closest("word", {}));
 }
 
+TEST_CASE("a misspelt dotted name is compared behind the head that both share") {
+  const std::vector<std::string> names = {"preset.1.mode", "preset.1.target-torque",
+                                          "preset.1.torque-limit", "preset.2.mode"};
+  CHECK(closest("preset.1.mdoe", names) == "preset.1.mode");
+  CHECK(closest("preset.1.torqe", names) == "preset.1.target-torque");
+  CHECK(closest("preset.1.limti", names) == "preset.1.torque-limit");
+  CHECK(closest("prest.2.mode", names) == "preset.2.mode");
+  CHECK_FALSE(closest("preset.1.wxyz", names));
+}
+
 TEST_CASE("unsigned numbers are read completely or not at all") {
   struct Case {
     std::string_view text;

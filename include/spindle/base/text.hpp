@@ -16,7 +16,8 @@ bool glob_match(std::string_view pattern, std::string_view text);
 bool is_pattern(std::string_view text);
 
 /// The candidate nearest to a misspelt word by Damerau-Levenshtein distance, when it is near enough
-/// to be worth suggesting (distance at most a third of the word's length, at least 1). The first of
+/// to be worth suggesting: at most a third of the word's length (at least 1), counted behind the
+/// dotted head that both share. Failing that, one with a hyphenated part as near. The first of
 /// equals.
 std::optional<std::string> closest(std::string_view word,
                                    const std::vector<std::string>& candidates);
