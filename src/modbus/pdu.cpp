@@ -183,6 +183,7 @@ Pdu write_multiple_response(RegisterAddress first, std::uint16_t count) {
 
 Pdu report_server_id_response(ByteView data) {
   Pdu pdu = words_pdu(FunctionCode::report_server_id, {});
+  pdu.data.reserve(1 + data.size());
   pdu.data.push_back(static_cast<std::uint8_t>(data.size()));
   pdu.data.insert(pdu.data.end(), data.begin(), data.end());
   return pdu;
