@@ -351,14 +351,14 @@ TEST_CASE("a line stands for itself at once, a note is for people only") {
     Caught caught;
     const auto renderer = make_renderer(format, caught.streams, Talk::normal);
     REQUIRE(renderer->line(record, "tcp://127.0.0.1:5000"));
-    const bool json = format == Format::json;
-    CHECK(caught.out().starts_with(json ? "{\"schema\"" : "tcp://127.0.0.1:5000\n"));
+    const bool is_json = format == Format::json;
+    CHECK(caught.out().starts_with(is_json ? "{\"schema\"" : "tcp://127.0.0.1:5000\n"));
     renderer->note("mind the gap");
-    CHECK(caught.err() == "mind the gap\n");
+    CHECK(caught.err == "mind the gap\n");
 
     Caught hushed;
     make_renderer(format, hushed.streams, Talk::quiet)->note("mind the gap");
-    CHECK(hushed.err().empty());
+    CHECK(hushed.err.empty());
   }
 }
 
