@@ -11,7 +11,7 @@ build_packages=(
 test_packages=(
   doctest-dev
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
-  python3-pymodbus mbpoll tshark socat
+  python3-pymodbus python3-serial-asyncio mbpoll tshark socat
 )
 
 # Prints those of the named packages that are not installed, one a line.
