@@ -37,18 +37,14 @@ constexpr std::array statuses = {
 
 constexpr std::array errors = {
     ErrcInfo{Errc::negative, ExitStatus::negative, "done, and the answer is no", ""},
-    ErrcInfo{Errc::usage, ExitStatus::usage, "the request is wrong",
-             "see 'spindle COMMAND --help'"},
+    ErrcInfo{Errc::usage, ExitStatus::usage, "the request is wrong", ""},
     ErrcInfo{Errc::unknown_name, ExitStatus::usage, "unknown name",
              "'spindle list' shows the names that the profile knows"},
-    ErrcInfo{Errc::bad_value, ExitStatus::usage, "the value does not fit its type",
-             "'spindle list' shows type, labels and unit"},
-    ErrcInfo{Errc::out_of_range, ExitStatus::usage, "the value is outside the range",
-             "'spindle list' shows the range"},
+    ErrcInfo{Errc::bad_value, ExitStatus::usage, "the value does not fit its type", ""},
+    ErrcInfo{Errc::out_of_range, ExitStatus::usage, "the value is outside the range", ""},
     ErrcInfo{Errc::read_only, ExitStatus::usage, "read-only, it cannot be written",
              "'spindle list' shows what can be written"},
-    ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed",
-             "answer the question, or give --yes"},
+    ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed", ""},
     ErrcInfo{Errc::unverified, ExitStatus::usage,
              "nobody has verified this action on this product, nothing was sent",
              "check it on the tool, then give --accept-unverified or list it under 'verified' in "
@@ -98,7 +94,7 @@ constexpr std::array errors = {
     ErrcInfo{Errc::mismatch, ExitStatus::mismatch, "differs from what was expected", ""},
     ErrcInfo{Errc::wrong_generation, ExitStatus::mismatch,
              "the tool is of another generation than this profile",
-             "its registers mean other things: only raw registers can be read"},
+             "only raw registers such as @holding:2 can be read"},
     ErrcInfo{Errc::wrong_model, ExitStatus::mismatch, "the tool is another model than expected",
              "check the target, or give the profile that fits"},
     ErrcInfo{Errc::partial, ExitStatus::partial, "some of it failed", ""},
@@ -139,6 +135,12 @@ std::string expand(std::string_view sentence, const Error& error) {
   return text;
 }
 
+std::string place_of(const Error& error) {
+  if (error.endpoint.empty()) return error.target;
+  const bool is_url = error.target.find("://") != std::string::npos;
+  return is_url ? error.endpoint : fmt::format("{} ({})", error.target, error.endpoint);
+}
+
 }  // namespace
 
 std::span<const StatusInfo> status_table() { return statuses; }
@@ -162,7 +164,8 @@ std::string hint_of(const Error& error) {
 
 std::string describe(const Error& error) {
   std::string text;
-  for (const std::string* part : {&error.target, &error.name}) {
+  const std::string place = place_of(error);
+  for (const std::string* part : {&place, &error.name}) {
     if (!part->empty()) text += *part + ": ";
   }
   text += message_of(error);

@@ -100,15 +100,45 @@ bool leaves_open(const Error& error) {
          error.code == Errc::bad_checksum;
 }
 
+bool is_interruption(const Error& error) {
+  return error.code == Errc::interrupted || error.code == Errc::terminated;
+}
+
+/// The tool acknowledged a deed, and only the proof is missing: a refused reading must not look
+/// like a refused write.
+Error without_proof(Error reading) {
+  if (is_interruption(reading)) return reading;
+  reading.message =
+      fmt::format("the tool acknowledged it, but reading it back failed: {}", message_of(reading));
+  if (reading.code == Errc::exception_response) reading.code = Errc::mismatch;
+  return reading;
+}
+
+/// Nobody knows what became of a write without an answer that can not be read back either.
+Error without_knowledge(Error write) {
+  if (!is_interruption(write)) write.hint = "whether it was written is not known: read it again";
+  return write;
+}
+
+std::string target_of(const link::Endpoint& endpoint, const LinkOptions& options) {
+  return options.shown.empty() ? endpoint.text : options.shown;
+}
+
+/// The address behind a tool's name; empty where the name is the address.
+std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& options) {
+  return options.shown.empty() || options.shown == endpoint.text ? std::string() : endpoint.text;
+}
+
 }  // namespace
 
-Device::Device(std::string target, const catalogue::Profile& profile,
-               std::unique_ptr<link::Session> session, unsigned retries)
-    : target_(std::move(target)),
+Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
+               const LinkOptions& options, std::unique_ptr<link::Session> session)
+    : target_(target_of(endpoint, options)),
+      endpoint_(endpoint_beside(endpoint, options)),
       profile_(&profile),
       session_(std::move(session)),
-      retries_(retries),
-      client_(*session_, read_limits(*profile_), retries) {}
+      retries_(options.retries.value_or(profile.link.retries)),
+      client_(*session_, read_limits(*profile_), retries_) {}
 
 Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                             const LinkOptions& options, const OpenTransport& open_transport,
@@ -117,18 +147,19 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
   auto transport = open_transport(endpoint, profile.link, connect_timeout);
   if (!transport) {
     Error error = std::move(transport.error());
-    error.target = endpoint.text;
+    error.target = target_of(endpoint, options);
+    error.endpoint = endpoint_beside(endpoint, options);
     return tl::unexpected(std::move(error));
   }
   auto session = std::make_unique<link::Session>(
       std::move(*transport), clock, session_options(profile, endpoint, options), options.trace);
-  const unsigned retries = options.retries.value_or(profile.link.retries);
-  return Device(endpoint.text, profile, std::move(session), retries);
+  return Device(endpoint, profile, options, std::move(session));
 }
 
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
   error.target = target_;
+  error.endpoint = endpoint_;
   return error;
 }
 
@@ -166,7 +197,7 @@ Result<void> Device::require_known_registers() {
   const auto generation = catalogue::generation_of(facts, identity);
   registers_known_ = generation == catalogue::Generation::known;
   if (registers_known_) return {};
-  Error error{.code = Errc::wrong_generation, .target = target_};
+  Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
   error.message =
       generation == catalogue::Generation::later
           ? fmt::format("firmware {} has other registers than profile {} (below {})",
@@ -257,7 +288,10 @@ Result<Written> Device::write(const Parameter& parameter, const Value& before, c
     sent = send_write(parameter, *registers);
     now = read_value(parameter);
   }
-  if (!now) return tl::unexpected(sent ? std::move(now.error()) : std::move(sent.error()));
+  if (!now) {
+    return tl::unexpected(sent ? without_proof(std::move(now.error()))
+                               : without_knowledge(std::move(sent.error())));
+  }
   if (*now == value) return Written{WriteResult::written, *now};
   if (!sent) return tl::unexpected(std::move(sent.error()));
   return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
@@ -282,8 +316,11 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint1
   Clock& clock = session_->clock();
   const TimePoint deadline = clock.now() + session_->options().answer_timeout;
   while (true) {
-    const auto now = read_value(confirming);
-    if (!now) return tl::unexpected(now.error());
+    auto now = read_value(confirming);
+    if (!now) {
+      now.error().name = action.name;
+      return tl::unexpected(without_proof(std::move(now.error())));
+    }
     if (*now == expected) return ActionResult::confirmed;
     const TimePoint next = clock.now() + confirm_interval;
     if (next > deadline) return ActionResult::not_confirmed;

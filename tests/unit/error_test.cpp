@@ -132,6 +132,23 @@ TEST_CASE("a description leaves out what is empty") {
         "t: n: bad; h");
 }
 
+TEST_CASE("a named tool is told with its address, a URL only once") {
+  Error error{.code = Errc::bad_file,
+              .message = "bad",
+              .target = "station3",
+              .endpoint = "tcp://192.168.10.23:5000"};
+  CHECK(describe(error) == "station3 (tcp://192.168.10.23:5000): bad");
+  error.target = "tcp://192.168.10.23";
+  CHECK(describe(error) == "tcp://192.168.10.23:5000: bad");
+}
+
+TEST_CASE("a refused value brings no hint beside its own words") {
+  for (const Errc code : {Errc::bad_value, Errc::out_of_range, Errc::usage}) {
+    CHECK(describe({.code = code, .message = "9.99 is above 6.00", .name = "p2"}) ==
+          "p2: 9.99 is above 6.00");
+  }
+}
+
 TEST_CASE("foreign text can break neither the line nor the terminal") {
   CHECK(describe({.code = Errc::bad_file, .message = "a\nb\x1b[31mc\x7f\xC3\xA9"}) ==
         "a b [31mc \xC3\xA9");

@@ -89,11 +89,12 @@ const ErrcInfo& info(Errc code);
 /// The one error type. Carries what was tried; `describe()` is the only place that makes it text.
 struct Error {
   Errc code = Errc::internal;
-  std::string message = {};  ///< lower case, one line, no full stop; empty: the table's text
-  std::string hint = {};     ///< what would help; empty: the table's hint
-  std::string target = {};   ///< endpoint or tool as the user knows it
-  std::string name = {};     ///< parameter, action, option or file that it is about
-  std::string tried = {};    ///< operation under way, such as "report server id"
+  std::string message = {};   ///< lower case, one line, no full stop; empty: the table's text
+  std::string hint = {};      ///< what would help; empty: the table's hint
+  std::string target = {};    ///< tool as the user named it
+  std::string endpoint = {};  ///< where the target is, when that is not its name; empty: the same
+  std::string name = {};      ///< parameter, action, option or file that it is about
+  std::string tried = {};     ///< operation under way, such as "report server id"
   std::optional<std::chrono::nanoseconds> waited = std::nullopt;
   std::optional<std::uint16_t> register_address = std::nullopt;
   std::optional<std::uint8_t> exception = std::nullopt;  ///< exception code as received
@@ -110,7 +111,8 @@ std::string message_of(const Error& error);
 /// The next step: the error's own or its table row's; may be empty.
 std::string hint_of(const Error& error);
 
-/// "target: name: message; hint", one line, as printed on stderr behind "spindle: ".
+/// "target (endpoint): name: message; hint", one line, as printed on stderr behind "spindle: ". A
+/// target that is a URL itself is not told beside its endpoint.
 std::string describe(const Error& error);
 
 }  // namespace spindle

@@ -25,6 +25,7 @@ struct LinkOptions {
   std::optional<Duration> connect_timeout = std::nullopt;
   std::optional<unsigned> retries = std::nullopt;  ///< of reads
   link::Trace trace = {};
+  std::string shown = {};  ///< how errors name the tool; empty: by its endpoint's text
 };
 
 /// One parameter as read. `registers` and `value` hold the same error when it could not be.
@@ -62,7 +63,7 @@ enum class ActionResult : std::uint8_t {
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
 class Device {
  public:
-  /// Connects. `profile` must outlive the device. Errors carry the endpoint's text as target, here
+  /// Connects. `profile` must outlive the device. Errors name the tool and its endpoint, here
   /// and in every other function.
   static Result<Device> open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                              const LinkOptions& options, const OpenTransport& open_transport,
@@ -100,8 +101,8 @@ class Device {
   Result<Duration> ping();
 
  private:
-  Device(std::string target, const catalogue::Profile& profile,
-         std::unique_ptr<link::Session> session, unsigned retries);
+  Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
+         const LinkOptions& options, std::unique_ptr<link::Session> session);
 
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
@@ -111,6 +112,7 @@ class Device {
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
 
   std::string target_;
+  std::string endpoint_;  ///< empty: the target says it
   const catalogue::Profile* profile_;
   std::unique_ptr<link::Session> session_;
   unsigned retries_;
