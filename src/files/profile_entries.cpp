@@ -51,6 +51,7 @@ struct Template {
   std::uint64_t stride = 0;
   std::optional<Evidence> repeats = std::nullopt;  ///< evidence of all but the first
   bool repeated = false;
+  Origin origin = {};
 };
 
 std::vector<Label> read_labels(const YamlNode& map, Findings& findings) {
@@ -187,39 +188,52 @@ void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draf
   }
 }
 
-void repeat(const Template& entry, const Origin& origin, ProfileDraft& draft, Findings& findings) {
-  const std::uint64_t first = entry.parameter.address.value;
-  for (std::uint64_t n = entry.numbers.from; n <= entry.numbers.to; ++n) {
-    const std::uint64_t address = first + (n - entry.numbers.from) * entry.stride;
-    if (address > last_register || draft.profile.parameters.size() >= most_parameters) {
-      findings.add_once(
-          origin.of("n"),
-          address > last_register
-              ? fmt::format("repetition {} would be at register {}, behind the last", n, address)
-              : fmt::format("more than {} parameters", most_parameters));
-      return;
-    }
-    Parameter parameter = entry.parameter;
-    parameter.name = substitute(std::move(parameter.name), n);
-    parameter.title = substitute(std::move(parameter.title), n);
-    parameter.address = {static_cast<std::uint16_t>(address)};
-    if (n != entry.numbers.from) assign(parameter.evidence, std::optional(entry.repeats));
-    add_parameter(std::move(parameter), origin, draft, findings);
+/// Adds repetition `step` (from 0) of an entry. False when there is none, or no room for it.
+bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& draft,
+                    Findings& findings) {
+  const std::uint64_t n = entry.numbers.from + step;
+  if (n > entry.numbers.to) return false;
+  const std::uint64_t address = entry.parameter.address.value + step * entry.stride;
+  if (address > last_register || draft.profile.parameters.size() >= most_parameters) {
+    findings.add_once(
+        entry.origin.of("n"),
+        address > last_register
+            ? fmt::format("repetition {} would be at register {}, behind the last", n, address)
+            : fmt::format("more than {} parameters", most_parameters));
+    return false;
+  }
+  Parameter parameter = entry.parameter;
+  parameter.name = substitute(std::move(parameter.name), n);
+  parameter.title = substitute(std::move(parameter.title), n);
+  parameter.address = {static_cast<std::uint16_t>(address)};
+  if (step != 0) assign(parameter.evidence, std::optional(entry.repeats));
+  add_parameter(std::move(parameter), entry.origin, draft, findings);
+  return true;
+}
+
+bool add_step(const Template& entry, std::uint64_t step, ProfileDraft& draft, Findings& findings) {
+  if (entry.repeated) return add_repetition(entry, step, draft, findings);
+  if (step == 0) add_parameter(entry.parameter, entry.origin, draft, findings);
+  return false;
+}
+
+/// The fields of the first repetition, then those of the second: one preset stands together.
+void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Findings& findings) {
+  bool any = true;
+  for (std::uint64_t step = 0; any; ++step) {
+    any = false;
+    for (const Template& entry : entries) any |= add_step(entry, step, draft, findings);
   }
 }
 
-void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft,
-                Findings& findings) {
+void read_entry(const YamlNode& node, const YamlNode* group, std::size_t layer,
+                std::vector<Template>& entries, Findings& findings) {
   YamlMap map(node, findings, group);
-  Origin origin{.entry = &node, .group = group, .layer = draft.layers};
+  Origin origin{.entry = &node, .group = group, .layer = layer};
   Template entry = read_template(map, group, origin.overlaps);
   map.finish();
-  if (entry.parameter.name.empty()) return;
-  if (entry.repeated) {
-    repeat(entry, origin, draft, findings);
-  } else {
-    add_parameter(std::move(entry.parameter), origin, draft, findings);
-  }
+  entry.origin = origin;
+  if (!entry.parameter.name.empty()) entries.push_back(std::move(entry));
 }
 
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
@@ -232,7 +246,11 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
   }
   group.finish();
   expect(fields, YamlNode::Kind::sequence, findings);
-  for (const YamlNode& field : fields.items) read_entry(field, &node, draft, findings);
+  std::vector<Template> entries;
+  for (const YamlNode& field : fields.items) {
+    read_entry(field, &node, draft.layers, entries, findings);
+  }
+  add_entries(entries, draft, findings);
 }
 
 void read_given_value(YamlMap& map, Action& action) {
@@ -307,7 +325,9 @@ void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findin
     if (const YamlNode* fields = node.find("fields")) {
       read_group(node, *fields, draft, findings);
     } else {
-      read_entry(node, nullptr, draft, findings);
+      std::vector<Template> entries;
+      read_entry(node, nullptr, draft.layers, entries, findings);
+      add_entries(entries, draft, findings);
     }
   }
 }
