@@ -89,7 +89,7 @@ Result<void> check_evidence(const Action& action, const Target& target, Acceptan
   return tl::unexpected(Error{
       .code = Errc::unverified,
       .message = fmt::format(
-          "that register {} is '{}' on this tool is not certain: evidence {} ({})",
+          "it is not certain that register {} is '{}' on this tool: evidence {} ({})",
           action.address.value, action.name, catalogue::to_text(action.evidence), action.source),
       .hint = fmt::format("{}; then add --accept-unverified, or list it under 'verified' in the "
                           "tools file",
@@ -159,13 +159,13 @@ report::Record deed_record(const Deed& deed, device::ActionResult result, const 
 }
 
 Error not_confirmed(const Deed& deed, const Target& target) {
-  return {.code = Errc::mismatch,
-          .message = fmt::format("the tool acknowledged it, but {} does not show the effect",
-                                 deed.action.confirm),
-          .hint = "is the tool running or locked? its register may also mean something else here",
-          .target = target.endpoint.text,
-          .name = deed.action.name,
-          .register_address = deed.action.address.value};
+  return target.blamed(
+      {.code = Errc::mismatch,
+       .message = fmt::format("the tool acknowledged it, but {} does not show the effect",
+                              deed.action.confirm),
+       .hint = "is the tool running or locked? its register may also mean something else here",
+       .name = deed.action.name,
+       .register_address = deed.action.address.value});
 }
 
 Result<Outcome> list_actions(const Target& target, Context& context) {
@@ -182,7 +182,14 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
     listing.add(action_record(action, target.shown, context.clock));
     outcome.succeed();
   }
-  return finish(listing, outcome);
+  return listing.end()
+      .and_then([&] {
+        return context.renderer.summary(
+            summary_record({{"actions", number(static_cast<std::int64_t>(outcome.succeeded()))}},
+                           outcome.status(), target.shown, context.clock),
+            fmt::format("{} actions", outcome.succeeded()));
+      })
+      .map([&] { return outcome; });
 }
 
 /// Carries the deeds out in order and stops at the first that fails: later ones may rest on it.

@@ -61,10 +61,19 @@ report::Record identity_record(const OpenTool& tool, const Identification& found
 
 std::optional<Error> misfit_of(const Target& target, const Identification& found) {
   if (target.profile.empty() || !found.candidates.empty()) return std::nullopt;
-  return Error{.code = Errc::mismatch,
-               .message = fmt::format("this is not what profile {} describes: {}", target.profile,
-                                      fmt::join(found.identity.notes, "; ")),
-               .target = target.endpoint.text};
+  return target.blamed(
+      {.code = Errc::mismatch,
+       .message = fmt::format("this is not what profile {} describes: {}", target.profile,
+                              fmt::join(found.identity.notes, "; "))});
+}
+
+/// The table has no room for notes, so people get them as sentences.
+void tell_notes(const Identified& identified, const Context& context) {
+  if (identified.misfit) return;  // its message says them
+  const report::Field* notes = identified.record.find("notes");
+  for (const std::string& note : std::get<report::Texts>(notes->cell)) {
+    context.renderer.note(fmt::format("{}: {}", identified.record.target, note));
+  }
 }
 
 Result<Identified> identify_one(const Target& target, const Context& context) {
@@ -92,7 +101,10 @@ Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
   Outcome outcome;
   Listing listing(context, columns);
   for (const Result<Identified>& result : results) {
-    if (result) listing.add(result->record);
+    if (result) {
+      listing.add(result->record);
+      tell_notes(*result, context);
+    }
     const std::optional<Error> error = result ? result->misfit : result.error();
     if (error) {
       outcome.fail(*error);

@@ -13,6 +13,15 @@ struct Subject {
   std::vector<std::string> patterns;
 };
 
+/// A torque in the tool's own unit, where the tools file says which that is.
+catalogue::Profile with_units_of(const Target& target, catalogue::Profile profile) {
+  if (target.torque_unit.empty()) return profile;
+  for (catalogue::Parameter& parameter : profile.parameters) {
+    parameter.unit = unit_of(parameter, target);
+  }
+  return profile;
+}
+
 /// Without a tool there is nothing to ask: the profile's own words.
 Result<Subject> offline(const ListOptions& options, const Context& context) {
   auto profile = context.profiles.load(context.common.profile);
@@ -27,11 +36,12 @@ Result<Subject> of_target(const ListOptions& options, const Context& context) {
   if (!target->profile.empty()) {
     auto profile = context.profiles.load(target->profile);
     if (!profile) return tl::unexpected(std::move(profile.error()));
-    return Subject{target->shown, std::move(*profile), std::move(patterns)};
+    return Subject{target->shown, with_units_of(*target, std::move(*profile)), std::move(patterns)};
   }
   auto tool = open_tool(*target, catalogue::Profile(), Need::named_registers, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
-  return Subject{target->shown, tool->device.profile(), std::move(patterns)};
+  return Subject{target->shown, with_units_of(*target, tool->device.profile()),
+                 std::move(patterns)};
 }
 
 Result<Subject> subject_of(const ListOptions& options, const Context& context) {

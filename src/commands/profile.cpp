@@ -89,7 +89,10 @@ Result<Outcome> profile_check(const ProfileNameOptions& options, Context& contex
   for (const files::Finding& finding : *findings) {
     listing.add(finding_record(finding, context.clock));
   }
-  if (findings->empty()) return finish(listing, outcome);
+  if (findings->empty()) {
+    context.renderer.note(fmt::format("{}: no faults", options.profile));
+    return finish(listing, outcome);
+  }
   if (auto ended = listing.end(); !ended) return tl::unexpected(std::move(ended.error()));
   return tl::unexpected(Error{.code = Errc::bad_file,
                               .message = fmt::format("{} fault{} in this profile", findings->size(),

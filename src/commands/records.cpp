@@ -162,7 +162,7 @@ report::Record action_record(const catalogue::Action& action, const std::string&
           .fields = {{"action", action.name},
                      {"title", action.title},
                      {"register", number(action.address.value)},
-                     {"value", values_of(action)},
+                     {"values", values_of(action)},
                      {"hazard", std::string(hazard_text(action.hazard))},
                      {"evidence", std::string(catalogue::to_text(action.evidence))},
                      {"source", action.source},
@@ -173,7 +173,7 @@ report::Record action_record(const catalogue::Action& action, const std::string&
 std::span<const Column> action_columns() {
   static const std::array<Column, 7> columns = {{{"ACTION", "action"},
                                                  {"REGISTER", "register", Align::right},
-                                                 {"VALUE", "value"},
+                                                 {"VALUES", "values"},
                                                  {"HAZARD", "hazard"},
                                                  {"EVIDENCE", "evidence"},
                                                  {"SOURCE", "source"},

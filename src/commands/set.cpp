@@ -45,19 +45,34 @@ std::string_view to_text(Ending ending) {
   return "";
 }
 
+/// Why a parameter can not be written. A raw register says what it belongs to instead.
+Error not_writable(const Parameter& parameter, const Profile& profile) {
+  Error error{
+      .code = Errc::read_only, .name = parameter.name, .register_address = parameter.address.value};
+  if (!parameter.name.starts_with('@') || parameter.table == modbus::RegisterTable::input) {
+    return error;
+  }
+  error.message = "this register is no parameter that can be written";
+  for (const catalogue::Action& action : profile.actions) {
+    if (action.address != parameter.address) continue;
+    error.message =
+        fmt::format("this is the register of action '{}', not of a parameter", action.name);
+    error.hint = "'spindle do' runs actions";
+  }
+  return error;
+}
+
 Result<Assignment> parse_assignment(const std::string& text, const Profile& profile) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
-                                .hint = "such as preset.1.target-torque=2.71"});
+                                .hint = "write it like preset.1.target-torque=2.71"});
   }
   auto parameter = profile.find(text.substr(0, equals));
   if (!parameter) return tl::unexpected(std::move(parameter.error()));
   if (parameter->access == catalogue::Access::read_only) {
-    return tl::unexpected(Error{.code = Errc::read_only,
-                                .name = parameter->name,
-                                .register_address = parameter->address.value});
+    return tl::unexpected(not_writable(*parameter, profile));
   }
   auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
   if (!value) {
@@ -144,11 +159,17 @@ Result<std::vector<Step>> check_against_tool(const std::vector<Assignment>& assi
   return steps;
 }
 
-const std::array<Column, 5> columns = {{{"NAME", "name"},
-                                        {"OLD", "old", Align::right},
-                                        {"NEW", "new", Align::right},
-                                        {"UNIT", "unit"},
-                                        {"RESULT", "result"}}};
+const std::array<Column, 5> plan_columns = {{{"NAME", "name"},
+                                             {"OLD", "old", Align::right},
+                                             {"NEW", "new", Align::right},
+                                             {"UNIT", "unit"},
+                                             {"CHANGES", "changes"}}};
+
+const std::array<Column, 5> write_columns = {{{"NAME", "name"},
+                                              {"OLD", "old", Align::right},
+                                              {"NEW", "new", Align::right},
+                                              {"UNIT", "unit"},
+                                              {"RESULT", "result"}}};
 
 report::Record step_record(const Step& step, Ending ending, const Value& now, const Target& target,
                            const Clock& clock) {
@@ -163,7 +184,7 @@ report::Record step_record(const Step& step, Ending ending, const Value& now, co
                    {"new", now.number, now.to_string()},
                    {"unit", text_or_null(unit_of(parameter, target))}};
   if (ending == Ending::planned) {
-    record.fields.push_back({"changes", step.changes()});
+    record.fields.push_back({"changes", step.changes(), step.changes() ? "yes" : "no"});
   } else {
     record.fields.push_back({"result", std::string(to_text(ending))});
   }
@@ -173,21 +194,22 @@ report::Record step_record(const Step& step, Ending ending, const Value& now, co
 Error not_stored(const Step& step, const device::Written& written, const Target& target) {
   const std::string asked = step.assignment->value.to_string();
   const std::string holds = written.now.to_string();
-  return {.code = Errc::mismatch,
-          .message = written.result == device::WriteResult::mismatch
-                         ? fmt::format("the tool acknowledged {} but still holds {}", asked, holds)
-                         : fmt::format("the tool acknowledged {} but now holds {}", asked, holds),
-          .hint = "is the tool running, locked, or set to refuse changes?",
-          .target = target.endpoint.text,
-          .name = step.assignment->parameter.name,
-          .register_address = step.assignment->parameter.address.value};
+  const std::string_view how = written.result == device::WriteResult::mismatch ? "still" : "now";
+  return target.blamed(
+      {.code = Errc::mismatch,
+       .message = fmt::format("the tool acknowledged {} but {} holds {}", asked, how, holds),
+       .hint = "is the tool running, locked, or set to refuse changes?",
+       .name = step.assignment->parameter.name,
+       .register_address = step.assignment->parameter.address.value});
 }
 
 /// Carries out one plan, and stops at the first write that fails.
 class Writer {
  public:
-  Writer(OpenTool& tool, Context& context)
-      : tool_(&tool), context_(&context), listing_(context, columns) {}
+  Writer(OpenTool& tool, Execution execution, Context& context)
+      : tool_(&tool),
+        context_(&context),
+        listing_(context, execution == Execution::dry_run ? plan_columns : write_columns) {}
 
   Result<Outcome> plan(const std::vector<Step>& steps) {
     for (const Step& step : steps) {
@@ -195,7 +217,8 @@ class Writer {
       step.changes() ? ++changed_ : ++unchanged_;
       outcome_.succeed();
     }
-    return end(fmt::format("{} to write, {} unchanged; nothing was written (dry run)", changed_,
+    return end({{"planned", count(changed_)}, {"unchanged", count(unchanged_)}},
+               fmt::format("{} to write, {} unchanged; nothing was written (dry run)", changed_,
                            unchanged_));
   }
 
@@ -209,10 +232,18 @@ class Writer {
     if (outcome_.failed() > 0) {
       sentence += fmt::format(", {} failed, {} not tried", outcome_.failed(), left);
     }
-    return end(sentence);
+    return end({{"written", count(changed_)},
+                {"unchanged", count(unchanged_)},
+                {"failed", count(outcome_.failed())},
+                {"not_tried", count(left)}},
+               sentence);
   }
 
  private:
+  static report::Cell count(std::size_t things) {
+    return number(static_cast<std::int64_t>(things));
+  }
+
   void note(const Step& step, Ending ending, const Value& now) {
     listing_.add(step_record(step, ending, now, tool_->target, context_->clock));
   }
@@ -249,15 +280,12 @@ class Writer {
     fail(not_stored(step, *written, tool_->target));
   }
 
-  Result<Outcome> end(const std::string& sentence) {
+  Result<Outcome> end(std::vector<report::Field> counts, const std::string& sentence) {
     auto drawn = listing_.end();
     if (drawn) {
-      drawn = context_->renderer.summary(
-          summary_record({{"written", number(static_cast<std::int64_t>(changed_))},
-                          {"unchanged", number(static_cast<std::int64_t>(unchanged_))},
-                          {"failed", number(static_cast<std::int64_t>(outcome_.failed()))}},
-                         outcome_.status(), tool_->target.shown, context_->clock),
-          sentence);
+      drawn = context_->renderer.summary(summary_record(std::move(counts), outcome_.status(),
+                                                        tool_->target.shown, context_->clock),
+                                         sentence);
     }
     return drawn.map([&] { return outcome_; });
   }
@@ -281,7 +309,7 @@ Result<Outcome> set(const SetOptions& options, Context& context) {
   if (!opened) return tl::unexpected(std::move(opened.error()));
   const auto steps = check_against_tool(opened->prepared, opened->tool.device);
   if (!steps) return tl::unexpected(steps.error());
-  Writer writer(opened->tool, context);
+  Writer writer(opened->tool, options.execution, context);
   return options.execution == Execution::dry_run ? writer.plan(*steps) : writer.write(*steps);
 }
 

@@ -25,7 +25,7 @@ Error unknown_target(const std::string& text, const files::Tools& tools) {
   std::string hint = suggestion(text, known);
   if (hint.empty()) {
     hint = tools.path.empty()
-               ? "no tools file was found, so a target is a URL: tcp://HOST, sim:doga-bm, …"
+               ? "no tools file was found, so a target is a URL: tcp://HOST or sim:doga-bm"
                : fmt::format("name a tool of {}, or a URL such as tcp://HOST", tools.path);
   }
   return {.code = Errc::unknown_name,
@@ -68,32 +68,44 @@ device::LinkOptions link_options(const Target& target, const Context& context) {
   return {.answer_timeout = context.common.timeout,
           .connect_timeout = context.common.connect_timeout,
           .retries = context.common.retries,
-          .trace = make_trace(target.shown, context)};
+          .trace = make_trace(target.shown, context),
+          .shown = target.shown};
 }
 
-Error no_profile(const Target& target, std::string why) {
-  return {.code = Errc::usage,
+/// A tool that could say what it is, but fits nothing that is known.
+Error unknown_product(Errc code, std::string why) {
+  return {.code = code,
           .message = std::move(why),
-          .hint =
-              "name the profile with --profile or in the tools file; 'spindle profile list' "
-              "shows all",
-          .target = target.endpoint.text};
+          .hint = "only raw registers such as @holding:2 can be read"};
+}
+
+/// The bytes with which a tool whose profile was not named says what it is.
+Result<Bytes> ask_identity(OpenTool& tool) {
+  if (tool.target.endpoint.medium != link::Medium::tcp) {
+    return tl::unexpected(tool.target.blamed(
+        {.code = Errc::usage,
+         .message = "a tool on a serial line can not prove what it is",
+         .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
+                 "shows all"}));
+  }
+  auto answer = tool.device.report_server_id();
+  if (answer || answer.error().code != Errc::exception_response) return answer;
+  return tl::unexpected(tool.target.blamed(unknown_product(
+      Errc::mismatch, fmt::format("no profile can be found: {}", message_of(answer.error())))));
 }
 
 /// A tool whose profile was not named: ask it, and go on with what its answer fits.
 Result<void> find_profile(OpenTool& tool, const Context& context) {
-  if (tool.target.endpoint.medium != link::Medium::tcp) {
-    return tl::unexpected(
-        no_profile(tool.target, "a tool on a serial line can not prove what it is"));
-  }
-  auto answer = tool.device.report_server_id();
+  auto answer = ask_identity(tool);
   if (!answer) return tl::unexpected(std::move(answer.error()));
   auto identification = match_identity(*answer, {}, context);
   if (!identification) return tl::unexpected(std::move(identification.error()));
   if (identification->candidates.empty()) {
-    return tl::unexpected(
-        no_profile(tool.target, fmt::format("no profile fits what the tool says of itself ({})",
-                                            fmt::join(identification->identity.notes, "; "))));
+    const bool later = identification->generation == catalogue::Generation::later;
+    return tl::unexpected(tool.target.blamed(
+        unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
+                        fmt::format("no profile fits what the tool says of itself: {}",
+                                    fmt::join(identification->identity.notes, "; ")))));
   }
   // Products that their answer does not tell apart share the register map of their common base.
   auto profile = context.profiles.load(identification->candidates.front());
@@ -101,6 +113,21 @@ Result<void> find_profile(OpenTool& tool, const Context& context) {
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*profile));
   tool.device.use(*tool.profile);
   return {};
+}
+
+/// The port that was tried is nobody's choice when neither URL nor profile names one.
+std::string other_port_hint(const Context& context) {
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto profile = context.profiles.load(entry.id);
+    if (!profile || profile->link.port == catalogue::LinkFacts().port) continue;
+    return fmt::format("no port is named, and {} tools listen on port {}: add :{} or --profile {}",
+                       profile->series, profile->link.port, profile->link.port, profile->id);
+  }
+  return {};
+}
+
+bool is_wrong_port(const Error& error) {
+  return error.code == Errc::connection_refused || error.code == Errc::connect_timeout;
 }
 
 /// What one profile makes of an answer.
@@ -148,17 +175,21 @@ const Match* best_of(const std::vector<Match>& matches) {
 /// Why a product of a known maker fits none of the profiles that were asked.
 std::string misfit_of(const Match& match) {
   if (match.generation == catalogue::Generation::later) {
-    return fmt::format(
-        "firmware {} has another register map than {} (below {}): only raw "
-        "registers can be read",
-        match.identity.firmware.value_or(0), match.profile.id,
-        match.profile.identity->firmware_below);
+    return fmt::format("firmware {} has another register map than {} (below {})",
+                       match.identity.firmware.value_or(0), match.profile.id,
+                       match.profile.identity->firmware_below);
   }
   return fmt::format("the serial number is that of a {}, not of a {}",
                      match.identity.product_profile, match.profile.id);
 }
 
 }  // namespace
+
+Error Target::blamed(Error error) const {
+  error.target = shown;
+  if (endpoint.text != shown) error.endpoint = endpoint.text;
+  return error;
+}
 
 bool is_target(std::string_view text, const Context& context) {
   if (link::looks_like_url(text) || find_tool(context.tools, text) != nullptr) return true;
@@ -200,17 +231,31 @@ Result<catalogue::Profile> load_profile(const Target& target, const Context& con
   return context.profiles.load(target.profile);
 }
 
-Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context) {
-  const device::OpenTransport open = with_simulated_tools(context);
-  Target resolved = target;
-  if (resolved.endpoint.medium == link::Medium::tcp && !resolved.endpoint.port) {
-    resolved.endpoint.port = profile.link.port;
-    resolved.endpoint.text = link::to_url(resolved.endpoint);
+link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& profile) {
+  if (endpoint.medium != link::Medium::tcp || endpoint.port) return endpoint;
+  endpoint.port = profile.link.port;
+  endpoint.text = link::to_url(endpoint);
+  return endpoint;
+}
+
+Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
+                                      const Context& context) {
+  auto device = device::Device::open(with_port(target.endpoint, profile), profile,
+                                     link_options(target, context), with_simulated_tools(context),
+                                     context.clock);
+  const bool guessed = target.profile.empty() && !target.endpoint.port;
+  if (!device && guessed && is_wrong_port(device.error())) {
+    device.error().hint = other_port_hint(context);
   }
+  return device;
+}
+
+Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context) {
   auto kept = std::make_unique<const catalogue::Profile>(std::move(profile));
-  auto device = device::Device::open(resolved.endpoint, *kept, link_options(resolved, context),
-                                     open, context.clock);
+  auto device = connect_device(target, *kept, context);
   if (!device) return tl::unexpected(std::move(device.error()));
+  Target resolved = target;
+  resolved.endpoint = with_port(resolved.endpoint, *kept);
   return OpenTool{std::move(resolved), std::move(kept), std::move(*device)};
 }
 
@@ -242,6 +287,7 @@ Result<Identification> match_identity(ByteView answer, const std::string& only,
     result.identity.notes.emplace_back("this is not the identity of any known product");
     return result;
   }
+  result.generation = best->generation;
   result.maker = best->profile.maker;
   result.identity = best->identity;
   if (result.candidates.empty()) result.identity.notes.push_back(misfit_of(*best));

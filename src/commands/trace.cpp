@@ -35,7 +35,8 @@ std::string_view to_text(link::Decision decision) {
 
 link::Trace make_trace(const std::string& target, const Context& context) {
   if (context.common.verbosity == Verbosity::normal) return {};
-  const auto line = [&context, target](const std::string& text) {
+  const auto line = [&context, target](std::string text) {
+    text.erase(text.find_last_not_of(' ') + 1);
     context.io.err(fmt::format("{} {} {}\n", report::to_text(context.clock.wall()), target, text));
   };
   return {.bytes =

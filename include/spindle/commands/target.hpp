@@ -19,6 +19,9 @@ struct Target {
   std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
   std::string torque_unit = {};  ///< of the tools file; empty: unknown
   std::vector<std::string> verified = {};
+
+  /// The error as one of this tool, with its address beside its name.
+  [[nodiscard]] Error blamed(Error error) const;
 };
 
 /// A target that was connected.
@@ -44,7 +47,11 @@ enum class Need : std::uint8_t { named_registers, raw_registers };
 /// The target's profile, or an empty one where none is known before connecting.
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context);
 
-/// Connects, and asks nothing.
+/// Connects with a profile that outlives the device, and asks nothing.
+Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
+                                      const Context& context);
+
+/// The same with a profile to keep.
 Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context);
 
 /// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
@@ -82,6 +89,8 @@ auto open_prepared(const Target& target, Need need, const Context& context, Prep
 /// What the answer to FC 11h fits.
 struct Identification {
   catalogue::Identity identity;
+  /// `known` when a profile fits, `later` when only the firmware does not.
+  catalogue::Generation generation = catalogue::Generation::unknown;
   std::string profile = {};                  ///< empty: unknown, or several fit
   std::vector<std::string> candidates = {};  ///< all that fit
   std::string maker = {};
