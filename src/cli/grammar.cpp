@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <map>
 #include <utility>
@@ -43,6 +44,8 @@ struct Words {
   std::string_view synopsis;  ///< behind the command's name
   std::string_view meaning;
   std::string_view examples;  ///< one a line
+  /// What stands behind the command's options, with its own heading; may be absent.
+  std::string (*appendix)() = nullptr;
 };
 
 /// The grammar while it is being parsed: the innermost command that was named.
@@ -52,6 +55,8 @@ struct Draft {
   const CLI::App* chosen = nullptr;
   Run run;
 };
+
+constexpr std::string_view end_of_options = "--";
 
 Error usage(std::string message, std::string hint = {}) {
   return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
@@ -115,22 +120,26 @@ CLI::Option* option(CLI::App* app, const std::string& names, std::string& into,
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
+void flag(CLI::App* app, const std::string& names, bool& into, const std::string& meaning) {
+  app->add_flag(names, into, meaning)->disable_flag_override();
+}
+
 void add_common_options(CLI::App& app, Typed& typed) {
   option(&app, "-o,--output", typed.output, "FORMAT", "table, json (JSON Lines) or csv");
-  app.add_flag("--json", typed.json, "the same as -o json");
+  flag(&app, "--json", typed.json, "the same as -o json");
   option(&app, "--profile", typed.profile, "NAME|FILE", "what the tool's registers mean");
   option(&app, "--tools", typed.tools, "FILE", "file of named tools");
   option(&app, "--timeout", typed.timeout, "DURATION", "how long to wait for one answer");
   option(&app, "--connect-timeout", typed.connect_timeout, "DURATION",
          "how long to wait for the connection");
   option(&app, "--retries", typed.retries, "N", "how often a read without an answer is repeated");
-  app.add_flag("-y,--yes", typed.yes, "answer every question with yes");
-  app.add_flag("--no-input", typed.no_input, "never ask; what would have to be asked is refused");
-  app.add_flag("-q,--quiet", typed.quiet, "no summary and no notes on stderr");
-  app.add_flag("-v,--verbose", typed.verbose, "every frame and decision on stderr");
+  flag(&app, "-y,--yes", typed.yes, "answer every question with yes");
+  flag(&app, "--no-input", typed.no_input, "never ask; what would have to be asked is refused");
+  flag(&app, "-q,--quiet", typed.quiet, "no summary and no notes on stderr");
+  flag(&app, "-v,--verbose", typed.verbose, "every frame and decision on stderr");
   option(&app, "--color", typed.color, "WHEN", "auto, always or never");
-  app.add_flag("-h,--help", typed.help, "show this help");
-  app.add_flag("--version", typed.version, "show the version");
+  flag(&app, "-h,--help", typed.help, "show this help");
+  flag(&app, "--version", typed.version, "show the version");
 }
 
 /// Adds a command whose options struct CLI11 fills while `make_run` turns it into the deed. The
@@ -212,7 +221,8 @@ void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
   add_command(app, draft, words, typed.list, commands::list)
-      ->add_option("ARGUMENT", typed.list.arguments, "target (optional), then names or patterns");
+      ->add_option("PATTERN", typed.list.arguments,
+                   "names or patterns; a tool name or URL may stand before them");
 }
 
 void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -231,7 +241,7 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
   CLI::App* command = add_command(app, draft, words, typed.get, run);
   command->add_option("TARGET", typed.get.options.target, "tool name or URL");
   command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
-  command->add_flag("--limits", typed.get.limits, "also read the tool's own minimum and maximum");
+  flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
 }
 
 void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -251,7 +261,7 @@ void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
   CLI::App* command = add_command(app, draft, words, typed.set, run);
   command->add_option("TARGET", typed.set.options.target, "tool name or URL");
   command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
-  command->add_flag("--dry-run", typed.set.dry_run, "check and show everything, write nothing");
+  flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
 }
 
 void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -270,8 +280,8 @@ void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_option("TARGET", typed.perform.options.target, "tool name or URL");
   command->add_option("ACTION", typed.perform.options.actions,
                       "actions, with =VALUE where they take one");
-  command->add_flag("--accept-unverified", typed.perform.accept_unverified,
-                    "send what may move or lock the tool although its register is not certain");
+  flag(command, "--accept-unverified", typed.perform.accept_unverified,
+       "send what may move or lock the tool although its register is not certain");
 }
 
 Result<Outcome> run_ping(TypedPing ping, Context& context) {
@@ -323,9 +333,10 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
 }
 
 std::string fault_words() {
-  std::string text = "make the tool misbehave: KIND[=ARGUMENT][@K|@every:N], repeatable:";
+  std::string text =
+      "Faults (behind any of them: @3 only the third answer, @every:5 every fifth):\n";
   for (const sim::FaultHelp& fault : sim::fault_help()) {
-    text += fmt::format("\n  {:<28}{}", fault.syntax, fault.meaning);
+    text += fmt::format("  {:<26}{}\n", fault.syntax, fault.meaning);
   }
   return text;
 }
@@ -335,13 +346,15 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "a simulated tool to learn on, script against and test with",
                            "spindle simulate doga-bm\n"
                            "spindle simulate doga-bm --listen tcp://127.0.0.1:5000 -v\n"
-                           "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3"};
+                           "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3\n"
+                           "spindle simulate doga-bm --firmware 4001",
+                           fault_words};
   CLI::App* command = add_command(app, draft, words, typed.simulate, run_simulate);
   auto& options = typed.simulate.options;
   command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
   option(command, "--listen", options.listen, "URL",
          "where to listen (default tcp://127.0.0.1:0: a free port)");
-  command->add_option("--fault", options.faults, fault_words())
+  command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
       ->type_name("FAULT")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -444,7 +457,8 @@ Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseEr
   const std::string what = error.what();
   for (const std::string& argument : arguments) {
     const std::string name = argument.substr(0, argument.find('='));
-    if (name.size() < 2 || name.front() != '-' || what.find(name) == std::string::npos) continue;
+    const std::string bare = name.substr(std::min(name.size(), name.find_first_not_of('-')));
+    if (bare.empty() || bare == name || what.find(bare) == std::string::npos) continue;
     if (name != argument) return usage(fmt::format("'{}' takes no value", name));
     return usage(fmt::format("'{}' needs a value", name));
   }
@@ -452,7 +466,7 @@ Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseEr
 }
 
 Result<void> understand_common(const Typed& typed, Invocation& invocation) {
-  const std::string output = typed.json ? "json" : typed.output.empty() ? "table" : typed.output;
+  const std::string output = typed.output.empty() ? "table" : typed.output;
   const auto format = to_choice("--output", output, formats);
   if (!format) return tl::unexpected(format.error());
   const auto color = to_choice("--color", typed.color.empty() ? "auto" : typed.color, colors);
@@ -477,15 +491,20 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   return {};
 }
 
+/// "-o, --output FORMAT", "    --json", "TARGET".
+std::string names_of(const CLI::Option& known) {
+  if (!known.nonpositional()) return known.get_name(true);
+  const auto& short_names = known.get_snames();
+  std::string names = short_names.empty() ? "    " : fmt::format("-{}, ", short_names.front());
+  names += "--" + known.get_lnames().front();
+  if (known.get_expected_max() > 0) names += " " + known.get_type_name();
+  return names;
+}
+
 std::string option_lines(const CLI::App& app) {
   std::string text;
   for (const CLI::Option* known : app.get_options()) {
-    const bool positional = known->nonpositional() ? false : true;
-    std::string names = positional ? known->get_name(true) : known->get_name(false, true);
-    if (!positional && known->get_expected_max() > 0 && !known->get_type_name().empty()) {
-      names += " " + known->get_type_name();
-    }
-    text += fmt::format("  {:<32}{}\n", names, known->get_description());
+    text += fmt::format("  {:<32}{}\n", names_of(*known), known->get_description());
   }
   return text;
 }
@@ -527,12 +546,15 @@ std::string program_help(const CLI::App& app) {
 }
 
 std::string command_help(const CLI::App& app, const CLI::App* command, const Words& words) {
-  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: spindle {} {}\n", words.meaning,
-                                 indented(words.examples), path_of(command), words.synopsis);
+  std::string usage_line = fmt::format("spindle {} {}", path_of(command), words.synopsis);
+  if (words.synopsis.empty()) usage_line.pop_back();
+  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: {}\n", words.meaning,
+                                 indented(words.examples), usage_line);
   const std::string commands = command_lines(*command);
   const std::string options = option_lines(*command);
   if (!commands.empty()) text += fmt::format("\nCommands:\n{}", commands);
   if (!options.empty()) text += fmt::format("\nArguments and options:\n{}", options);
+  if (words.appendix != nullptr) text += "\n" + words.appendix();
   return text + fmt::format("\nOptions of every command:\n{}", option_lines(app));
 }
 
@@ -551,8 +573,8 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
     invocation.text = fmt::format("spindle {}\n", version);
     return invocation;
   }
-  if (const auto extras = app.remaining(true); !extras.empty()) {
-    return tl::unexpected(unexpected_argument(app, draft, extras.front()));
+  for (const std::string& extra : app.remaining(true)) {
+    if (extra != end_of_options) return tl::unexpected(unexpected_argument(app, draft, extra));
   }
   if (auto understood = understand_common(draft.typed, invocation); !understood) {
     return tl::unexpected(std::move(understood.error()));
@@ -562,6 +584,13 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   }
   invocation.run = std::move(draft.run);
   return invocation;
+}
+
+/// --json is -o json, so that of several the last one wins.
+std::vector<std::string> with_one_output_option(std::vector<std::string> arguments) {
+  const auto end = std::find(arguments.begin(), arguments.end(), end_of_options);
+  std::replace(arguments.begin(), end, std::string("--json"), std::string("--output=json"));
+  return arguments;
 }
 
 }  // namespace
@@ -576,7 +605,9 @@ Result<Invocation> parse(const std::vector<std::string>& arguments) {
   add_common_options(app, draft.typed);
   add_commands(app, draft, typed);
   try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    auto words = with_one_output_option(arguments);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    app.parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     return tl::unexpected(parser_error(arguments, error));
   }
@@ -584,19 +615,19 @@ Result<Invocation> parse(const std::vector<std::string>& arguments) {
 }
 
 report::Format wanted_format(const std::vector<std::string>& arguments) {
-  report::Format format = report::Format::table;
+  std::string_view last = "table";
   for (std::size_t index = 0; index < arguments.size(); ++index) {
-    const std::string& argument = arguments[index];
-    if (argument == "--") break;
-    if (argument == "--json" || argument == "-ojson" || argument == "--output=json") {
-      return report::Format::json;
-    }
-    const bool output = argument == "-o" || argument == "--output";
-    if (output && index + 1 < arguments.size() && arguments[index + 1] == "json") {
-      return report::Format::json;
-    }
+    const std::string_view argument = arguments[index];
+    if (argument == end_of_options) break;
+    const bool has_next = index + 1 < arguments.size();
+    if (argument == "--json") last = "json";
+    if (argument.starts_with("--output=")) last = argument.substr(argument.find('=') + 1);
+    if (argument.starts_with("-o") && argument.size() > 2) last = argument.substr(2);
+    if ((argument == "-o" || argument == "--output") && has_next) last = arguments[index + 1];
   }
-  return format;
+  const auto* const found = std::find_if(formats.begin(), formats.end(),
+                                         [&](const auto& row) { return row.first == last; });
+  return found == formats.end() ? report::Format::table : found->second;
 }
 
 }  // namespace spindle::cli

@@ -1,6 +1,7 @@
 #include "spindle/cli/run.hpp"
 
 #include <exception>
+#include <filesystem>
 #include <utility>
 
 #include "grammar.hpp"
@@ -34,7 +35,8 @@ std::vector<std::string> profile_folders(const World& world) {
   if (!data.empty()) folders.push_back(data + "/spindle/profiles");
   for (const std::string_view below :
        {"/../share/spindle/profiles", "/profiles", "/../profiles", "/../../profiles"}) {
-    folders.push_back(world.program_folder + std::string(below));
+    const std::filesystem::path folder = world.program_folder + std::string(below);
+    folders.push_back(folder.lexically_normal().string());
   }
   return folders;
 }
