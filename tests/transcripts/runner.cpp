@@ -1,14 +1,16 @@
 // Runs transcripts: what a user types and what the program prints, in one readable file. The whole
 // program runs in this process, against simulated tools on a clock that is moved by hand.
 //
-//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [FAULT=SPEC]...   a tool that lives as long
-//   as the file %file NAME … %end                                   a file in the transcript's own
-//   folder %answer TEXT                                        what the user types at the next
-//   question $ spindle ARGUMENTS                                 followed by what it prints
+//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [FAULT=SPEC]...
+//                         a tool that lives as long as the transcript
+//   %file NAME … %end     a file in the transcript's own folder
+//   %answer TEXT          what the user types at the next question
+//   $ spindle ARGUMENTS   followed by what it prints
 //
 // Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
 // fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status.
-// With SPINDLE_UPDATE=1 the file is rewritten with what was really printed.
+// The source folder is shown as $SOURCE. With SPINDLE_UPDATE=1 the file is rewritten with what was
+// really printed.
 
 #include <fmt/format.h>
 
@@ -73,6 +75,15 @@ std::vector<std::string> shell_words(const std::string& line) {
   return words;
 }
 
+/// Where the sources are differs from machine to machine.
+std::string without_source_folder(std::string text) {
+  const std::string folder = SPINDLE_SOURCE_DIR;
+  for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
+    text.replace(at, folder.size(), "$SOURCE");
+  }
+  return text;
+}
+
 enum class Marking { mark_stderr, plain };
 
 /// A simulated tool behind an address, alive from one command to the next.
@@ -125,26 +136,29 @@ class Stage {
         fresh_line = c == '\n';
       }
     };
-    cli::World world{.io = {.out =
-                                [&](std::string_view text) {
-                                  show(text, false);
-                                  return Result<void>();
-                                },
-                            .err = [&](std::string_view text) { show(text, true); },
-                            .read_line = [&] { return next_answer(show); },
-                            .in_is_terminal = !answers_.empty(),
-                            .err_is_terminal = !answers_.empty()},
-                     .clock = clock_,
-                     .interrupt = interrupt_,
-                     .open = [this](const auto& endpoint, const auto& facts,
-                                    Duration) { return open(endpoint, facts); },
-                     .serve = {},
-                     .environment = [](std::string_view) { return std::optional<std::string>(); },
-                     .file_exists = posix::file_exists,
-                     .program_folder = SPINDLE_SOURCE_DIR};
+    cli::World world{
+        .io = {.out =
+                   [&](std::string_view text) {
+                     show(text, false);
+                     return Result<void>();
+                   },
+               .err = [&](std::string_view text) { show(text, true); },
+               .read_line = [&] { return next_answer(show); },
+               .in_is_terminal = !answers_.empty(),
+               .err_is_terminal = !answers_.empty()},
+        .clock = clock_,
+        .interrupt = interrupt_,
+        .open = [this](const auto& endpoint, const auto& facts,
+                       Duration) { return open(endpoint, facts); },
+        // Enough of a server: it is listening, and nobody comes.
+        .serve = [](sim::Server&,
+                    const sim::ServeOptions& options) { return options.listening(5000); },
+        .environment = [](std::string_view) { return std::optional<std::string>(); },
+        .file_exists = posix::file_exists,
+        .program_folder = SPINDLE_SOURCE_DIR};
     status_ = cli::run(arguments, world);
     Lines lines;
-    std::istringstream stream(shown);
+    std::istringstream stream(without_source_folder(std::move(shown)));
     for (std::string line; std::getline(stream, line);) lines.push_back(line);
     if (status_ != 0 && marking == Marking::mark_stderr)
       lines.push_back(fmt::format("[{}]", status_));
@@ -169,6 +183,9 @@ class Stage {
 
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkFacts& facts) {
+    if (endpoint.medium != link::Medium::tcp) {
+      return posix::line_opener(clock_, interrupt_)(endpoint, facts, Duration::zero());
+    }
     const auto found = tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)));
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
     Tool& tool = *found->second;
