@@ -6,15 +6,16 @@
 
 int main(int count, char** arguments) {
   using namespace spindle::posix;
-  const SignalWatch signals;
+  SignalWatch signals;
   SteadyClock clock(signals.interrupt());
   spindle::cli::World world{.io = {write_out, write_err, read_line, is_terminal(Stream::in),
-                                   is_terminal(Stream::out), is_terminal(Stream::err)},
+                                   is_terminal(Stream::out), is_terminal(Stream::err), out_is_open},
                             .clock = clock,
                             .interrupt = signals.interrupt(),
                             .open = line_opener(clock, signals.interrupt()),
                             .serve = tool_server(clock, signals.interrupt()),
-                            .environment = environment,
+                            .end_waits = [&signals] { signals.end_waits(); },
+      .environment = environment,
                             .file_exists = file_exists,
                             .program_folder = program_folder()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);

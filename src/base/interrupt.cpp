@@ -15,7 +15,8 @@ void Interrupt::raise(int signal_number) noexcept {
 }
 
 Error Interrupt::error() const {
-  const bool by_hand = signal_.load() == interrupt_signal;
+  const int signal = signal_.load();
+  const bool by_hand = signal == interrupt_signal || signal == 0;
   return Error{.code = by_hand ? Errc::interrupted : Errc::terminated};
 }
 

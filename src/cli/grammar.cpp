@@ -10,6 +10,7 @@
 
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/commands/target.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "version.hpp"
 
@@ -177,6 +178,18 @@ struct TypedDo {
   commands::DoOptions options;
   bool accept_unverified = false;
 };
+struct TypedWatch {
+  commands::WatchOptions options;
+  std::vector<std::string> arguments;
+  std::string interval;
+  std::string count;
+  std::string duration;
+  std::string idle_timeout;
+  bool all = false;
+  bool initial = false;
+  bool no_push = false;
+  bool no_reconnect = false;
+};
 struct TypedSimulate {
   commands::SimulateOptions options;
   std::string identity_bytes;
@@ -193,6 +206,7 @@ struct TypedCommands {
   TypedSet set;
   TypedDo perform;
   TypedPing ping;
+  TypedWatch watch;
   TypedSimulate simulate;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
@@ -341,6 +355,70 @@ std::string fault_words() {
   return text;
 }
 
+/// TARGET... [NAME|PATTERN...]: the first argument is a target, and so is every one behind it that
+/// can be nothing else.
+void part_arguments(const TypedWatch& typed, commands::WatchOptions& options,
+                    const Context& context) {
+  for (const std::string& argument : typed.arguments) {
+    const bool is_target = options.targets.empty() ||
+                           (options.names.empty() && commands::is_target(argument, context));
+    (is_target ? options.targets : options.names).push_back(argument);
+  }
+}
+
+Result<void> understand_watch(const TypedWatch& typed, commands::WatchOptions& options) {
+  const auto interval = to_duration("--interval", typed.interval);
+  if (!interval) return tl::unexpected(interval.error());
+  const auto duration = to_duration("--duration", typed.duration);
+  if (!duration) return tl::unexpected(duration.error());
+  const auto idle_timeout = to_duration("--idle-timeout", typed.idle_timeout);
+  if (!idle_timeout) return tl::unexpected(idle_timeout.error());
+  if (!typed.count.empty()) {
+    const auto count = to_number("--count", typed.count, 1, 1'000'000'000);
+    if (!count) return tl::unexpected(count.error());
+    options.count = *count;
+  }
+  options.interval = interval->value_or(options.interval);
+  options.duration = *duration;
+  options.idle_timeout = *idle_timeout;
+  if (typed.initial) options.samples = device::Samples::changes_and_first;
+  if (typed.all) options.samples = device::Samples::all;
+  if (typed.no_push) options.events = device::EventMode::poll;
+  if (typed.no_reconnect) options.reconnection = device::Reconnection::never;
+  return {};
+}
+
+Result<Outcome> run_watch(TypedWatch typed, Context& context) {
+  if (typed.arguments.empty()) return tl::unexpected(missing("watch", "TARGET"));
+  part_arguments(typed, typed.options, context);
+  if (auto understood = understand_watch(typed, typed.options); !understood) {
+    return tl::unexpected(std::move(understood.error()));
+  }
+  return commands::watch(typed.options, context);
+}
+
+void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"watch", "TARGET... [NAME|PATTERN...]",
+                           "events as they happen and changes of polled values, until stopped",
+                           "spindle watch station3\n"
+                           "spindle watch station3 station4 --json --count 100\n"
+                           "spindle watch station3 status.ready status.alarm --interval 500ms"};
+  CLI::App* command = add_command(app, draft, words, typed.watch, run_watch);
+  TypedWatch& watch = typed.watch;
+  command->add_option("TARGET", watch.arguments, "tools, then names or patterns of values to poll");
+  option(command, "--interval", watch.interval, "DURATION",
+         "time between two polls (default 200ms)");
+  command->add_flag("--all", watch.all, "every polled sample instead of changes");
+  command->add_flag("--initial", watch.initial, "also the first value of everything polled");
+  option(command, "--count", watch.count, "N", "end after so many events and changes");
+  option(command, "--duration", watch.duration, "DURATION", "end after this time");
+  option(command, "--idle-timeout", watch.idle_timeout, "DURATION",
+         "end when nothing came for this time; status 1 if nothing came at all");
+  command->add_flag("--no-push", watch.no_push,
+                    "poll the event counter; for tools whose output another client uses");
+  command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
+}
+
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"simulate", "PROFILE [--listen URL]",
                            "a simulated tool to learn on, script against and test with",
@@ -409,6 +487,7 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_get(app, draft, typed);
   add_set(app, draft, typed);
   add_do(app, draft, typed);
+  add_watch(app, draft, typed);
   add_ping(app, draft, typed);
   add_simulate(app, draft, typed);
   add_profile(app, draft, typed);

@@ -76,6 +76,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                             .interrupt = world.interrupt,
                             .open = world.open,
                             .serve = world.serve,
+                            .end_waits = world.end_waits,
                             .profiles = profiles,
                             .tools = *tools,
                             .renderer = renderer,

@@ -11,6 +11,9 @@ namespace {
 /// How often a confirming parameter is read while its effect is awaited.
 constexpr Duration confirm_interval = std::chrono::milliseconds(20);
 
+/// How often the last event is read before giving up on one that stands still meanwhile.
+constexpr int max_event_reads = 5;
+
 using catalogue::Area;
 using catalogue::Parameter;
 using catalogue::Value;
@@ -41,6 +44,12 @@ void append_without_absent(const Area& area, const std::vector<Area>& absent,
     from = std::uint32_t{hole.to} + 1;
   }
   append(std::uint32_t{area.to} + 1);
+}
+
+modbus::RegisterTable event_table(const catalogue::EventFacts& events) {
+  const bool input =
+      events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
+  return input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
 }
 
 link::ReadLimits read_limits(const catalogue::Profile& profile) {
@@ -196,6 +205,8 @@ Result<void> Device::require_known_registers() {
   const auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
   const auto generation = catalogue::generation_of(facts, identity);
   registers_known_ = generation == catalogue::Generation::known;
+  identity_text_ =
+      fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
   if (registers_known_) return {};
   Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
   error.message =
@@ -326,6 +337,49 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint1
     if (next > deadline) return ActionResult::not_confirmed;
     if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
+}
+
+Result<Registers> Device::read_raw(const RegisterRange& range) {
+  return client_.read(range).map_error([this](Error error) { return located(std::move(error)); });
+}
+
+Result<void> Device::switch_events(EventOutput output) {
+  const catalogue::EventFacts& events = *profile_->events;
+  const std::uint16_t value = output == EventOutput::on ? events.arm_value : events.disarm_value;
+  return client_.write(modbus::RegisterAddress{events.arm_register}, value)
+      .map_error([this](Error error) { return located(std::move(error)); });
+}
+
+Result<std::uint16_t> Device::event_number() {
+  const auto number = profile_->find(profile_->events->number);
+  if (!number) return tl::unexpected(number.error());
+  return read_raw(range_of(*number)).map([](const Registers& registers) {
+    return registers.front();
+  });
+}
+
+Result<Registers> Device::last_event() {
+  const catalogue::EventFacts& events = *profile_->events;
+  const auto table = event_table(events);
+  const auto all_but_one = static_cast<std::uint16_t>(events.count - 1);
+  const auto last = static_cast<std::uint16_t>(events.first + all_but_one);
+  const auto number = profile_->find(events.number);
+  if (!number) return tl::unexpected(number.error());
+  const std::size_t number_at = number->address.value - events.first;
+  for (int attempt = 0; attempt < max_event_reads; ++attempt) {
+    auto block = read_raw({table, events.first, all_but_one});
+    if (!block) return block;
+    const auto tail = read_raw({table, last, 1});
+    if (!tail) return tail;
+    const auto again = event_number();
+    if (!again) return tl::unexpected(again.error());
+    if (*again != (*block)[number_at]) continue;
+    block->push_back(tail->front());
+    return block;
+  }
+  return tl::unexpected(Error{.code = Errc::no_answer,
+                              .message = "events come faster than the last one can be read",
+                              .target = target_});
 }
 
 Result<Duration> Device::ping() {

@@ -22,15 +22,19 @@ constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGPIPE};
 std::atomic<Interrupt*> watched{nullptr};
 static_assert(std::atomic<Interrupt*>::is_always_lock_free, "read by a signal handler");
 
+void wake(const Interrupt& interrupt) {
+  const std::uint64_t one = 1;
+  // Fails only when the counter is full; then it is readable already.
+  [[maybe_unused]] const ssize_t written = ::write(interrupt.descriptor(), &one, sizeof one);
+}
+
 extern "C" void on_signal(int number) {
   Interrupt* const interrupt = watched.load();
   if (interrupt == nullptr) return;
-  if (interrupt->raised()) ::_exit(signal_status_base + number);
+  if (interrupt->signalled()) ::_exit(signal_status_base + number);
   const int interrupted_errno = errno;
   interrupt->raise(number);
-  const std::uint64_t one = 1;
-  // Fails only when the counter is full; then it is readable already.
-  [[maybe_unused]] const ssize_t written = ::write(interrupt->descriptor(), &one, sizeof one);
+  wake(*interrupt);
   errno = interrupted_errno;
 }
 
@@ -64,6 +68,11 @@ SignalWatch::~SignalWatch() {
   }
   watched.store(nullptr);
   ::close(interrupt_.descriptor());
+}
+
+void SignalWatch::end_waits() {
+  interrupt_.end_waits();
+  wake(interrupt_);
 }
 
 }  // namespace spindle::posix

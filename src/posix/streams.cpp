@@ -69,4 +69,9 @@ bool is_terminal(Stream stream) {
   return false;
 }
 
+bool out_is_open() {
+  pollfd reader = {STDOUT_FILENO, 0, 0};
+  return ::poll(&reader, 1, 0) <= 0 || (reader.revents & (POLLERR | POLLHUP)) == 0;
+}
+
 }  // namespace spindle::posix

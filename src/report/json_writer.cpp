@@ -112,6 +112,7 @@ void append_json(std::string& out, const Record& record) {
     append_json_string(out, record.target);
   }
   for (const Field& field : record.fields) {
+    if (field.audience == Audience::columns) continue;
     out += ',';
     append_json_string(out, field.key);
     out += ':';

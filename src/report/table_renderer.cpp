@@ -6,20 +6,32 @@
 namespace spindle::report {
 namespace {
 
-using Row = std::vector<std::string>;
+struct Drawn {
+  std::string text;
+  Tone tone = Tone::plain;
+};
+using Row = std::vector<Drawn>;
 
 constexpr std::string_view gap = "  ";
 constexpr std::string_view bold = "\x1b[1m";
+constexpr std::string_view green = "\x1b[32m";
+constexpr std::string_view red = "\x1b[31m";
 constexpr std::string_view plain = "\x1b[0m";
 
+std::string colored(const Drawn& cell, Color color) {
+  if (color == Color::off || cell.tone == Tone::plain) return cell.text;
+  return std::string(cell.tone == Tone::good ? green : red).append(cell.text).append(plain);
+}
+
 std::string draw(const Row& row, std::span<const Column> columns,
-                 std::span<const std::size_t> widths) {
+                 std::span<const std::size_t> widths, Color color) {
   std::string line;
   for (std::size_t index = 0; index < row.size(); ++index) {
     if (index != 0) line += gap;
-    const std::size_t width = display_width(row[index]);
+    const std::size_t width = display_width(row[index].text);
     const std::string padding(widths[index] > width ? widths[index] - width : 0, ' ');
-    line += columns[index].align == Align::right ? padding + row[index] : row[index] + padding;
+    const std::string text = colored(row[index], color);
+    line += columns[index].align == Align::right ? padding + text : text + padding;
   }
   line.erase(line.find_last_not_of(' ') + 1);
   return line;
@@ -44,7 +56,9 @@ class TableRenderer final : public PlainRenderer {
     Row row;
     row.reserve(columns_.size());
     for (const Column& column : columns_) {
-      row.push_back(printable(shown_text(record, column.key), LineBreaks::fold));
+      const Field* const field = record.find(column.key);
+      row.push_back({printable(shown_text(record, column.key), LineBreaks::fold),
+                     field == nullptr ? Tone::plain : field->tone});
     }
     rows_.push_back(std::move(row));
     return is_live() ? flush() : Result<void>{};
@@ -68,14 +82,14 @@ class TableRenderer final : public PlainRenderer {
 
   void widen(const Row& row) {
     for (std::size_t index = 0; index < row.size(); ++index) {
-      widths_[index] = std::max(widths_[index], display_width(row[index]));
+      widths_[index] = std::max(widths_[index], display_width(row[index].text));
     }
   }
 
   [[nodiscard]] std::string header() {
     Row titles;
-    for (const Column& column : columns_) titles.push_back(column.title);
-    std::string line = draw(titles, columns_, widths_);
+    for (const Column& column : columns_) titles.push_back({column.title});
+    std::string line = draw(titles, columns_, widths_, Color::off);
     if (streams().color == Color::off) return line;
     return std::string(bold).append(line).append(plain);
   }
@@ -85,7 +99,7 @@ class TableRenderer final : public PlainRenderer {
     std::string text;
     if (heading_ == Heading::another) text += '\n';
     if (heading_ != Heading::drawn) text += header() + '\n';
-    for (const Row& row : rows_) text += draw(row, columns_, widths_) + '\n';
+    for (const Row& row : rows_) text += draw(row, columns_, widths_, streams().color) + '\n';
     rows_.clear();
     heading_ = Heading::drawn;
     return streams().out(text);

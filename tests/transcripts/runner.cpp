@@ -147,12 +147,13 @@ class Stage {
                .in_is_terminal = !answers_.empty(),
                .err_is_terminal = !answers_.empty()},
         .clock = clock_,
-        .interrupt = interrupt_,
+        .interrupt = interrupt_.emplace(),
         .open = [this](const auto& endpoint, const auto& facts,
                        Duration) { return open(endpoint, facts); },
         // Enough of a server: it is listening, and nobody comes.
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
+        .end_waits = [this] { interrupt_->end_waits(); },
         .environment = [](std::string_view) { return std::optional<std::string>(); },
         .file_exists = posix::file_exists,
         .program_folder = SPINDLE_SOURCE_DIR};
@@ -184,18 +185,18 @@ class Stage {
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkFacts& facts) {
     if (endpoint.medium != link::Medium::tcp) {
-      return posix::line_opener(clock_, interrupt_)(endpoint, facts, Duration::zero());
+      return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
     const auto found = tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)));
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
     Tool& tool = *found->second;
     return sim::make_sim_transport(*tool.server, {++tool.connections}, tool.profile.link.framing,
-                                   tool.faults, tool.answers, clock_, interrupt_);
+                                   tool.faults, tool.answers, clock_, *interrupt_);
   }
 
   files::ProfileStore profiles_;
   test::FakeClock clock_;
-  Interrupt interrupt_;
+  std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
   int status_ = 0;

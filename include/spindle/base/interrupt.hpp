@@ -17,14 +17,20 @@ class Interrupt {
   /// Remembers the first signal (SIGINT = 2, SIGTERM = 15, as numbered by POSIX systems).
   void raise(int signal_number) noexcept;
 
-  [[nodiscard]] bool raised() const noexcept { return signal_.load() != 0; }
+  /// The program itself wants every wait to end, without any signal.
+  void end_waits() noexcept { ended_.store(true); }
+
+  /// Whether waits have to end, for either reason.
+  [[nodiscard]] bool raised() const noexcept { return signalled() || ended_.load(); }
+  [[nodiscard]] bool signalled() const noexcept { return signal_.load() != 0; }
   [[nodiscard]] int descriptor() const noexcept { return wake_descriptor_; }
 
-  /// `Errc::interrupted` for SIGINT, `Errc::terminated` for anything else. Requires raised().
+  /// `Errc::interrupted` for SIGINT and without a signal, `Errc::terminated` for other signals.
   [[nodiscard]] Error error() const;
 
  private:
   std::atomic<int> signal_{0};
+  std::atomic<bool> ended_{false};
   int wake_descriptor_;
 };
 

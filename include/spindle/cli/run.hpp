@@ -15,8 +15,9 @@ struct World {
   report::Streams io;
   Clock& clock;
   const Interrupt& interrupt;
-  device::OpenTransport open;  ///< real lines
-  sim::Serve serve;            ///< puts a simulated tool on a port
+  device::OpenTransport open;       ///< real lines
+  sim::Serve serve;                 ///< puts a simulated tool on a port
+  std::function<void()> end_waits;  ///< ends every wait, as a signal would
   std::function<std::optional<std::string>(std::string_view name)> environment;
   std::function<bool(const std::string& path)> file_exists;
   std::string program_folder;  ///< where the executable is; its profiles are found from here

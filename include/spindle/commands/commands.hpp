@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "spindle/commands/context.hpp"
+#include "spindle/device/watcher.hpp"
 
 /// One options struct and one function a verb. None of them prints, exits or parses a command line.
 namespace spindle::commands {
@@ -51,6 +52,19 @@ struct PingOptions {
   Duration interval = std::chrono::seconds(1);
 };
 Result<Outcome> ping(const PingOptions& options, Context& context);
+
+struct WatchOptions {
+  std::vector<std::string> targets;
+  std::vector<std::string> names;  ///< values to poll; none: events only
+  device::EventMode events = device::EventMode::push;
+  device::Samples samples = device::Samples::changes;
+  device::Reconnection reconnection = device::Reconnection::forever;
+  Duration interval = std::chrono::milliseconds(200);
+  std::size_t count = 0;  ///< end after so many events and changes; 0: never
+  std::optional<Duration> duration;
+  std::optional<Duration> idle_timeout;
+};
+Result<Outcome> watch(const WatchOptions& options, Context& context);
 
 struct SimulateOptions {
   std::string profile;

@@ -42,6 +42,7 @@ struct Context {
   const Interrupt& interrupt;
   const device::OpenTransport& open;  ///< real lines; simulated tools are opened by commands
   const sim::Serve& serve;
+  const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
   const files::ProfileStore& profiles;
   const files::Tools& tools;
   report::Renderer& renderer;

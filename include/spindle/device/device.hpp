@@ -60,6 +60,8 @@ enum class ActionResult : std::uint8_t {
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
 
+enum class EventOutput : std::uint8_t { on, off };
+
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
 class Device {
  public:
@@ -83,6 +85,10 @@ class Device {
   /// 11h is refused): on such a tool only raw registers may be read.
   Result<void> require_known_registers();
 
+  /// What the tool said of itself when its registers were last checked: "serial 1021100042,
+  /// firmware 2103"; empty before.
+  [[nodiscard]] const std::string& identity_text() const { return identity_text_; }
+
   /// Reads all in the fewest requests. A refused register stands in its reading; anything else ends
   /// it.
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
@@ -96,6 +102,18 @@ class Device {
   /// Sends the action once, never again, and waits for its confirming parameter.
   Result<ActionResult> perform(const catalogue::Action& action, std::uint16_t value);
 
+  /// Switches the tool's unasked event frames on or off; on expires unless it is repeated. Requires
+  /// a profile with events.
+  Result<void> switch_events(EventOutput output);
+
+  /// The counter of events, read alone. Requires a profile with events.
+  Result<std::uint16_t> event_number();
+
+  /// The whole last event, never in one read (whose answer would look like an event frame): all but
+  /// the last register, the last, and the number once more; read anew when an event came in
+  /// between.
+  Result<Registers> last_event();
+
   /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
   /// response counts as an answer.
   Result<Duration> ping();
@@ -104,6 +122,7 @@ class Device {
   Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
          const LinkOptions& options, std::unique_ptr<link::Session> session);
 
+  Result<Registers> read_raw(const link::RegisterRange& range);
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
   Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
@@ -118,6 +137,7 @@ class Device {
   unsigned retries_;
   link::Client client_;
   bool registers_known_ = false;
+  std::string identity_text_ = {};
 };
 
 }  // namespace spindle::device

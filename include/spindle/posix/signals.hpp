@@ -17,6 +17,9 @@ class SignalWatch {
   SignalWatch& operator=(const SignalWatch&) = delete;
   [[nodiscard]] const Interrupt& interrupt() const { return interrupt_; }
 
+  /// Ends every wait, as a signal would. May be called from any thread.
+  void end_waits();
+
  private:
   struct Previous;
 

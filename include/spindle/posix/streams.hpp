@@ -18,6 +18,10 @@ void write_err(std::string_view text);
 /// One line from standard input without its end; empty at end of input.
 std::optional<std::string> read_line();
 
+/// Whether the reader of standard output is still there. Only pipes and sockets can tell; others
+/// are always open.
+bool out_is_open();
+
 enum class Stream : std::uint8_t { in, out, err };
 bool is_terminal(Stream stream);
 

@@ -16,6 +16,13 @@ using Words = std::vector<std::uint16_t>;
 using Texts = std::vector<std::string>;
 using Pairs = std::vector<std::pair<std::string, std::string>>;
 
+/// Who a fact is for: tables, CSV and JSON, or only those with columns (a text made of other
+/// facts).
+enum class Audience : std::uint8_t { everyone, columns };
+
+/// What colour says beside the words, where there is colour.
+enum class Tone : std::uint8_t { plain, good, bad };
+
 /// One fact of a record: null, number, text, truth, words, texts, or an object of texts.
 using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Texts, Pairs>;
 
@@ -23,6 +30,8 @@ struct Field {
   std::string key;  ///< snake_case, as in the contract's table of record types
   Cell cell;
   std::string shown = {};  ///< what people see instead, in tables; empty: the cell itself
+  Audience audience = Audience::everyone;
+  Tone tone = Tone::plain;
 };
 
 /// What commands produce. Renderers decide how it looks.

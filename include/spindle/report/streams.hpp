@@ -22,6 +22,8 @@ struct Streams {
   bool in_is_terminal = false;
   bool out_is_terminal = false;
   bool err_is_terminal = false;
+  /// Whether somebody still reads what out() writes; may be empty, which means yes.
+  std::function<bool()> out_is_open = {};
   Color color = Color::off;
 };
 

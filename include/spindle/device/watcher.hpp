@@ -1,0 +1,131 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "spindle/device/device.hpp"
+#include "spindle/device/event_tracker.hpp"
+
+namespace spindle::device {
+
+/// How an event became known.
+enum class EventSource : std::uint8_t {
+  push,      ///< the tool sent it unasked
+  poll,      ///< its counter was seen to change
+  catch_up,  ///< it was fetched after (re)connecting
+};
+
+/// A new event. `block` are the registers of the profile's event block.
+struct EventNews {
+  EventSource source;
+  Registers block;
+  WallTime time;
+};
+
+/// A polled value: its first reading, one that differs, or every sample.
+struct ValueNews {
+  const catalogue::Parameter* parameter;
+  Registers registers;
+  catalogue::Value value;
+  std::optional<catalogue::Value> previous;
+};
+
+/// Events that happened, or may have, and were not seen.
+struct GapNews {
+  std::optional<std::uint32_t> missed;  ///< empty: unknown
+  std::string reason;
+};
+
+enum class LinkState : std::uint8_t { connected, lost, reconnecting };
+
+struct LinkNews {
+  LinkState state;
+  unsigned attempt;  ///< of the present reconnection, from 1; 0 when none is under way
+  std::string message;
+};
+
+using News = std::variant<EventNews, ValueNews, GapNews, LinkNews>;
+
+/// How events are learned of.
+enum class EventMode : std::uint8_t {
+  none,  ///< not at all
+  push,  ///< auto output is armed, repeated, and switched off at the end
+  poll,  ///< the counter alone is polled; for tools whose output another client uses
+};
+enum class Samples : std::uint8_t { changes, changes_and_first, all };
+enum class Reconnection : std::uint8_t { forever, never };
+
+struct WatchPlan {
+  EventMode events = EventMode::push;
+  std::vector<catalogue::Parameter> values = {};
+  Duration interval = std::chrono::milliseconds(200);  ///< between two polls
+  Samples samples = Samples::changes;
+  Reconnection reconnection = Reconnection::forever;
+};
+
+/// What whoever hears the news wants next.
+enum class Heed : std::uint8_t { go_on, stop };
+
+/// Watches one tool: pushed and polled events as one stream, values by polling, keep-alive,
+/// re-arming, reconnection with back-off. Every loss of knowledge is in the stream. One thread.
+class Watcher {
+ public:
+  /// Opens the tool anew, identified: the serial and firmware that it reports (empty where the
+  /// profile has no identity).
+  struct Link {
+    Device device;
+    std::string identity;
+  };
+  using Open = std::function<Result<Link>()>;
+  using Tell = std::function<Heed(const News&)>;
+  /// When to end, asked anew at least once per keep-alive; a point in the past ends at once.
+  using Until = std::function<TimePoint()>;
+
+  Watcher(Open open, const catalogue::Profile& profile, WatchPlan plan, Clock& clock, Tell tell);
+
+  /// Returns at its end, or when whoever hears the news wants to stop; then the tool's output
+  /// is switched off again where the link still allows it. Errors: an interrupt; with
+  /// Reconnection::never any trouble; without it what no retry can mend (another product).
+  Result<void> run(const Until& until);
+
+ private:
+  Result<void> watch(const Until& until);
+  Result<void> connect(const Until& until);
+  Result<void> greet(Link link);
+  Result<void> begin();
+  Result<void> serve(const Until& until);
+  Result<void> run_due();
+  Result<void> poll_values();
+  Result<void> poll_number();
+  Result<void> fetch_last(EventSource source);
+  void hear(const link::Spontaneous& frame);
+  void judge(EventSource source, Registers block, WallTime time);
+  void tell(const News& news);
+  void tell_gap(const Tracked& tracked, EventSource source);
+  void lose(const Error& error);
+  void leave();
+  [[nodiscard]] TimePoint next_due() const;
+  [[nodiscard]] Duration back_off() const;
+
+  Open open_;
+  const catalogue::Profile* profile_;
+  WatchPlan plan_;
+  Clock* clock_;
+  Tell tell_;
+  std::optional<Link> link_ = std::nullopt;
+  std::string known_identity_ = {};
+  EventTracker tracker_ = {};
+  std::size_t number_at_ = 0;
+  std::vector<std::optional<catalogue::Value>> previous_ = {};
+  TimePoint arm_due_ = {};
+  TimePoint keep_alive_due_ = {};
+  TimePoint poll_due_ = {};
+  unsigned attempt_ = 0;
+  bool stopped_ = false;
+};
+
+}  // namespace spindle::device

@@ -1,0 +1,187 @@
+#include "event_records.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "records.hpp"
+#include "spindle/catalogue/value.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using report::Audience;
+using report::Cell;
+using report::Field;
+using report::Record;
+using report::Tone;
+
+/// "event.screw-count" is "screw_count" in JSON.
+std::string key_of(const std::string& name) {
+  std::string key = name.substr(name.rfind('.') + 1);
+  std::replace(key.begin(), key.end(), '-', '_');
+  return key;
+}
+
+Field only_shown(std::string key, std::string text, Tone tone = Tone::plain) {
+  return {.key = std::move(key),
+          .cell = text_or_null(std::move(text)),
+          .audience = Audience::columns,
+          .tone = tone};
+}
+
+Field result_of(const std::string& kind) {
+  if (kind == "fastening-ok") return only_shown("result", "OK", Tone::good);
+  if (kind == "fastening-ng") return only_shown("result", "NG", Tone::bad);
+  return only_shown("result", "");
+}
+
+std::string_view to_text(device::EventSource source) {
+  switch (source) {
+    case device::EventSource::push:
+      return "push";
+    case device::EventSource::poll:
+      return "poll";
+    case device::EventSource::catch_up:
+      return "catch-up";
+  }
+  return "";
+}
+
+std::string_view to_text(device::LinkState state) {
+  switch (state) {
+    case device::LinkState::connected:
+      return "connected";
+    case device::LinkState::lost:
+      return "lost";
+    case device::LinkState::reconnecting:
+      return "reconnecting";
+  }
+  return "";
+}
+
+}  // namespace
+
+NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile,
+                         catalogue::CodeTexts errors)
+    : target_(&target), profile_(&profile), errors_(std::move(errors)) {
+  if (!profile.events) return;
+  const catalogue::EventFacts& events = *profile.events;
+  const auto table =
+      events.function == 4 ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
+  for (const catalogue::Parameter& parameter : profile.parameters) {
+    const std::uint16_t address = parameter.address.value;
+    const bool inside = parameter.table == table && address >= events.first &&
+                        address < events.first + events.count;
+    if (!inside) continue;
+    const auto at = static_cast<std::size_t>(address - events.first);
+    fields_.push_back({key_of(parameter.name), &parameter, at});
+    if (parameter.name == events.kind) kind_at_ = at;
+  }
+}
+
+Record NewsRecords::blank(std::string type, WallTime time) const {
+  return {.type = std::move(type), .target = target_->shown, .time = time, .fields = {}};
+}
+
+std::string NewsRecords::kind_of(const Registers& block) const {
+  const auto kind = profile_->events->kinds.find(block[kind_at_]);
+  return kind == profile_->events->kinds.end() ? "other" : kind->second;
+}
+
+std::string NewsRecords::error_text(std::int64_t code) const {
+  if (code == 0) return {};
+  const auto known = errors_.find(code);
+  return known == errors_.end() ? std::string() : known->second.text;
+}
+
+Record NewsRecords::event(const device::EventNews& news) const {
+  Record record = blank("event", news.time);
+  const std::string kind = kind_of(news.block);
+  record.fields.reserve(fields_.size() + 6);
+  record.fields.push_back({"kind", kind});
+  record.fields.push_back({"source", std::string(to_text(news.source))});
+  std::string text;
+  for (const EventField& field : fields_) {
+    const auto words = catalogue::register_count(field.parameter->encoding.kind);
+    const auto value =
+        catalogue::decode(*field.parameter, RegisterView(news.block).subspan(field.at, words));
+    if (!value) continue;
+    record.fields.push_back({field.key, value->number, value->to_string()});
+    if (field.key != "error") continue;
+    std::string meaning = error_text(value->number.mantissa());
+    if (value->number.mantissa() != 0) {
+      text = fmt::format("E{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ", meaning);
+    }
+    record.fields.push_back({"error_text", text_or_null(std::move(meaning))});
+  }
+  record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
+  record.fields.push_back({"raw", news.block});
+  record.fields.push_back(result_of(kind));
+  record.fields.push_back(only_shown("text", std::move(text)));
+  return record;
+}
+
+Record NewsRecords::change(const device::ValueNews& news, WallTime time) const {
+  const catalogue::Parameter& parameter = *news.parameter;
+  Record record = blank("change", time);
+  const std::string unit = unit_of(parameter, *target_);
+  record.fields = {{"name", parameter.name},
+                   {"table", std::string(catalogue::to_text(parameter.table))},
+                   {"register", number(parameter.address.value)},
+                   {"raw", news.registers},
+                   {"value", news.value.number, news.value.to_string()},
+                   {"label", text_or_null(news.value.label)},
+                   {"unit", text_or_null(unit)},
+                   {"previous", news.previous ? Cell(news.previous->number) : Cell()}};
+  const std::string before = news.previous ? news.previous->to_string() + " -> " : "";
+  record.fields.push_back(only_shown("kind", "change"));
+  record.fields.push_back(
+      only_shown("text", fmt::format("{}: {}{}{}{}", parameter.name, before, news.value.to_string(),
+                                     unit.empty() ? "" : " ", unit)));
+  return record;
+}
+
+Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {
+  Record record = blank("gap", time);
+  const std::string count = news.missed ? fmt::format("{}", *news.missed) : "an unknown number of";
+  record.fields = {{"missed", news.missed ? number(*news.missed) : Cell()},
+                   {"reason", news.reason},
+                   only_shown("kind", "gap", Tone::bad),
+                   only_shown("text", fmt::format("{} events missed: {}", count, news.reason))};
+  return record;
+}
+
+Record NewsRecords::link(const device::LinkNews& news, WallTime time) const {
+  Record record = blank("link", time);
+  const Tone tone = news.state == device::LinkState::lost ? Tone::bad : Tone::plain;
+  std::string text = news.state == device::LinkState::connected
+                         ? news.message
+                         : fmt::format("{}: {}", to_text(news.state), news.message);
+  if (news.state == device::LinkState::reconnecting) {
+    text = fmt::format("reconnecting, attempt {}: {}", news.attempt, news.message);
+  }
+  record.fields = {{"state", std::string(to_text(news.state))},
+                   {"attempt", number(news.attempt)},
+                   {"message", news.message},
+                   only_shown("kind", "link", tone),
+                   only_shown("text", std::move(text))};
+  return record;
+}
+
+std::vector<report::Column> news_columns(Tools tools) {
+  using report::Align;
+  std::vector<report::Column> columns = {{"TIME", "time", Align::left, 24}};
+  if (tools == Tools::several) columns.push_back({"TARGET", "target", Align::left, 16});
+  columns.insert(columns.end(), {{"KIND", "kind", Align::left, 16},
+                                 {"NUMBER", "number", Align::right, 6},
+                                 {"PRESET", "preset", Align::right, 6},
+                                 {"TORQUE", "torque", Align::right, 7},
+                                 {"ANGLE", "a3", Align::right, 6},
+                                 {"RESULT", "result", Align::left, 6},
+                                 {"TEXT", "text", Align::left, 1}});
+  return columns;
+}
+
+}  // namespace spindle::commands

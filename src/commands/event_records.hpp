@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/device/watcher.hpp"
+#include "spindle/report/renderer.hpp"
+
+namespace spindle::commands {
+
+/// Turns the news of one tool into records. Everything that the profile says of event blocks is
+/// looked up once, so that an event costs little.
+class NewsRecords {
+ public:
+  /// `target` and `profile` must outlive it.
+  NewsRecords(const Target& target, const catalogue::Profile& profile, catalogue::CodeTexts errors);
+
+  [[nodiscard]] report::Record event(const device::EventNews& news) const;
+  [[nodiscard]] report::Record change(const device::ValueNews& news, WallTime time) const;
+  [[nodiscard]] report::Record gap(const device::GapNews& news, WallTime time) const;
+  [[nodiscard]] report::Record link(const device::LinkNews& news, WallTime time) const;
+
+  /// The contract's name of an event's kind: "fastening-ok", …, "other".
+  [[nodiscard]] std::string kind_of(const Registers& block) const;
+
+  /// Meaning of an error code; empty when it is 0 or unknown.
+  [[nodiscard]] std::string error_text(std::int64_t code) const;
+
+ private:
+  struct EventField {
+    std::string key;  ///< as in JSON
+    const catalogue::Parameter* parameter;
+    std::size_t at;  ///< index in the block
+  };
+
+  [[nodiscard]] report::Record blank(std::string type, WallTime time) const;
+
+  const Target* target_;
+  const catalogue::Profile* profile_;
+  catalogue::CodeTexts errors_;
+  std::vector<EventField> fields_ = {};
+  std::size_t kind_at_ = 0;
+};
+
+/// Columns of a stream of news, drawn row by row.
+enum class Tools : std::uint8_t { one, several };
+std::vector<report::Column> news_columns(Tools tools);
+
+}  // namespace spindle::commands
