@@ -1,0 +1,420 @@
+"""What the end-to-end tests share: running the real binary, and recording what it says on the wire.
+
+Everything that is started here is stopped here, by its own pid. Ports are chosen by the system, and
+every wait is for a condition and has a deadline.
+"""
+
+import contextlib
+import dataclasses
+import decimal
+import fcntl
+import json
+import os
+import pathlib
+import selectors
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import threading
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DEADLINE = 20.0  # for what must happen at all; never waited out when things go well
+POLL = 0.001
+
+READ_HOLDING, READ_INPUT, WRITE_SINGLE, REPORT_SERVER_ID = 0x03, 0x04, 0x06, 0x11
+
+
+def binary():
+    path = os.environ.get("SPINDLE")
+    if not path:
+        raise SystemExit("SPINDLE must name the spindle binary to test")
+    return os.path.abspath(path)
+
+
+def wait_until(condition, what, deadline=DEADLINE):
+    """Returns the first true value of the condition."""
+    end = time.monotonic() + deadline
+    pause = threading.Event()
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise AssertionError(f"waited {deadline:g} s in vain: {what}")
+        pause.wait(POLL)
+
+
+# --- the program ------------------------------------------------------------------------------
+
+
+class Home:
+    """An empty home folder, so that no tools file or profile of the machine plays a part."""
+
+    def __init__(self):
+        self.path = pathlib.Path(tempfile.mkdtemp(prefix="spindle-end-to-end-"))
+
+    def environment(self, **extra):
+        kept = {name: os.environ[name] for name in os.environ if name.endswith("SAN_OPTIONS")}
+        own = {
+            "HOME": str(self.path),
+            "PATH": "/usr/bin:/bin",
+            "LC_ALL": "C.UTF-8",
+            "SPINDLE_PROFILE_PATH": str(ROOT / "profiles"),
+        }
+        return {**kept, **own, **extra}
+
+    def remove(self):
+        shutil.rmtree(self.path, ignore_errors=True)
+
+
+_home = None
+
+
+def home():
+    global _home
+    if _home is None:
+        _home = Home()
+    return _home
+
+
+def remove_home():
+    """To be called by each test file when it ends (tearDownModule)."""
+    global _home
+    if _home is not None:
+        _home.remove()
+        _home = None
+
+
+def parse_json(line):
+    """One JSON line with exact numbers; a repeated key is an error."""
+
+    def unique(pairs):
+        keys = [key for key, _ in pairs]
+        if len(set(keys)) != len(keys):
+            raise ValueError(f"repeated key in {keys}")
+        return dict(pairs)
+
+    return json.loads(line, parse_float=decimal.Decimal, object_pairs_hook=unique)
+
+
+@dataclasses.dataclass
+class Finished:
+    arguments: list
+    status: int
+    stdout: str
+    stderr: str
+    seconds: float
+
+    def records(self, kind=None):
+        """All of standard output as JSON lines, or those of one type."""
+        if self.stdout and not self.stdout.endswith("\n"):
+            raise ValueError(f"the last line is cut off: {self.stdout[-80:]!r}")
+        records = [parse_json(line) for line in self.stdout.split("\n")[:-1]]
+        return [record for record in records if kind is None or record["type"] == kind]
+
+    def __str__(self):
+        return (
+            f"spindle {' '.join(self.arguments)}\n  status {self.status} after {self.seconds:.3f} s\n"
+            f"  stdout: {self.stdout[-2000:]!r}\n  stderr: {self.stderr[-1000:]!r}"
+        )
+
+
+class Running:
+    """A spindle that was started and is ended by its own pid when the block is left."""
+
+    def __init__(self, *arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, environment=None):
+        self.arguments = [str(argument) for argument in arguments]
+        self._began = time.monotonic()
+        self.process = subprocess.Popen(
+            [binary(), *self.arguments],
+            stdin=stdin,
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            cwd=home().path,
+            env=home().environment(**(environment or {})),
+        )
+        self._unread = b""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout, self.process.stderr):
+            if stream:
+                stream.close()
+
+    @property
+    def pid(self):
+        return self.process.pid
+
+    def line(self, deadline=DEADLINE):
+        """The next line of standard output, without its end."""
+        end = time.monotonic() + deadline
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            while b"\n" not in self._unread:
+                if not selector.select(max(0.0, end - time.monotonic())):
+                    raise AssertionError(f"no line from spindle {' '.join(self.arguments)}")
+                chunk = os.read(self.process.stdout.fileno(), 65536)
+                if not chunk:
+                    raise AssertionError(
+                        f"spindle {' '.join(self.arguments)} ended: {self.process.stderr.read()!r}"
+                    )
+                self._unread += chunk
+        line, self._unread = self._unread.split(b"\n", 1)
+        return line.decode()
+
+    def send_signal(self, number):
+        self._began = time.monotonic()
+        self.process.send_signal(number)
+
+    def finish(self, timeout=DEADLINE):
+        """Waits for the end; the seconds count from the start or from the last signal."""
+        timer = threading.Timer(timeout, self.process.kill)
+        timer.start()
+        try:
+            os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
+            seconds = time.monotonic() - self._began
+            stdout, stderr = self.process.communicate()
+        finally:
+            timer.cancel()
+        return Finished(
+            self.arguments,
+            self.process.returncode,
+            (self._unread + (stdout or b"")).decode(),
+            stderr.decode(),
+            seconds,
+        )
+
+
+def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None):
+    """Runs spindle to its end. Output is taken through files, so that nothing can block."""
+    arguments = [str(argument) for argument in arguments]
+    with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
+        began = time.monotonic()
+        process = subprocess.Popen(
+            [binary(), *arguments],
+            stdin=stdin,
+            stdout=stdout,
+            stderr=stderr,
+            cwd=home().path,
+            env=home().environment(**(environment or {})),
+        )
+        try:
+            status = process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+            status = None
+        seconds = time.monotonic() - began
+        texts = []
+        for stream in (stdout, stderr):
+            stream.seek(0)
+            texts.append(stream.read().decode("utf-8", "backslashreplace"))
+    return Finished(arguments, status, *texts, seconds)
+
+
+@contextlib.contextmanager
+def simulator(profile="doga-bm", *flags, listen="tcp://127.0.0.1:0"):
+    """A simulated tool on a free port; gives its URL."""
+    with Running("simulate", profile, "--listen", listen, *flags) as running:
+        yield running.line()
+        running.send_signal(signal.SIGTERM)
+        finished = running.finish()
+        if finished.status != 143:
+            raise AssertionError(f"the simulator did not end as asked: {finished}")
+
+
+# --- the wire ---------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """One Modbus TCP request, taken apart by the length of its header."""
+
+    bytes: bytes
+
+    @property
+    def transaction(self):
+        return struct.unpack_from(">H", self.bytes)[0]
+
+    @property
+    def protocol(self):
+        return struct.unpack_from(">H", self.bytes, 2)[0]
+
+    @property
+    def unit(self):
+        return self.bytes[6]
+
+    @property
+    def function(self):
+        return self.bytes[7]
+
+    @property
+    def data(self):
+        return self.bytes[8:]
+
+    @property
+    def words(self):
+        """Address and count of a read; address and value of a write."""
+        return struct.unpack(">HH", self.data) if len(self.data) == 4 else ()
+
+    def __repr__(self):
+        return f"<{self.bytes.hex(' ')}>"
+
+
+def take_requests(buffer):
+    """Removes complete frames from the front of a bytearray."""
+    requests = []
+    while len(buffer) >= 6:
+        total = 6 + struct.unpack_from(">H", buffer, 4)[0]
+        if total < 8 or total > 260:
+            raise ValueError(f"not a Modbus TCP request: {bytes(buffer[:16]).hex(' ')}")
+        if len(buffer) < total:
+            break
+        requests.append(Request(bytes(buffer[:total])))
+        del buffer[:total]
+    return requests
+
+
+def host_and_port(url):
+    host, port = url.removeprefix("tcp://").rsplit(":", 1)
+    return host.strip("[]"), int(port)
+
+
+class Recorder:
+    """Passes one client's bytes to a server and back, and keeps every request that it sees."""
+
+    def __init__(self, url):
+        self._upstream = host_and_port(url)
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.url = f"tcp://127.0.0.1:{self._listening.getsockname()[1]}"
+        self.requests = []
+        self._sockets = []
+        self._threads = [threading.Thread(target=self._accept, daemon=True)]
+
+    def __enter__(self):
+        self._threads[0].start()
+        return self
+
+    def __exit__(self, *_):
+        for opened in [self._listening, *self._sockets]:
+            with contextlib.suppress(OSError):
+                opened.shutdown(socket.SHUT_RDWR)
+            opened.close()
+        for thread in self._threads:
+            thread.join(DEADLINE)
+
+    def count(self, *functions):
+        return sum(request.function in functions for request in self.requests)
+
+    def _accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                client, _ = self._listening.accept()
+                server = socket.create_connection(self._upstream)
+                self._sockets += [client, server]
+                for source, sink, sees in ((client, server, True), (server, client, False)):
+                    pump = threading.Thread(target=self._pump, args=(source, sink, sees), daemon=True)
+                    self._threads.append(pump)
+                    pump.start()
+
+    def _pump(self, source, sink, sees_requests):
+        buffer = bytearray()
+        with contextlib.suppress(OSError):
+            while chunk := source.recv(65536):
+                if sees_requests:
+                    buffer += chunk
+                    self.requests += take_requests(buffer)
+                sink.sendall(chunk)
+            sink.shutdown(socket.SHUT_WR)
+
+
+TCP_ESTABLISHED, TCP_SYN_SENT = 1, 2
+
+
+def tcp_sockets():
+    """The kernel's IPv4 sockets: (local port, remote port, state, unread bytes)."""
+    rows = []
+    with open("/proc/net/tcp", encoding="ascii") as table:
+        next(table)
+        for line in table:
+            _, local, remote, state, queues = line.split()[:5]
+            ports = [int(end.split(":")[1], 16) for end in (local, remote)]
+            rows.append((*ports, int(state, 16), int(queues.split(":")[1], 16)))
+    return rows
+
+
+def unread_bytes(local, remote):
+    """What a process has not read yet of an open loopback connection; None when that is closed.
+
+    Asks the kernel for one socket (sock_diag(7)), which is quick however many there are.
+    """
+    by_family, this_socket = 20, struct.pack("=II", 0xFFFFFFFF, 0xFFFFFFFF)
+    host = socket.inet_aton("127.0.0.1").ljust(16, b"\0")
+    body = struct.pack("=BBBBI", socket.AF_INET, socket.IPPROTO_TCP, 0, 0, 0xFFFFFFFF)
+    body += struct.pack(">HH", local, remote) + host + host + struct.pack("=I", 0) + this_socket
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, 4) as diagnosis:
+        diagnosis.send(struct.pack("=IHHII", 16 + len(body), by_family, 1, 0, 0) + body)
+        answer = diagnosis.recv(4096)
+    kind = struct.unpack_from("=H", answer, 4)[0]
+    if kind != by_family or answer[17] != TCP_ESTABLISHED:
+        return None
+    return struct.unpack_from("=I", answer, 72)[0]
+
+
+@contextlib.contextmanager
+def full_backlog():
+    """A port that takes no further connection: its queue is full and nobody accepts."""
+    with contextlib.ExitStack() as stack:
+        listening = stack.enter_context(socket.socket())
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(0)
+        port = listening.getsockname()[1]
+        fillers = set()
+
+        def is_full():
+            waiting = {
+                local
+                for local, remote, state, _ in tcp_sockets()
+                if remote == port and state == TCP_SYN_SENT
+            }
+            if waiting & fillers:
+                return True
+            filler = stack.enter_context(socket.socket())
+            filler.setblocking(False)
+            filler.connect_ex(("127.0.0.1", port))
+            fillers.add(filler.getsockname()[1])
+            return False
+
+        wait_until(is_full, "the queue of a port fills up")
+
+        def is_somebody_waiting():
+            return any(
+                remote == port and state == TCP_SYN_SENT and local not in fillers
+                for local, remote, state, _ in tcp_sockets()
+            )
+
+        yield f"tcp://127.0.0.1:{port}", is_somebody_waiting
+
+
+@contextlib.contextmanager
+def refusing_port():
+    """A port that is bound, so that nobody else gets it, and on which nobody listens."""
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        yield f"tcp://127.0.0.1:{bound.getsockname()[1]}"
+
+
+def small_pipe():
+    """A pipe that holds so little that a long output has to wait for its reader."""
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    return reading, writing

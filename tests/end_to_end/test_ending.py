@@ -1,0 +1,198 @@
+"""How it ends: signals during every wait, closed pipes, closed streams."""
+
+import os
+import signal
+import subprocess
+import unittest
+
+import hostile_server
+import support
+
+# The contract says 100 ms. The rest is allowed for a machine that has more to do than this.
+PROMPT = 0.25
+SIGNALS = ((signal.SIGINT, 130), (signal.SIGTERM, 143))
+SILENT = {"on": ["identity", "read", "write", "read-back"], "reply": []}
+TORQUE = "preset.1.target-torque"
+
+
+def tearDownModule():
+    support.remove_home()
+
+
+class SignalTest(unittest.TestCase):
+    slowest = 0.0
+
+    @classmethod
+    def tearDownClass(cls):
+        print(f"slowest end after a signal: {1000 * cls.slowest:.1f} ms")
+
+    def interrupt(self, number, status, waits_until, *arguments):
+        with support.Running(*arguments, "--json") as running:
+            support.wait_until(lambda: waits_until(running), f"{arguments[0]} waits")
+            running.send_signal(number)
+            finished = running.finish()
+        self.assertEqual(finished.status, status, finished)
+        self.assertLess(finished.seconds, PROMPT, finished)
+        type(self).slowest = max(self.slowest, finished.seconds)
+        return finished
+
+    def test_while_connecting(self):
+        for number, status in SIGNALS:
+            with self.subTest(number), support.full_backlog() as (url, somebody_waits):
+                finished = self.interrupt(
+                    number, status, lambda _: somebody_waits(),
+                    "get", url, "--profile", "doga-bm", TORQUE, "--connect-timeout", "60s",
+                )
+                self.assertEqual(finished.records()[-1]["exit_status"], status, finished)
+
+    def test_while_waiting_for_an_answer(self):
+        commands = {
+            "identify": [],
+            "get": ["--profile", "doga-bm", TORQUE],
+            "set": ["--profile", "doga-bm", f"{TORQUE}=2.80"],
+            "do": ["--profile", "doga-bm", "auto-output=1"],
+            "ping": [],
+        }
+        for command, arguments in commands.items():
+            for number, status in SIGNALS:
+                with self.subTest(command, signal=number), hostile_server.HostileServer(SILENT) as server:
+                    finished = self.interrupt(
+                        number, status, lambda _: server.requests,
+                        command, server.url, *arguments, "--timeout", "60s",
+                    )
+                    self.assertEqual(finished.records()[-1]["exit_status"], status, finished)
+
+    def test_while_waiting_for_the_echo_of_a_write(self):
+        row = {"on": ["write"], "reply": []}
+        for number, status in SIGNALS:
+            with self.subTest(number), hostile_server.HostileServer(row) as server:
+                self.interrupt(
+                    number, status, lambda _: server.misbehaved,
+                    "set", server.url, "--profile", "doga-bm", f"{TORQUE}=2.80", "--timeout", "60s",
+                )
+
+    def test_in_a_flood_of_strays(self):
+        stray = {"stray": {"transaction": 1, "function": 3, "data": "04010F03E8"}}
+        row = {"on": ["identity"], "reply": [{"endless": [stray]}]}
+        with hostile_server.HostileServer(row) as server:
+            self.interrupt(
+                signal.SIGINT, 130, lambda _: server.misbehaved, "identify", server.url, "--timeout", "60s"
+            )
+
+    def test_between_two_pings(self):
+        for number, status in SIGNALS:
+            with self.subTest(number), hostile_server.HostileServer({}) as server:
+                with support.Running(
+                    "ping", server.url, "--interval", "60s", "--count", "9", "--json"
+                ) as running:
+                    self.assertIn('"type":"ping"', running.line())
+                    running.send_signal(number)
+                    finished = running.finish()
+                self.assertEqual(finished.status, status, finished)
+                self.assertLess(finished.seconds, PROMPT, finished)
+                summary = finished.records("summary")
+                self.assertEqual([(s["received"], s["exit_status"]) for s in summary], [(1, status)])
+
+    def test_simulate(self):
+        for number, status in SIGNALS:
+            with self.subTest(number):
+                with support.Running("simulate", "doga-bm", "--listen", "tcp://127.0.0.1:0") as running:
+                    self.assertRegex(running.line(), r"^tcp://127\.0\.0\.1:\d+$")
+                    running.send_signal(number)
+                    finished = running.finish()
+                self.assertEqual(finished.status, status, finished)
+                self.assertLess(finished.seconds, PROMPT, finished)
+                self.assertEqual(finished.stdout, "", finished)
+                self.assertRegex(finished.stderr, r"^0 connections, 0 requests\n", finished)
+
+    def test_simulate_with_clients(self):
+        with support.Running("simulate", "doga-bm", "--listen", "tcp://127.0.0.1:0", "--json") as running:
+            url = support.parse_json(running.line())["endpoint"]
+            self.assertEqual(support.run("get", url, TORQUE).status, 0)
+            running.send_signal(signal.SIGINT)
+            finished = running.finish()
+        self.assertEqual(finished.status, 130, finished)
+        summary = finished.records("summary")[-1]
+        self.assertEqual((summary["connections"], summary["requests"]), (1, 2), finished)
+
+
+class StreamTest(unittest.TestCase):
+    def head(self, *arguments):
+        """Reads one line and closes the pipe, as head -1 does, while the program still writes."""
+        reading, writing = support.small_pipe()
+        with support.Running(*arguments, stdout=writing) as running:
+            os.close(writing)
+            with os.fdopen(reading, "rb") as pipe:
+                first = pipe.readline()
+            finished = running.finish()
+        self.assertTrue(first.endswith(b"\n"))
+        self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+
+    def test_closed_pipe(self):
+        with support.simulator() as url:
+            for form in ("table", "json", "csv"):
+                self.head("get", url, "--profile", "doga-bm", "preset.*", "p[1-4]??", "-o", form)
+            self.head("ping", url, "--count", "100000", "--interval", "1ms", "--json")
+        for form in ("table", "json", "csv"):
+            self.head("list", "--profile", "doga-bm", "p[0-9]*", "-o", form)
+        self.head("profile", "show", "doga-bm")
+
+    def test_pipe_that_was_closed_before(self):
+        reading, writing = os.pipe()
+        os.close(reading)
+        with support.Running("list", "--profile", "doga-bm", stdout=writing) as running:
+            os.close(writing)
+            finished = running.finish()
+        self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+
+    def test_simulate_into_a_closed_pipe(self):
+        reading, writing = os.pipe()
+        os.close(reading)
+        with support.Running("simulate", "doga-bm", stdout=writing) as running:
+            os.close(writing)
+            finished = running.finish()
+        self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+
+    def test_full_disk_is_no_success(self):
+        with open("/dev/full", "wb") as full:
+            with support.Running("list", "--profile", "doga-bm", "--json", stdout=full) as running:
+                finished = running.finish()
+        self.assertNotEqual(finished.status, 0, finished)
+        self.assertIn("spindle: ", finished.stderr)
+
+    def closed(self, descriptors, *arguments):
+        """Runs with descriptors closed, as a daemon's parent may leave them."""
+        script = 'exec "$0" "$@" ' + " ".join(f"{number}>&-" for number in descriptors)
+        return subprocess.run(
+            ["/bin/sh", "-c", script, support.binary(), *arguments],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=support.DEADLINE,
+            env=support.home().environment(), cwd=support.home().path, check=False,
+        )
+
+    def test_closed_standard_input(self):
+        with support.simulator() as url:
+            finished = self.closed([0], "get", url, TORQUE, "--json")
+            self.assertEqual(finished.returncode, 0, finished)
+            self.assertEqual(support.parse_json(finished.stdout)["raw"], [271])
+            asked = self.closed(
+                [0], "do", url, "--profile", "doga-bm", "alarm-reset", "--accept-unverified"
+            )
+            self.assertEqual(asked.returncode, 2, asked)
+            self.assertIn("--yes", asked.stderr)
+
+    def test_closed_standard_error(self):
+        with support.simulator() as url, support.Recorder(url) as recorder:
+            finished = self.closed([2], "get", recorder.url, TORQUE, "--json", "--verbose")
+            self.assertEqual(finished.returncode, 0, finished)
+            self.assertEqual(support.parse_json(finished.stdout)["raw"], [271])
+            # Nothing but requests went to the tool, though its socket may have taken number 2.
+            self.assertEqual(len(recorder.requests), 2, recorder.requests)
+
+    def test_closed_standard_output(self):
+        with support.simulator() as url, support.Recorder(url) as recorder:
+            self.closed([1], "get", recorder.url, TORQUE, "--json")
+            self.assertLessEqual(len(recorder.requests), 2, recorder.requests)
+
+
+if __name__ == "__main__":
+    unittest.main()
