@@ -8,7 +8,8 @@
 //   $ spindle ARGUMENTS   followed by what it prints
 //
 // Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
-// fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status.
+// fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status; a
+// directive stands in a comment, and the file that it names is the fenced block behind it.
 // The source folder is shown as $SOURCE. With SPINDLE_UPDATE=1 the file is rewritten with what was
 // really printed.
 
@@ -202,6 +203,8 @@ class Stage {
   int status_ = 0;
 };
 
+constexpr std::string_view file_comment = "<!-- %file ";
+
 /// Plays one file and returns it as it should read.
 class Player {
  public:
@@ -218,9 +221,10 @@ class Player {
     const std::string& line = lines[index];
     played_.push_back(line);
     if (markdown_ && line.starts_with("```")) in_block_ = line.starts_with("```console");
+    if (markdown_ && line.starts_with(file_comment)) return write_block(lines, index);
     if (markdown_ && line.starts_with("<!-- %")) directive(line.substr(5, line.rfind(" -->") - 5));
     if (markdown_ && !in_block_) return index;
-    if (line.starts_with("%file ")) return write_file(lines, index);
+    if (line.starts_with("%file ")) return write_file(line.substr(6), "%end", lines, index);
     if (line.starts_with("%")) directive(line);
     if (line.starts_with("$ spindle")) return run(lines, index, true);
     if (line.starts_with("$ echo $?")) return run(lines, index, false);
@@ -233,14 +237,25 @@ class Player {
     if (words.at(0) == "answer") stage_.answer(words.at(1));
   }
 
-  std::size_t write_file(const Lines& lines, std::size_t index) {
-    std::ofstream file(lines[index].substr(6));
+  /// Writes what stands between `index` and the line `end`; returns where that is.
+  std::size_t write_file(const std::string& name, std::string_view end, const Lines& lines,
+                         std::size_t index) {
+    std::ofstream file(name);
     while (++index < lines.size()) {
       played_.push_back(lines[index]);
-      if (lines[index] == "%end") break;
+      if (lines[index] == end) break;
       file << lines[index] << '\n';
     }
     return index;
+  }
+
+  /// The fenced block behind a comment that names a file.
+  std::size_t write_block(const Lines& lines, std::size_t index) {
+    const std::string& comment = lines[index];
+    const std::size_t until = comment.rfind(" -->");
+    const std::string name = comment.substr(file_comment.size(), until - file_comment.size());
+    played_.push_back(lines.at(++index));
+    return write_file(name, "```", lines, index);
   }
 
   std::size_t run(const Lines& lines, std::size_t index, bool is_spindle) {

@@ -1,8 +1,10 @@
 #include "spindle/base/error.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <cctype>
+#include <fstream>
 #include <set>
 
 using namespace spindle;
@@ -37,6 +39,22 @@ TEST_CASE("exit statuses and their names are those of the contract") {
     CHECK(found.name == name);
     CHECK_FALSE(found.meaning.empty());
   }
+}
+
+TEST_CASE("the README's table of exit statuses is the table of the code") {
+  std::ifstream readme(SPINDLE_SOURCE_DIR "/README.md");
+  std::vector<std::string> rows;
+  for (std::string line; std::getline(readme, line);) {
+    const bool begins = line == "| status | name | meaning |";
+    if (begins || (!rows.empty() && line.starts_with('|'))) rows.push_back(line);
+    if (!rows.empty() && !line.starts_with('|')) break;
+  }
+  std::vector<std::string> expected = {"| status | name | meaning |", "|---|---|---|"};
+  for (const StatusInfo& row : status_table()) {
+    expected.push_back(
+        fmt::format("| {} | {} | {} |", static_cast<int>(row.status), row.name, row.meaning));
+  }
+  CHECK(rows == expected);
 }
 
 TEST_CASE("each error belongs to one exit status") {
