@@ -178,6 +178,16 @@ struct TypedDo {
   commands::DoOptions options;
   bool accept_unverified = false;
 };
+struct TypedRemoteStart {
+  commands::RemoteStartOptions options;
+  std::string limit;
+  bool accept_unverified = false;
+};
+struct TypedAlarms {
+  commands::AlarmsOptions options;
+  bool reset = false;
+  bool accept_unverified = false;
+};
 struct TypedWatch {
   commands::WatchOptions options;
   std::vector<std::string> arguments;
@@ -196,6 +206,8 @@ struct TypedSimulate {
   std::string firmware;
   std::string serial;
   std::string model;
+  std::string rundown_every;
+  std::string ng_every;
 };
 
 /// Everything that CLI11 writes into; must live as long as the parser.
@@ -207,6 +219,9 @@ struct TypedCommands {
   TypedDo perform;
   TypedPing ping;
   TypedWatch watch;
+  TypedRemoteStart remote_start;
+  commands::RemoteStopOptions remote_stop;
+  TypedAlarms alarms;
   TypedSimulate simulate;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
@@ -341,8 +356,17 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
               [&] { return fill_number("--firmware", typed.firmware, 0xFFFF, options.firmware); })
           .and_then(
               [&] { return fill_number("--serial", typed.serial, 0xFFFF'FFFF, options.serial); })
-          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, options.model); });
+          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, options.model); })
+          .and_then([&] {
+            return fill_number("--ng-every", typed.ng_every, 1'000'000, options.ng_every);
+          });
   if (!filled) return tl::unexpected(std::move(filled.error()));
+  const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
+  if (!rundown_every) return tl::unexpected(rundown_every.error());
+  options.rundown_every = *rundown_every;
+  if (options.ng_every && !options.rundown_every) {
+    return tl::unexpected(usage("--ng-every needs --rundown-every", "such as --rundown-every 5s"));
+  }
   return commands::simulate(options, context);
 }
 
@@ -419,11 +443,75 @@ void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
 }
 
+Result<Outcome> run_remote_start(TypedRemoteStart typed, Context& context) {
+  if (typed.options.target.empty()) return tl::unexpected(missing("remote-start", "TARGET"));
+  const auto limit = to_duration("--for", typed.limit);
+  if (!limit) return tl::unexpected(limit.error());
+  typed.options.limit = *limit;
+  if (typed.accept_unverified) typed.options.acceptance = commands::Acceptance::unverified;
+  return commands::remote_start(typed.options, context);
+}
+
+constexpr std::string_view accept_unverified_words =
+    "send what may move or lock the tool although its register is not certain";
+
+void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {
+      "remote-start", "TARGET [--preset N] [--direction D] [--for DURATION]",
+      "start the tool under a guard that always ends in a stop; wait for the result",
+      "spindle remote-start station3 --preset 2\n"
+      "spindle remote-start station3 --for 2s --yes --json\n"
+      "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes"};
+  CLI::App* command = add_command(app, draft, words, typed.remote_start, run_remote_start);
+  auto& options = typed.remote_start.options;
+  command->add_option("TARGET", options.target, "tool name or URL");
+  option(command, "--preset", options.preset, "N", "select this preset first");
+  option(command, "--direction", options.direction, "D", "select this direction first");
+  option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
+  command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
+                    std::string(accept_unverified_words));
+}
+
+void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"remote-stop", "TARGET...", "stop now; never asks",
+                           "spindle remote-stop station3\n"
+                           "spindle remote-stop @line1"};
+  const auto run = [](const commands::RemoteStopOptions& options, Context& context) {
+    if (options.targets.empty()) {
+      return Result<Outcome>(tl::unexpected(missing("remote-stop", "TARGET")));
+    }
+    return commands::remote_stop(options, context);
+  };
+  add_command(app, draft, words, typed.remote_stop, run)
+      ->add_option("TARGET", typed.remote_stop.targets, "tool name, @group or URL");
+}
+
+void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"alarms", "TARGET [--reset]",
+                           "present alarm and last error, with meaning and remedy",
+                           "spindle alarms sim:doga-bm\n"
+                           "spindle alarms station3 --reset"};
+  const auto run = [](TypedAlarms alarms, Context& context) {
+    if (alarms.options.target.empty()) {
+      return Result<Outcome>(tl::unexpected(missing("alarms", "TARGET")));
+    }
+    if (alarms.reset) alarms.options.reset = commands::AlarmReset::yes;
+    if (alarms.accept_unverified) alarms.options.acceptance = commands::Acceptance::unverified;
+    return commands::alarms(alarms.options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.alarms, run);
+  command->add_option("TARGET", typed.alarms.options.target, "tool name or URL");
+  command->add_flag("--reset", typed.alarms.reset, "also reset the present alarm");
+  command->add_flag("--accept-unverified", typed.alarms.accept_unverified,
+                    std::string(accept_unverified_words));
+}
+
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"simulate", "PROFILE [--listen URL]",
                            "a simulated tool to learn on, script against and test with",
                            "spindle simulate doga-bm\n"
                            "spindle simulate doga-bm --listen tcp://127.0.0.1:5000 -v\n"
+                           "spindle simulate doga-bm --rundown-every 3s --ng-every 5\n"
                            "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3\n"
                            "spindle simulate doga-bm --firmware 4001",
                            fault_words};
@@ -441,6 +529,10 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");
   option(command, "--serial", typed.simulate.serial, "N", "serial number to report");
   option(command, "--model", typed.simulate.model, "N", "tool model code to report");
+  option(command, "--rundown-every", typed.simulate.rundown_every, "DURATION",
+         "an operator who drives a screw at this interval (default: nobody)");
+  option(command, "--ng-every", typed.simulate.ng_every, "N",
+         "every so many of the operator's screws end NG");
 }
 
 void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -488,6 +580,9 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_set(app, draft, typed);
   add_do(app, draft, typed);
   add_watch(app, draft, typed);
+  add_remote_start(app, draft, typed);
+  add_remote_stop(app, draft, typed);
+  add_alarms(app, draft, typed);
   add_ping(app, draft, typed);
   add_simulate(app, draft, typed);
   add_profile(app, draft, typed);

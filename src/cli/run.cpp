@@ -75,6 +75,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                             .clock = world.clock,
                             .interrupt = world.interrupt,
                             .open = world.open,
+                            .calm = world.calm,
                             .serve = world.serve,
                             .end_waits = world.end_waits,
                             .profiles = profiles,

@@ -61,6 +61,12 @@ std::string_view to_text(device::LinkState state) {
   return "";
 }
 
+std::string missed_text(std::optional<std::uint32_t> missed) {
+  if (!missed) return "perhaps events missed";
+  if (*missed == 0) return "no event missed";
+  return fmt::format("{} event{} missed", *missed, *missed == 1 ? "" : "s");
+}
+
 }  // namespace
 
 NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile,
@@ -145,11 +151,11 @@ Record NewsRecords::change(const device::ValueNews& news, WallTime time) const {
 
 Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {
   Record record = blank("gap", time);
-  const std::string count = news.missed ? fmt::format("{}", *news.missed) : "an unknown number of";
-  record.fields = {{"missed", news.missed ? number(*news.missed) : Cell()},
-                   {"reason", news.reason},
-                   only_shown("kind", "gap", Tone::bad),
-                   only_shown("text", fmt::format("{} events missed: {}", count, news.reason))};
+  record.fields = {
+      {"missed", news.missed ? number(*news.missed) : Cell()},
+      {"reason", news.reason},
+      only_shown("kind", "gap", Tone::bad),
+      only_shown("text", fmt::format("{}: {}", missed_text(news.missed), news.reason))};
   return record;
 }
 

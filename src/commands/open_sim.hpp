@@ -4,9 +4,6 @@
 
 namespace spindle::commands {
 
-/// Opens sim: endpoints as tools inside this process, and everything else through the context.
-device::OpenTransport with_simulated_tools(const Context& context);
-
 /// What may be changed on a simulated tool from the command line.
 struct SimulatedToolOptions {
   std::optional<std::size_t> identity_bytes = std::nullopt;
@@ -14,7 +11,12 @@ struct SimulatedToolOptions {
   std::optional<std::uint32_t> serial = std::nullopt;
   std::optional<std::uint16_t> model = std::nullopt;
   sim::FaultPlan faults = {};
+  std::optional<Duration> rundown_every = std::nullopt;  ///< an operator's; empty: nobody works
+  unsigned ng_every = 0;  ///< every so many run-downs of the operator end NG; 0: none
 };
+
+/// Opens sim: endpoints as such tools inside this process, and everything else through the context.
+device::OpenTransport with_simulated_tools(const Context& context, SimulatedToolOptions options);
 
 /// A simulated tool and the profile that it was made from.
 struct SimulatedTool {

@@ -2,6 +2,20 @@
 
 namespace spindle::commands {
 
+Context calm_context(const Context& context) {
+  return {.io = context.io,
+          .clock = context.calm.clock,
+          .interrupt = context.calm.interrupt,
+          .open = context.calm.open,
+          .calm = context.calm,
+          .serve = context.serve,
+          .end_waits = context.end_waits,
+          .profiles = context.profiles,
+          .tools = context.tools,
+          .renderer = context.renderer,
+          .common = context.common};
+}
+
 void Outcome::fail(const Error& error) {
   const ExitStatus status = error.status();
   if (failed_++ == 0) first_ = status;

@@ -101,7 +101,9 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
                                    .firmware = options.firmware,
                                    .serial = options.serial,
                                    .model = options.model,
-                                   .faults = *faults},
+                                   .faults = *faults,
+                                   .rundown_every = options.rundown_every,
+                                   .ng_every = options.ng_every.value_or(0)},
                                   context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   if (!listen->port) listen->port = tool->profile.link.port;

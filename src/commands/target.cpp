@@ -72,6 +72,15 @@ device::LinkOptions link_options(const Target& target, const Context& context) {
           .shown = target.shown};
 }
 
+SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
+  SimulatedToolOptions options;
+  if (simulated_operator == SimulatedOperator::working) {
+    options.rundown_every = std::chrono::seconds(2);
+    options.ng_every = 4;
+  }
+  return options;
+}
+
 /// A tool that could say what it is, but fits nothing that is known.
 Error unknown_product(Errc code, std::string why) {
   return {.code = code,
@@ -239,10 +248,11 @@ link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& prof
 }
 
 Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
-                                      const Context& context) {
-  auto device = device::Device::open(with_port(target.endpoint, profile), profile,
-                                     link_options(target, context), with_simulated_tools(context),
-                                     context.clock);
+                                      const Context& context,
+                                      SimulatedOperator simulated_operator) {
+  auto device = device::Device::open(
+      with_port(target.endpoint, profile), profile, link_options(target, context),
+      with_simulated_tools(context, simulated_options(simulated_operator)), context.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {
     device.error().hint = other_port_hint(context);

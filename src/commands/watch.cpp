@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <variant>
 
@@ -37,12 +38,17 @@ class Stage {
     return ended_ ? Heed::stop : Heed::go_on;
   }
 
-  void fail(const Error& error) {
+  /// How the watch of one tool ended.
+  void leave(const Result<void>& watched) {
     const std::lock_guard lock(mutex_);
-    if (ended_) return;  // an interrupt that we caused ourselves
-    outcome_.fail(error);
-    const bool asked_to_end = error.code == Errc::interrupted || error.code == Errc::terminated;
-    if (!asked_to_end) listing_.add(error);
+    if (watched || ended_) {  // once the whole ends, it is we who interrupt the others
+      outcome_.succeed();
+      return;
+    }
+    outcome_.fail(watched.error());
+    const ExitStatus status = watched.error().status();
+    const bool asked_to_end = status == ExitStatus::interrupted || status == ExitStatus::terminated;
+    if (!asked_to_end) listing_.add(watched.error());
   }
 
   /// When to end, as far as is known now.
@@ -64,7 +70,6 @@ class Stage {
     if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
     const bool idle =
         options_->idle_timeout && context_->clock.now() >= last_event_ + *options_->idle_timeout;
-    if (outcome_.failed() == 0) outcome_.succeed();
     if (idle && events_ + changes_ == 0) outcome_.negate();
     return summarise().map([&] { return outcome_; });
   }
@@ -133,10 +138,8 @@ class Stage {
 };
 
 Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::Profile& profile) {
-  device::WatchPlan plan{.events = options.events,
-                         .interval = options.interval,
-                         .samples = options.samples,
-                         .reconnection = options.reconnection};
+  device::WatchPlan plan{
+      .events = options.events, .interval = options.interval, .samples = options.samples};
   if (!profile.events) plan.events = device::EventMode::none;
   if (!options.names.empty()) {
     auto values = profile.select(options.names);
@@ -152,31 +155,58 @@ Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::
   return plan;
 }
 
-Result<void> watch_one(const WatchedTool& tool, Stage& stage, const WatchOptions& options,
+/// Whether what was asked for can be watched on some tool that is known.
+Result<void> check_for_any_profile(const WatchOptions& options, ProfileShelf& shelf,
+                                   const Context& context) {
+  Result<void> checked;
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto known = shelf.take(entry.id);
+    if (!known) continue;  // another one's broken file
+    auto plan = plan_of(options, (*known)->profile);
+    if (plan) return {};
+    checked = tl::unexpected(std::move(plan.error()));
+  }
+  return checked;
+}
+
+/// Refuses what can be known to be wrong before anybody is asked.
+Result<void> check(const WatchOptions& options, const WatchedTool& tool, ProfileShelf& shelf,
+                   const Context& context) {
+  if (tool.known() == nullptr) return check_for_any_profile(options, shelf, context);
+  return plan_of(options, tool.known()->profile).map([](const device::WatchPlan&) {});
+}
+
+Result<void> watch_one(WatchedTool& tool, Stage& stage, const WatchOptions& options,
                        const Context& context) {
-  auto plan = plan_of(options, *tool.profile);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-  const NewsRecords records(tool.target, *tool.profile, *tool.errors);
-  device::Watcher watcher(link_opener(tool, context), *tool.profile, std::move(*plan),
-                          context.clock,
-                          [&](const device::News& news) { return stage.tell(news, records); });
+  const catalogue::Profile unknown;
+  std::optional<NewsRecords> records;
+  records.emplace(tool.target(), unknown, catalogue::CodeTexts());
+  const auto open = [&] {
+    auto link = tool.open();
+    if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->errors);
+    return link;
+  };
+  const auto plan = [&](const catalogue::Profile& profile) { return plan_of(options, profile); };
+  device::Watcher watcher(open, plan, options.reconnection, context.clock,
+                          [&](const device::News& news) { return stage.tell(news, *records); });
   return watcher.run([&] { return stage.until(); });
 }
 
 }  // namespace
 
 Result<Outcome> watch(const WatchOptions& options, Context& context) {
-  auto tools = prepare_tools(options.targets, context);
+  ProfileShelf shelf(context.profiles);
+  auto tools = prepare_tools(options.targets, shelf, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
-  for (const WatchedTool& tool : tools->tools) {
-    if (auto plan = plan_of(options, *tool.profile); !plan) {
-      return tl::unexpected(std::move(plan.error()));
+  for (const WatchedTool& tool : *tools) {
+    if (auto checked = check(options, tool, shelf, context); !checked) {
+      return tl::unexpected(std::move(checked.error()));
     }
   }
-  Stage stage(options, tools->tools.size() == 1 ? Tools::one : Tools::several, context);
-  for_each_side_by_side(tools->tools, [&](const WatchedTool& tool) {
+  Stage stage(options, tools->size() == 1 ? Tools::one : Tools::several, context);
+  for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, stage, options, context);
-    if (!watched) stage.fail(watched.error());
+    stage.leave(watched);
   });
   return stage.finish();
 }

@@ -2,57 +2,65 @@
 
 #include <utility>
 
-#include "open_sim.hpp"
-
 namespace spindle::commands {
-namespace {
 
-/// Loads what belongs to a profile, unless it was loaded for another tool.
-Result<void> load_shared(WatchedTools& shared, const std::string& name, const Context& context) {
-  if (shared.profiles.contains(name)) return {};
-  auto profile = context.profiles.load(name);
+Result<const KnownProfile*> ProfileShelf::take(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  const auto known = profiles_.find(id);
+  if (known != profiles_.end()) return known->second.get();
+  auto profile = store_->load(id);
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto errors = context.profiles.load_error_codes(name);
+  auto errors = store_->load_error_codes(id);
   if (!errors) return tl::unexpected(std::move(errors.error()));
-  shared.profiles[name] = std::make_unique<const catalogue::Profile>(std::move(*profile));
-  shared.errors[name] = std::make_unique<const catalogue::CodeTexts>(std::move(*errors));
-  return {};
+  auto& place = profiles_[id];
+  place =
+      std::make_unique<const KnownProfile>(KnownProfile{std::move(*profile), std::move(*errors)});
+  return place.get();
 }
 
-}  // namespace
+Result<WatchedTool> WatchedTool::make(Target target, ProfileShelf& shelf, const Context& context) {
+  WatchedTool tool(std::move(target), shelf, context);
+  if (tool.target_.profile.empty()) return tool;
+  return tool.learn(tool.target_.profile).map([&] { return std::move(tool); });
+}
 
-Result<WatchedTools> prepare_tools(const std::vector<std::string>& targets,
-                                   const Context& context) {
+Result<void> WatchedTool::learn(const std::string& profile) {
+  return shelf_->take(profile).map([&](const KnownProfile* known) { known_ = known; });
+}
+
+Result<void> WatchedTool::find_profile() {
+  auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, *context_);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  target_ = tool->target;
+  target_.profile = tool->profile->id;
+  return learn(target_.profile);
+}
+
+Result<device::Watcher::Link> WatchedTool::open() {
+  if (known_ == nullptr) {
+    if (auto found = find_profile(); !found) return tl::unexpected(std::move(found.error()));
+  }
+  auto device = connect_device(target_, known_->profile, *context_, SimulatedOperator::working);
+  if (!device) return tl::unexpected(std::move(device.error()));
+  if (auto registers = device->require_known_registers(); !registers) {
+    return tl::unexpected(std::move(registers.error()));
+  }
+  std::string identity = device->identity_text();
+  return device::Watcher::Link{std::move(*device), std::move(identity)};
+}
+
+Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+                                               ProfileShelf& shelf, const Context& context) {
   auto resolved = resolve_targets(targets, context);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
-  WatchedTools shared;
+  std::vector<WatchedTool> tools;
+  tools.reserve(resolved->size());
   for (Target& target : *resolved) {
-    if (target.profile.empty()) {
-      auto tool = open_tool(target, catalogue::Profile(), Need::named_registers, context);
-      if (!tool) return tl::unexpected(std::move(tool.error()));
-      target = tool->target;
-      target.profile = tool->profile->id;
-    }
-    if (auto loaded = load_shared(shared, target.profile, context); !loaded) {
-      return tl::unexpected(std::move(loaded.error()));
-    }
-    const std::string name = target.profile;
-    shared.tools.push_back(
-        {std::move(target), shared.profiles[name].get(), shared.errors[name].get()});
+    auto tool = WatchedTool::make(std::move(target), shelf, context);
+    if (!tool) return tl::unexpected(std::move(tool.error()));
+    tools.push_back(std::move(*tool));
   }
-  return shared;
-}
-
-device::Watcher::Open link_opener(const WatchedTool& tool, const Context& context) {
-  return [&tool, &context]() -> Result<device::Watcher::Link> {
-    auto device = connect_device(tool.target, *tool.profile, context);
-    if (!device) return tl::unexpected(std::move(device.error()));
-    if (auto known = device->require_known_registers(); !known) {
-      return tl::unexpected(std::move(known.error()));
-    }
-    std::string identity = device->identity_text();
-    return device::Watcher::Link{std::move(*device), std::move(identity)};
-  };
+  return tools;
 }
 
 }  // namespace spindle::commands

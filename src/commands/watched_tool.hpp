@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -11,34 +12,65 @@
 
 namespace spindle::commands {
 
-/// A tool that is opened again and again, with what is shared by all tools of its profile.
-struct WatchedTool {
-  Target target;
-  const catalogue::Profile* profile;
-  const catalogue::CodeTexts* errors;
+/// A profile with the texts of its tools' error codes.
+struct KnownProfile {
+  catalogue::Profile profile;
+  catalogue::CodeTexts errors;
 };
 
-/// Tools, and the profiles and texts that they refer to: each loaded once.
-struct WatchedTools {
-  std::vector<WatchedTool> tools;
-  std::map<std::string, std::unique_ptr<const catalogue::Profile>> profiles;
-  std::map<std::string, std::unique_ptr<const catalogue::CodeTexts>> errors;
+/// Profiles, each loaded once however many tools have it. Several threads may ask.
+class ProfileShelf {
+ public:
+  explicit ProfileShelf(const files::ProfileStore& store) : store_(&store) {}
+
+  /// Stays valid as long as the shelf.
+  Result<const KnownProfile*> take(const std::string& id);
+
+ private:
+  const files::ProfileStore* store_;
+  std::mutex mutex_;
+  std::map<std::string, std::unique_ptr<const KnownProfile>> profiles_;
 };
 
-/// Resolves targets; a profile that is not known is found by asking the tool once.
-Result<WatchedTools> prepare_tools(const std::vector<std::string>& targets, const Context& context);
+/// A tool that is opened again and again. Where its profile is not known, it is asked at the first
+/// time, so that a tool that is not there keeps nobody from the others.
+class WatchedTool {
+ public:
+  /// Loads the profile of a target that names one. `shelf` and `context` must outlive it.
+  static Result<WatchedTool> make(Target target, ProfileShelf& shelf, const Context& context);
 
-/// Opens one tool and makes sure that its registers are those of the profile.
-device::Watcher::Open link_opener(const WatchedTool& tool, const Context& context);
+  [[nodiscard]] const Target& target() const { return target_; }
+  /// Null until the tool has said what it is.
+  [[nodiscard]] const KnownProfile* known() const { return known_; }
+
+  /// Opens the tool and makes sure that its registers are those of the profile.
+  Result<device::Watcher::Link> open();
+
+ private:
+  WatchedTool(Target target, ProfileShelf& shelf, const Context& context)
+      : target_(std::move(target)), shelf_(&shelf), context_(&context) {}
+
+  Result<void> find_profile();
+  Result<void> learn(const std::string& profile);
+
+  Target target_;
+  ProfileShelf* shelf_;
+  const Context* context_;
+  const KnownProfile* known_ = nullptr;
+};
+
+/// Resolves targets, asking none of them.
+Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+                                               ProfileShelf& shelf, const Context& context);
 
 /// Calls `handle` for every tool, each in a thread of its own when there are several, and returns
 /// when all are done.
 template <typename Handle>
-void for_each_side_by_side(const std::vector<WatchedTool>& tools, Handle handle) {
+void for_each_side_by_side(std::vector<WatchedTool>& tools, Handle handle) {
   if (tools.size() == 1) return handle(tools.front());
   std::vector<std::jthread> threads;
   threads.reserve(tools.size());
-  for (const WatchedTool& tool : tools) threads.emplace_back([&] { handle(tool); });
+  for (WatchedTool& tool : tools) threads.emplace_back([&] { handle(tool); });
 }
 
 }  // namespace spindle::commands

@@ -308,6 +308,22 @@ Result<Written> Device::write(const Parameter& parameter, const Value& before, c
   return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
 }
 
+Result<void> Device::send(const catalogue::Action& action, std::uint16_t value) {
+  return client_.write(action.address, value).map_error([&](Error error) {
+    error = located(std::move(error));
+    error.name = action.name;
+    error.register_address = action.address.value;
+    return error;
+  });
+}
+
+Result<Shown> Device::shows(const std::string& parameter, std::int64_t number) {
+  const auto found = profile_->find(parameter);
+  if (!found) return tl::unexpected(found.error());
+  return read_value(*found).map(
+      [&](const Value& value) { return value.number == Decimal(number) ? Shown::yes : Shown::no; });
+}
+
 Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint16_t value) {
   Parameter confirming;
   if (!action.confirm.empty()) {
@@ -315,12 +331,7 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint1
     if (!found) return tl::unexpected(std::move(found.error()));
     confirming = std::move(*found);
   }
-  auto sent = client_.write(action.address, value).map_error([&](Error error) {
-    error = located(std::move(error));
-    error.name = action.name;
-    error.register_address = action.address.value;
-    return error;
-  });
+  auto sent = send(action, value);
   if (!sent) return tl::unexpected(std::move(sent.error()));
   if (action.confirm.empty()) return ActionResult::sent;
   const Value expected{Decimal(action.confirm_value.value_or(value)), {}};

@@ -1,8 +1,9 @@
 // Runs transcripts: what a user types and what the program prints, in one readable file. The whole
 // program runs in this process, against simulated tools on a clock that is moved by hand.
 //
-//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [FAULT=SPEC]...
-//                         a tool that lives as long as the transcript
+//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [RUNDOWNS=DURATION] [NG=N] [FAULT=SPEC]...
+//                         a tool that lives as long as the transcript; with an operator who drives
+//                         a screw now and then, every Nth of them NG
 //   %file NAME … %end     a file in the transcript's own folder
 //   %answer TEXT          what the user types at the next question
 //   $ spindle ARGUMENTS   followed by what it prints
@@ -27,6 +28,7 @@
 #include <string>
 #include <vector>
 
+#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/cli/run.hpp"
 #include "spindle/posix/world.hpp"
@@ -113,6 +115,8 @@ class Stage {
       if (key == "FIRMWARE") options.firmware = static_cast<std::uint16_t>(std::stoul(value));
       if (key == "MODEL") options.tool_model = static_cast<std::uint16_t>(std::stoul(value));
       if (key == "BYTES") options.identity_bytes = std::stoul(value);
+      if (key == "RUNDOWNS") options.rundown_every = parse_duration(value).value();
+      if (key == "NG") options.ng_every = static_cast<unsigned>(std::stoul(value));
       if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
     }
     options.faults = tool->faults;
@@ -152,6 +156,10 @@ class Stage {
         .open = [this](const auto& endpoint, const auto& facts,
                        Duration) { return open(endpoint, facts); },
         // Enough of a server: it is listening, and nobody comes.
+        .calm = {clock_, calm_,
+                 [this](const auto& endpoint, const auto& facts, Duration) {
+                   return open(endpoint, facts);
+                 }},
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },
@@ -197,6 +205,7 @@ class Stage {
 
   files::ProfileStore profiles_;
   test::FakeClock clock_;
+  const Interrupt calm_;
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;

@@ -66,6 +66,29 @@ struct WatchOptions {
 };
 Result<Outcome> watch(const WatchOptions& options, Context& context);
 
+struct RemoteStartOptions {
+  std::string target;
+  std::string preset;             ///< value of the action select-preset; empty: leave as it is
+  std::string direction;          ///< value of the action direction; empty: leave as it is
+  std::optional<Duration> limit;  ///< stop after this time
+  Acceptance acceptance = Acceptance::verified_only;
+};
+Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context);
+
+struct RemoteStopOptions {
+  std::vector<std::string> targets;
+};
+Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
+
+enum class AlarmReset : std::uint8_t { no, yes };
+
+struct AlarmsOptions {
+  std::string target;
+  AlarmReset reset = AlarmReset::no;
+  Acceptance acceptance = Acceptance::verified_only;
+};
+Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
+
 struct SimulateOptions {
   std::string profile;
   std::string listen = "tcp://127.0.0.1:0";
@@ -74,6 +97,8 @@ struct SimulateOptions {
   std::optional<std::uint16_t> firmware;
   std::optional<std::uint32_t> serial;
   std::optional<std::uint16_t> model;
+  std::optional<Duration> rundown_every;  ///< an operator's; empty: nobody works with the tool
+  std::optional<unsigned> ng_every;       ///< every so many of them end NG
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
 

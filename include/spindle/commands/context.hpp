@@ -35,12 +35,20 @@ struct CommonOptions {
   Verbosity verbosity = Verbosity::normal;
 };
 
+/// A line and a clock that signals do not end: for the last words that leave a tool safe.
+struct Calm {
+  Clock& clock;
+  const Interrupt& interrupt;  ///< never raised
+  device::OpenTransport open;
+};
+
 /// Everything a command may touch.
 struct Context {
   report::Streams& io;
   Clock& clock;
   const Interrupt& interrupt;
   const device::OpenTransport& open;  ///< real lines; simulated tools are opened by commands
+  const Calm& calm;
   const sim::Serve& serve;
   const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
   const files::ProfileStore& profiles;
@@ -48,6 +56,9 @@ struct Context {
   report::Renderer& renderer;
   const CommonOptions& common;
 };
+
+/// The same context with a clock and lines that signals do not end.
+Context calm_context(const Context& context);
 
 /// How a command that handled several things ended.
 class Outcome {

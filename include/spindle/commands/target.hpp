@@ -47,9 +47,13 @@ enum class Need : std::uint8_t { named_registers, raw_registers };
 /// The target's profile, or an empty one where none is known before connecting.
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context);
 
+/// Whether somebody works with a tool of sim:, so that there is something to watch.
+enum class SimulatedOperator : std::uint8_t { absent, working };
+
 /// Connects with a profile that outlives the device, and asks nothing.
-Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
-                                      const Context& context);
+Result<device::Device> connect_device(
+    const Target& target, const catalogue::Profile& profile, const Context& context,
+    SimulatedOperator simulated_operator = SimulatedOperator::absent);
 
 /// The same with a profile to keep.
 Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context);

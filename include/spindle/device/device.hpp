@@ -53,6 +53,9 @@ struct Written {
   catalogue::Value now;  ///< as read back
 };
 
+/// What a reading says of an expectation.
+enum class Shown : std::uint8_t { no, yes };
+
 /// How an action ended.
 enum class ActionResult : std::uint8_t {
   confirmed,      ///< a reading proves the effect
@@ -98,6 +101,17 @@ class Device {
   /// has shown that it did not take. Does not check ranges. `before` is the value read before.
   Result<Written> write(const catalogue::Parameter& parameter, const catalogue::Value& before,
                         const catalogue::Value& value);
+
+  /// Sends an action's value once, never again; acknowledged is all that it means.
+  Result<void> send(const catalogue::Action& action, std::uint16_t value);
+
+  /// Sends an action's stop value. Requires an action that has one.
+  Result<void> send_stop(const catalogue::Action& action) {
+    return send(action, *action.stop_value);
+  }
+
+  /// Whether a parameter reads as this number now.
+  Result<Shown> shows(const std::string& parameter, std::int64_t number);
 
   /// Sends the action once, never again, and waits for its confirming parameter.
   Result<ActionResult> perform(const catalogue::Action& action, std::uint16_t value);

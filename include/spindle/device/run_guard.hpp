@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "spindle/device/device.hpp"
+
+namespace spindle::device {
+
+/// How surely a started motion has ended.
+enum class StopResult : std::uint8_t {
+  confirmed,    ///< the tool says that it does not run
+  sent,         ///< acknowledged; nothing that can be read proves it
+  unconfirmed,  ///< the link is gone, or the tool still says that it runs
+};
+
+struct StopReport {
+  StopResult result = StopResult::unconfirmed;
+  unsigned attempts = 0;     ///< how often the stop was sent, or a connection tried for it
+  Duration tried = {};       ///< for how long
+  std::string trouble = {};  ///< the last trouble, for `unconfirmed`
+};
+
+/// From the moment a start is sent, a stop is sent on every way out. Whoever holds a guard calls
+/// stop(); the destructor does it when nobody did. Stopping is not ended by an interrupt, and it
+/// reopens a lost link. It can not stop a tool that can not be reached: this is not a safety
+/// function.
+class RunGuard {
+ public:
+  /// Opens the tool anew for a stop, on a line that interrupts do not end.
+  using Reopen = std::function<Result<Device>()>;
+
+  /// `start` is an action with a stop value. `calm` is a clock whose sleeps are not interrupted.
+  RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm);
+  ~RunGuard();
+  RunGuard(const RunGuard&) = delete;
+  RunGuard& operator=(const RunGuard&) = delete;
+
+  /// Sends the start, exactly once. The guard is armed even when no acknowledgement comes: the tool
+  /// may run all the same.
+  Result<void> start();
+
+  /// Sends the stop until it is proven to have worked, for at most ten seconds. Further calls do
+  /// nothing and report the same.
+  StopReport stop();
+
+ private:
+  Result<StopResult> try_to_stop(Device& device);
+
+  Device* device_;
+  const catalogue::Action* action_;
+  Reopen reopen_;
+  Clock* calm_;
+  bool armed_ = false;
+  std::optional<StopReport> report_ = std::nullopt;
+};
+
+/// Sends the stop of an action and waits until its confirming parameter shows it. The stop may be
+/// repeated without harm. A tool that still runs at the deadline is `unconfirmed`.
+Result<StopResult> stop_and_confirm(Device& device, const catalogue::Action& start, Clock& clock);
+
+}  // namespace spindle::device

@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <array>
+
+#include "deeds.hpp"
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using catalogue::Profile;
+using report::Column;
+
+/// Registers whose meaning is not known: their numbers are shown, not explained.
+constexpr std::string_view data_list = "alarm-data";
+
+struct AlarmPlan {
+  std::vector<std::pair<std::string, Parameter>> sources;  ///< list name and parameter
+  std::optional<Deed> reset;
+};
+
+const std::array<Column, 5> columns = {{{"LIST", "list"},
+                                        {"INDEX", "index", report::Align::right},
+                                        {"CODE", "code", report::Align::right},
+                                        {"TEXT", "text"},
+                                        {"REMEDY", "remedy"}}};
+
+/// The present alarm is what proves a reset; the last event's error and the raw alarm data stand
+/// beside it.
+Result<AlarmPlan> plan_alarms(const Profile& profile) {
+  AlarmPlan plan;
+  const auto reset = profile.find_action("alarm-reset");
+  if (!reset) return tl::unexpected(reset.error());
+  auto present = profile.find(reset->confirm);
+  if (!present) return tl::unexpected(std::move(present.error()));
+  plan.sources.emplace_back("present", std::move(*present));
+  if (auto error = profile.find("event.error")) {
+    plan.sources.emplace_back("last-event", std::move(*error));
+  }
+  if (auto data = profile.select({"alarm.*"})) {
+    for (Parameter& parameter : *data)
+      plan.sources.emplace_back(std::string(data_list), std::move(parameter));
+  }
+  return plan;
+}
+
+report::Record alarm_record(const std::string& list, std::size_t index, std::int64_t code,
+                            const catalogue::CodeText* text, const Target& target,
+                            const Clock& clock) {
+  const bool is_free = code == 0 && list != data_list;
+  const std::string meaning = text != nullptr ? text->text : is_free ? "none" : "";
+  return {.type = "alarm",
+          .target = target.shown,
+          .time = clock.wall(),
+          .fields = {{"list", list},
+                     {"index", number(static_cast<std::int64_t>(index))},
+                     {"code", number(code)},
+                     {"text", text_or_null(meaning)},
+                     {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
+}
+
+Result<void> show(const AlarmPlan& plan, OpenTool& tool, Outcome& outcome, Context& context) {
+  const auto texts = context.profiles.load_error_codes(tool.profile->id);
+  if (!texts) return tl::unexpected(texts.error());
+  std::vector<Parameter> parameters;
+  parameters.reserve(plan.sources.size());
+  for (const auto& [list, parameter] : plan.sources) parameters.push_back(parameter);
+  const auto readings = tool.device.read_each(parameters, device::Limits::skip);
+  if (!readings) return tl::unexpected(readings.error());
+  Listing listing(context, columns);
+  std::size_t index = 0;
+  for (std::size_t at = 0; at < readings->size(); ++at) {
+    const auto& [list, parameter] = plan.sources[at];
+    index = at > 0 && plan.sources[at - 1].first == list ? index + 1 : 1;
+    const device::Reading& reading = (*readings)[at];
+    if (!reading.value) {
+      outcome.fail(reading.value.error());
+      listing.add(reading.value.error());
+      continue;
+    }
+    outcome.succeed();
+    const std::int64_t code = reading.value->number.mantissa();
+    const auto known = list == data_list ? texts->end() : texts->find(code);
+    listing.add(alarm_record(list, index, code, known == texts->end() ? nullptr : &known->second,
+                             tool.target, context.clock));
+  }
+  return listing.end();
+}
+
+Result<void> reset(const Deed& deed, OpenTool& tool, Outcome& outcome, Context& context) {
+  const auto result = tool.device.perform(deed.action, deed.value);
+  if (!result) return tl::unexpected(result.error());
+  Listing listing(context, deed_columns());
+  listing.add(deed_record(deed, *result, tool.target, context.clock));
+  if (result == device::ActionResult::not_confirmed) {
+    const Error error = not_confirmed(deed, tool.target);
+    outcome.fail(error);
+    listing.add(error);
+  } else {
+    outcome.succeed();
+  }
+  return listing.end();
+}
+
+}  // namespace
+
+Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
+  const auto target = resolve_target(options.target, context);
+  if (!target) return tl::unexpected(target.error());
+  auto opened = open_prepared(
+      *target, Need::named_registers, context, [&](const Profile& profile) -> Result<AlarmPlan> {
+        auto plan = plan_alarms(profile);
+        if (!plan || options.reset == AlarmReset::no) return plan;
+        auto deed = parse_deed("alarm-reset", profile);
+        if (!deed) return tl::unexpected(std::move(deed.error()));
+        plan->reset = std::move(*deed);
+        return check_evidence(plan->reset->action, *target, options.acceptance)
+            .and_then([&] { return ask_for_hazards({*plan->reset}, *target, context); })
+            .map([&] { return std::move(*plan); });
+      });
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  Outcome outcome;
+  auto done = show(opened->prepared, opened->tool, outcome, context);
+  if (done && opened->prepared.reset) {
+    done = reset(*opened->prepared.reset, opened->tool, outcome, context);
+  }
+  if (!done) return tl::unexpected(std::move(done.error()));
+  return context.renderer
+      .summary(summary_record({{"codes", number(static_cast<std::int64_t>(outcome.succeeded()))},
+                               {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                              outcome.status(), target->shown, context.clock),
+               {})
+      .map([&] { return outcome; });
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/report/renderer.hpp"
+
+namespace spindle::commands {
+
+/// An action of the catalogue with the value to send.
+struct Deed {
+  catalogue::Action action;
+  std::uint16_t value;
+};
+
+/// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`.
+Result<Deed> parse_deed(const std::string& text, const catalogue::Profile& profile);
+
+/// The evidence rule: what may move or lock a tool is not sent on the word of another product,
+/// unless it is accepted or the tools file lists it as verified. Error `unverified` says how to
+/// check it.
+Result<void> check_evidence(const catalogue::Action& action, const Target& target,
+                            Acceptance acceptance);
+
+/// Asks for consent when one of the deeds has a hazard.
+Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
+                             const Context& context);
+
+report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,
+                           const Clock& clock);
+std::span<const report::Column> deed_columns();
+
+/// The tool acknowledged the deed, and its effect can not be seen.
+Error not_confirmed(const Deed& deed, const Target& target);
+
+}  // namespace spindle::commands

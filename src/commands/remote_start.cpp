@@ -1,0 +1,254 @@
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "deeds.hpp"
+#include "event_records.hpp"
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/device/run_follower.hpp"
+#include "spindle/device/run_guard.hpp"
+#include "stops.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Action;
+using catalogue::Profile;
+using device::RunEnding;
+
+/// Everything that is decided before the tool is touched.
+struct RunPlan {
+  std::vector<Deed> selections;  ///< preset and direction, as far as they were given
+  Action start;
+  Action alarm_reset;  ///< its confirming parameter tells whether there is an alarm
+};
+
+Result<RunPlan> plan_run(const RemoteStartOptions& options, const Profile& profile,
+                         const Target& target) {
+  auto start = find_start(profile);
+  if (!start) return tl::unexpected(std::move(start.error()));
+  if (!profile.events || start->confirm.empty()) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "a run of this product can not be followed",
+                                .name = profile.id});
+  }
+  auto alarm_reset = profile.find_action("alarm-reset");
+  if (!alarm_reset) return tl::unexpected(std::move(alarm_reset.error()));
+  RunPlan plan{.selections = {}, .start = *start, .alarm_reset = std::move(*alarm_reset)};
+  for (const auto& [name, value] :
+       {std::pair("select-preset", &options.preset), std::pair("direction", &options.direction)}) {
+    if (value->empty()) continue;
+    auto deed = parse_deed(fmt::format("{}={}", name, *value), profile);
+    if (!deed) return tl::unexpected(std::move(deed.error()));
+    auto allowed = check_evidence(deed->action, target, options.acceptance);
+    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    plan.selections.push_back(std::move(*deed));
+  }
+  return check_evidence(plan.start, target, options.acceptance).map([&] {
+    return std::move(plan);
+  });
+}
+
+Result<void> ask_to_start(const RunPlan& plan, const Target& target, const Context& context) {
+  std::vector<Deed> deeds = plan.selections;
+  deeds.push_back({plan.start, *plan.start.value});
+  return ask_for_hazards(deeds, target, context);
+}
+
+Error not_ready(const Target& target, std::string message, std::string hint) {
+  return target.blamed(
+      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
+}
+
+/// No alarm, not running. Whether it is locked can not be read on every product.
+Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
+  const auto alarm_free =
+      tool.device.shows(plan.alarm_reset.confirm, plan.alarm_reset.confirm_value.value_or(0));
+  if (!alarm_free) return tl::unexpected(alarm_free.error());
+  if (*alarm_free == device::Shown::no) {
+    return tl::unexpected(not_ready(tool.target, "the tool has an alarm, so it was not started",
+                                    "'spindle alarms' shows it"));
+  }
+  const auto still = tool.device.shows(plan.start.confirm, *plan.start.stop_value);
+  if (!still) return tl::unexpected(still.error());
+  if (*still == device::Shown::no) {
+    return tl::unexpected(
+        not_ready(tool.target, "the tool runs already, so it was not started", ""));
+  }
+  return {};
+}
+
+/// One remote start: what is told of it, and how it ended.
+class RemoteRun {
+ public:
+  RemoteRun(const RemoteStartOptions& options, const RunPlan& plan, OpenTool& tool,
+            Context& context)
+      : options_(&options), plan_(&plan), tool_(&tool), context_(&context) {}
+
+  Result<Outcome> run() {
+    auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
+    if (!selected) return tl::unexpected(std::move(selected.error()));
+    device::RunFollower follower(tool_->device, plan_->start, context_->clock);
+    if (auto prepared = follower.prepare(); !prepared) {
+      return tl::unexpected(std::move(prepared.error()));
+    }
+    device::RunGuard guard(tool_->device, plan_->start, reopener(), context_->calm.clock);
+    auto followed = guard.start().and_then([&] { return follower.follow(follow_options()); });
+    clear_progress();
+    const device::StopReport stop = guard.stop();
+    auto late = find_result(followed, follower, stop);
+    follower.leave();
+    return report(followed, late, stop);
+  }
+
+ private:
+  Result<void> select() {
+    for (const Deed& deed : plan_->selections) {
+      const auto result = tool_->device.perform(deed.action, deed.value);
+      if (!result) return tl::unexpected(result.error());
+      if (result == device::ActionResult::not_confirmed) {
+        return tl::unexpected(not_confirmed(deed, tool_->target));
+      }
+    }
+    return {};
+  }
+
+  /// A line that signals do not end, for a stop after the first one broke.
+  device::RunGuard::Reopen reopener() {
+    return [this]() -> Result<device::Device> {
+      const Context calm = calm_context(*context_);
+      return connect_device(tool_->target, *tool_->profile, calm);
+    };
+  }
+
+  device::FollowOptions follow_options() {
+    return {.limit = options_->limit, .progress = [this](Duration elapsed) -> Result<void> {
+              if (context_->io.out_is_open && !context_->io.out_is_open()) {
+                return tl::unexpected(Error{.code = Errc::closed_pipe});
+              }
+              show_progress(elapsed);
+              return {};
+            }};
+  }
+
+  void show_progress(Duration elapsed) {
+    if (!context_->io.err_is_terminal) return;
+    const auto tenths =
+        std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count() / 100;
+    context_->io.err(fmt::format("\r\x1b[Krunning {}.{} s", tenths / 10, tenths % 10));
+  }
+
+  void clear_progress() {
+    if (context_->io.err_is_terminal) context_->io.err("\r\x1b[K");
+  }
+
+  /// The event of the run: the one that ended it, or the one that our stop caused.
+  std::optional<device::EventNews> find_result(Result<device::FollowedRun>& followed,
+                                               device::RunFollower& follower,
+                                               const device::StopReport& stop) {
+    if (followed && followed->event) return std::move(followed->event);
+    if (stop.result == device::StopResult::unconfirmed) return std::nullopt;
+    auto late = follower.late_event();
+    return late ? std::move(*late) : std::nullopt;
+  }
+
+  Result<Outcome> report(const Result<device::FollowedRun>& followed,
+                         const std::optional<device::EventNews>& event,
+                         const device::StopReport& stop) {
+    const auto codes = context_->profiles.load_error_codes(tool_->profile->id);
+    const NewsRecords records(tool_->target, *tool_->profile,
+                              codes.value_or(catalogue::CodeTexts()));
+    Listing listing(*context_, news_columns(Tools::one));
+    std::string kind;
+    if (event) {
+      kind = records.kind_of(event->block);
+      listing.add(records.event(*event));
+    }
+    judge(followed, kind);
+    if (stop.result == device::StopResult::unconfirmed) {
+      outcome_ = {};  // nothing else matters as much
+      fail(unconfirmed_stop(stop));
+    }
+    for (const Error& error : errors_) listing.add(error);
+    auto ended = listing.end().and_then([&] { return summarise(kind, stop); });
+    // A stop that nobody could confirm is told even where nobody reads the results any more.
+    if (!ended && stop.result == device::StopResult::confirmed) {
+      return tl::unexpected(std::move(ended.error()));
+    }
+    return outcome_;
+  }
+
+  void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
+    if (!followed) {
+      if (followed.error().code != Errc::closed_pipe) fail(followed.error());
+      return;
+    }
+    if (followed->ending == RunEnding::ignored && kind.empty()) {
+      fail(tool_->target.blamed({.code = Errc::mismatch,
+                                 .message = "the tool acknowledged the start, but does not run",
+                                 .hint = "is it locked, or without a battery charge?",
+                                 .name = plan_->start.name}));
+      return;
+    }
+    if (followed->ending == RunEnding::ended && kind.empty()) {
+      fail(tool_->target.blamed({.code = Errc::no_answer,
+                                 .message = "the tool ran, but never sent a result",
+                                 .hint = "'spindle get' with 'event.*' shows its last event"}));
+      return;
+    }
+    outcome_.succeed();
+    if (kind == "fastening-ng" || kind == "error") outcome_.negate();
+  }
+
+  void fail(const Error& error) {
+    outcome_.fail(error);
+    errors_.push_back(error);
+  }
+
+  Error unconfirmed_stop(const device::StopReport& stop) const {
+    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(stop.tried).count();
+    return tool_->target.blamed(
+        {.code = Errc::no_answer,
+         .message =
+             fmt::format("THE TOOL MAY STILL RUN: the stop was tried for {} s ({} times) and "
+                         "could not be confirmed: {}",
+                         seconds, stop.attempts, stop.trouble),
+         .hint = "stop it at the tool"});
+  }
+
+  Result<void> summarise(const std::string& kind, const device::StopReport& stop) {
+    const bool stopped = stop.result == device::StopResult::confirmed;
+    const std::string result = kind.empty() ? "no result" : kind;
+    return context_->renderer.summary(
+        summary_record({{"result", text_or_null(kind)}, {"stop_confirmed", stopped}},
+                       outcome_.status(), tool_->target.shown, context_->clock),
+        fmt::format("{}; the tool {}", result,
+                    stopped ? "stands still" : "may still run: the stop could not be confirmed"));
+  }
+
+  const RemoteStartOptions* options_;
+  const RunPlan* plan_;
+  OpenTool* tool_;
+  Context* context_;
+  Outcome outcome_ = {};
+  std::vector<Error> errors_ = {};
+};
+
+}  // namespace
+
+Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context) {
+  const auto target = resolve_target(options.target, context);
+  if (!target) return tl::unexpected(target.error());
+  auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
+    return plan_run(options, profile, *target).and_then([&](RunPlan plan) {
+      return ask_to_start(plan, *target, context).map([&] { return std::move(plan); });
+    });
+  });
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  return RemoteRun(options, opened->prepared, opened->tool, context).run();
+}
+
+}  // namespace spindle::commands

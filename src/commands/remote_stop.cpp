@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+
+#include "deeds.hpp"
+#include "listing.hpp"
+#include "records.hpp"
+#include "side_by_side.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/device/run_guard.hpp"
+#include "stops.hpp"
+
+namespace spindle::commands {
+namespace {
+
+/// Neither asks nor waits for anything but the proof: somebody wants this tool to stand still.
+Result<device::StopResult> stop_one(const Target& target, const Context& context) {
+  auto profile = load_profile(target, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  auto tool = open_tool(target, std::move(*profile), Need::named_registers, context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  const auto start = find_start(*tool->profile);
+  if (!start) return tl::unexpected(start.error());
+  return device::stop_and_confirm(tool->device, *start, context.clock);
+}
+
+}  // namespace
+
+Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
+  const auto targets = resolve_targets(options.targets, context);
+  if (!targets) return tl::unexpected(targets.error());
+  const auto results =
+      side_by_side(*targets, [&](const Target& target) { return stop_one(target, context); });
+  Outcome outcome;
+  Listing listing(context, stop_columns());
+  for (std::size_t index = 0; index < results.size(); ++index) {
+    const Target& target = (*targets)[index];
+    const Result<device::StopResult>& result = results[index];
+    if (result) listing.add(stop_record(*result, target, context.clock));
+    std::optional<Error> error;
+    if (!result) error = result.error();
+    if (result == device::StopResult::unconfirmed) error = still_runs(target);
+    if (error) {
+      outcome.fail(*error);
+      listing.add(*error);
+    } else {
+      outcome.succeed();
+    }
+  }
+  return listing.end()
+      .and_then([&] {
+        return context.renderer.summary(
+            summary_record({{"stopped", number(static_cast<std::int64_t>(outcome.succeeded()))},
+                            {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                           outcome.status(), {}, context.clock),
+            fmt::format("{} stopped, {} failed", outcome.succeeded(), outcome.failed()));
+      })
+      .map([&] { return outcome; });
+}
+
+}  // namespace spindle::commands

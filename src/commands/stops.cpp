@@ -1,0 +1,54 @@
+#include "stops.hpp"
+
+#include <array>
+
+#include "records.hpp"
+
+namespace spindle::commands {
+namespace {
+
+std::string_view to_text(device::StopResult result) {
+  switch (result) {
+    case device::StopResult::confirmed:
+      return "confirmed";
+    case device::StopResult::sent:
+      return "sent";
+    case device::StopResult::unconfirmed:
+      return "not-confirmed";
+  }
+  return "";
+}
+
+}  // namespace
+
+Result<catalogue::Action> find_start(const catalogue::Profile& profile) {
+  auto start = profile.find_action("start");
+  if (start && start->value && start->stop_value) return start;
+  return tl::unexpected(Error{.code = Errc::usage,
+                              .message = "this product can not be started and stopped by Modbus",
+                              .name = profile.id});
+}
+
+report::Record stop_record(device::StopResult result, const Target& target, const Clock& clock) {
+  return {.type = "action",
+          .target = target.shown,
+          .time = clock.wall(),
+          .fields = {{"action", std::string("stop")},
+                     {"value", report::Cell()},
+                     {"result", std::string(to_text(result))}}};
+}
+
+std::span<const report::Column> stop_columns() {
+  static const std::array<report::Column, 3> columns = {
+      {{"TARGET", "target"}, {"ACTION", "action"}, {"RESULT", "result"}}};
+  return columns;
+}
+
+Error still_runs(const Target& target) {
+  return target.blamed(
+      {.code = Errc::mismatch,
+       .message = "the stop was acknowledged, but the tool still says that it runs",
+       .hint = "stop it at the tool"});
+}
+
+}  // namespace spindle::commands
