@@ -606,8 +606,17 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
   return names;
 }
 
+std::string path_of(const CLI::App* command) {
+  std::string path = command->get_name();
+  for (const CLI::App* parent = command->get_parent();
+       parent != nullptr && parent->get_parent() != nullptr; parent = parent->get_parent()) {
+    path = parent->get_name() + " " + path;
+  }
+  return path;
+}
+
 Error unexpected_argument(const CLI::App& app, const Draft& draft, const std::string& extra) {
-  const std::string command = draft.chosen == nullptr ? "" : draft.chosen->get_name();
+  const std::string command = draft.chosen == nullptr ? "" : path_of(draft.chosen);
   if (extra.size() > 1 && extra.front() == '-') {
     const std::string name = extra.substr(0, extra.find('='));
     std::string hint = suggestion(name, option_names(app, draft.chosen));
@@ -695,15 +704,6 @@ std::string command_lines(const CLI::App& app) {
     text += fmt::format("  {:<12}{}\n", command->get_name(), command->get_description());
   }
   return text;
-}
-
-std::string path_of(const CLI::App* command) {
-  std::string path = command->get_name();
-  for (const CLI::App* parent = command->get_parent();
-       parent != nullptr && parent->get_parent() != nullptr; parent = parent->get_parent()) {
-    path = parent->get_name() + " " + path;
-  }
-  return path;
 }
 
 std::string program_help(const CLI::App& app) {

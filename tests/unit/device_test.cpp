@@ -1,0 +1,458 @@
+#include "spindle/device/device.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "spindle/files/profile_store.hpp"
+#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/sim_transport.hpp"
+#include "support/fake_clock.hpp"
+
+using namespace spindle;
+using namespace spindle::device;
+using namespace std::chrono_literals;
+using catalogue::Parameter;
+using catalogue::Profile;
+using catalogue::Value;
+using modbus::FunctionCode;
+using modbus::Pdu;
+
+namespace {
+
+const files::ProfileStore& store() {
+  static const files::ProfileStore profiles({SPINDLE_SOURCE_DIR "/profiles"});
+  return profiles;
+}
+
+const Profile& bm() {
+  static const Profile profile = store().load("doga-bm").value();
+  return profile;
+}
+
+/// Decides about one write before the tool sees it: the number counts writes from 1.
+using Swallow = std::function<bool(std::size_t write)>;
+
+/// A simulated tool to which some writes never come.
+class Deaf final : public sim::Server {
+ public:
+  Deaf(std::unique_ptr<sim::Server> tool, Swallow swallow)
+      : tool_(std::move(tool)), swallow_(std::move(swallow)) {}
+
+  std::optional<Pdu> answer(sim::ConnectionId connection, modbus::UnitId unit, const Pdu& request,
+                            TimePoint now) override {
+    const bool is_write =
+        request.function == static_cast<std::uint8_t>(FunctionCode::write_single_register);
+    if (is_write && swallow_ && swallow_(++writes_)) return std::nullopt;
+    return tool_->answer(connection, unit, request, now);
+  }
+  void advance(TimePoint now) override { tool_->advance(now); }
+  [[nodiscard]] std::optional<TimePoint> next_change() const override {
+    return tool_->next_change();
+  }
+  std::vector<sim::Push> take_pushes() override { return tool_->take_pushes(); }
+  std::vector<sim::Push> take_pushes(sim::ConnectionId connection) override {
+    return tool_->take_pushes(connection);
+  }
+  [[nodiscard]] std::optional<Pdu> event_frame() const override { return tool_->event_frame(); }
+  void connected(sim::ConnectionId connection) override { tool_->connected(connection); }
+  void disconnected(sim::ConnectionId connection) override { tool_->disconnected(connection); }
+
+ private:
+  std::unique_ptr<sim::Server> tool_;
+  Swallow swallow_;
+  std::size_t writes_ = 0;
+};
+
+struct Setup {
+  std::vector<std::string> faults = {};
+  sim::BmOptions tool = {};
+  Swallow swallow = {};
+  std::string shown = {};
+};
+
+/// A device before a simulated tool, with no retries of reads; what it sends is written down.
+struct Bench {
+  explicit Bench(Setup setup = {}, const Profile& profile = bm()) {
+    for (const std::string& fault : setup.faults) faults.push_back(*sim::parse_fault(fault));
+    setup.tool.faults = faults;
+    auto tool = sim::make_bm_tool(bm(), store().load_simulation("doga-bm").value(), setup.tool);
+    auto server = std::make_unique<Deaf>(std::move(tool), std::move(setup.swallow));
+    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts& facts,
+                                   Duration) -> Result<std::unique_ptr<link::Transport>> {
+      return sim::make_sim_transport(std::move(server), facts.framing, faults, clock, interrupt);
+    };
+    const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
+    const link::Trace trace{.bytes = [this](auto way, ByteView bytes) { note(way, bytes); },
+                            .decision = {}};
+    const LinkOptions options{.retries = 0, .trace = trace, .shown = setup.shown};
+    opened = Device::open(*endpoint, profile, options, open, clock);
+    REQUIRE(opened.has_value());
+  }
+
+  void note(link::Direction direction, ByteView bytes) {
+    if (direction == link::Direction::received) return;
+    const auto request = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, bytes);
+    requests.push_back(std::get<modbus::Deframed>(request).adu.pdu);
+  }
+
+  Device& device() { return *opened; }
+
+  [[nodiscard]] std::size_t count(FunctionCode function) const {
+    return static_cast<std::size_t>(
+        std::count_if(requests.begin(), requests.end(), [&](const Pdu& request) {
+          return request.function == static_cast<std::uint8_t>(function);
+        }));
+  }
+  [[nodiscard]] std::size_t writes() const { return count(FunctionCode::write_single_register); }
+
+  Interrupt interrupt;
+  test::FakeClock clock{interrupt};
+  sim::FaultPlan faults;
+  std::vector<Pdu> requests;
+  Result<Device> opened = tl::unexpected(Error());
+};
+
+const Value before{Decimal(271, -2), {}};
+const Value wanted{Decimal(300, -2), {}};
+
+Parameter target_torque() { return bm().find("preset.1.target-torque").value(); }
+
+Result<Written> write(Bench& bench) {
+  return bench.device().write(target_torque(), before, wanted);
+}
+
+Result<ActionResult> perform(Bench& bench, std::string_view action, std::uint16_t value) {
+  return bench.device().perform(bm().find_action(action).value(), value);
+}
+
+}  // namespace
+
+TEST_CASE("a tool is of the profile only when it says so itself") {
+  struct Case {
+    std::string what;
+    Setup setup;
+    std::optional<Errc> refused;
+  };
+  const std::vector<Case> cases = {
+      {"the profile's own", {}, std::nullopt},
+      {"a longer identity", {.tool = {.identity_bytes = 13}}, std::nullopt},
+      {"the longest identity", {.tool = {.identity_bytes = 17}}, std::nullopt},
+      {"the last firmware of the generation", {.tool = {.firmware = 3999}}, std::nullopt},
+      {"the next generation", {.tool = {.firmware = 4000}}, Errc::wrong_generation},
+      {"a later one", {.tool = {.firmware = 4001}}, Errc::wrong_generation},
+      {"an unknown model", {.tool = {.tool_model = 99}}, Errc::wrong_generation},
+      {"an identity that is too short", {.tool = {.identity_bytes = 8}}, Errc::wrong_generation},
+      {"a refusal to say", {.faults = {"exception=1"}}, Errc::wrong_generation},
+      {"silence", {.faults = {"lost"}}, Errc::no_answer},
+      {"a hang-up", {.faults = {"close"}}, Errc::closed},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.setup);
+    const auto known = bench.device().require_known_registers();
+    CHECK(known.has_value() == !row.refused.has_value());
+    if (!known) CHECK(known.error().code == row.refused);
+    CHECK(bench.requests.size() == 1);
+  }
+}
+
+TEST_CASE("a tool is asked what it is once, and not at all where the profile has no identity") {
+  Bench bench;
+  REQUIRE(bench.device().require_known_registers().has_value());
+  REQUIRE(bench.device().require_known_registers().has_value());
+  CHECK(bench.count(FunctionCode::report_server_id) == 1);
+
+  Profile anonymous = bm();
+  anonymous.identity.reset();
+  Bench unasked({}, anonymous);
+  CHECK(unasked.device().require_known_registers().has_value());
+  CHECK(unasked.requests.empty());
+}
+
+TEST_CASE("a refusal names firmware and profile, and what can still be done") {
+  Bench bench({.tool = {.firmware = 4001}});
+  const auto known = bench.device().require_known_registers();
+  REQUIRE_FALSE(known.has_value());
+  CHECK(describe(known.error()) ==
+        "tcp://192.168.10.23:5000: firmware 4001 has other registers than profile doga-bm (below "
+        "4000); only raw registers such as @holding:2 can be read");
+}
+
+TEST_CASE("all presets are read in at most four requests") {
+  Bench bench;
+  const auto presets = bm().select({"preset.*"});
+  REQUIRE(presets->size() == 225);
+  const auto readings = bench.device().read_each(*presets, Limits::skip);
+  REQUIRE(readings.has_value());
+  CHECK(readings->size() == 225);
+  CHECK(bench.requests.size() <= 4);
+  CHECK((*readings)[1].value->to_string() == "2.71");
+}
+
+TEST_CASE("a hole stands in its own reading, and the limits of a parameter beside its value") {
+  Bench bench;
+  const auto parameters = bm().select({"preset.1.target-torque", "p564", "p725", "status.ready"});
+  const auto readings = bench.device().read_each(*parameters, Limits::read);
+  REQUIRE(readings.has_value());
+  const Reading& torque = (*readings)[0];
+  CHECK(torque.minimum->to_string() == "0.00");
+  CHECK(torque.maximum->to_string() == "6.00");
+  CHECK_FALSE(torque.limits_error.has_value());
+
+  const Reading& hole = (*readings)[1];
+  REQUIRE_FALSE(hole.value.has_value());
+  CHECK(hole.value.error().code == Errc::exception_response);
+  CHECK(hole.value.error().name == "p564");
+  CHECK(hole.limits_error.has_value());
+
+  for (const std::size_t without : {2U, 3U}) {
+    CAPTURE(without);
+    CHECK((*readings)[without].value.has_value());
+    CHECK_FALSE((*readings)[without].minimum.has_value());
+    CHECK_FALSE((*readings)[without].limits_error.has_value());
+  }
+}
+
+TEST_CASE("a write is sent once and proven by reading back") {
+  struct Case {
+    std::string what;
+    Setup setup;
+    WriteResult result;
+    std::string now;
+    std::size_t writes;
+  };
+  const auto first = [](std::size_t write) { return write == 1; };
+  const std::vector<Case> cases = {
+      {"acknowledged", {}, WriteResult::written, "3.00", 1},
+      {"acknowledged with a wrong echo",
+       {.faults = {"wrong-echo@1"}},
+       WriteResult::written,
+       "3.00",
+       1},
+      {"taken, but the answer was lost", {.faults = {"lost@1"}}, WriteResult::written, "3.00", 1},
+      {"never arrived: repeated", {.swallow = first}, WriteResult::written, "3.00", 2},
+      {"acknowledged, not stored", {.faults = {"ignore-write"}}, WriteResult::mismatch, "2.71", 1},
+      {"stored as something else", {.faults = {"store-other=5"}}, WriteResult::coerced, "3.05", 1},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.setup);
+    const auto written = write(bench);
+    REQUIRE(written.has_value());
+    CHECK(written->result == row.result);
+    CHECK(written->now.to_string() == row.now);
+    CHECK(bench.writes() == row.writes);
+  }
+}
+
+TEST_CASE("a write that fails says what is known, and is not repeated blindly") {
+  struct Case {
+    std::string what;
+    Setup setup;
+    Errc code;
+    std::string text;  ///< part of the description
+    std::size_t writes;
+    std::size_t reads;
+  };
+  const auto always = [](std::size_t) { return true; };
+  const std::vector<Case> cases = {
+      {"refused",
+       {.faults = {"exception=14@1"}},
+       Errc::exception_response,
+       "refused 'write register 2' with exception 0E",
+       1,
+       0},
+      {"hung up", {.faults = {"close@1"}}, Errc::closed, "closed the connection", 1, 0},
+      {"never arrives, twice",
+       {.swallow = always},
+       Errc::no_answer,
+       "no answer to 'write register",
+       2,
+       2},
+      {"no answer, then a third value",
+       {.faults = {"lost@1", "store-other=5"}},
+       Errc::no_answer,
+       "no answer to 'write register 2'",
+       1,
+       1},
+      {"no answer, and none to the reading",
+       {.faults = {"lost"}},
+       Errc::no_answer,
+       "whether it was written is not known",
+       1,
+       1},
+      {"acknowledged, reading refused",
+       {.faults = {"exception=2@2"}},
+       Errc::mismatch,
+       "the tool acknowledged it, but reading it back failed",
+       1,
+       1},
+      {"acknowledged, reading not answered",
+       {.faults = {"lost@2"}},
+       Errc::no_answer,
+       "the tool acknowledged it, but reading it back failed",
+       1,
+       1},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.setup);
+    const auto written = write(bench);
+    REQUIRE_FALSE(written.has_value());
+    const std::string text = describe(written.error());
+    CAPTURE(text);
+    CHECK(written.error().code == row.code);
+    CHECK(text.find(row.text) != std::string::npos);
+    CHECK(written.error().name == "preset.1.target-torque");
+    CHECK(bench.writes() == row.writes);
+    CHECK(bench.count(FunctionCode::read_holding_registers) == row.reads);
+  }
+}
+
+TEST_CASE("an action is sent exactly once, however it ends") {
+  struct Case {
+    std::string what;
+    std::string action;
+    std::uint16_t value;
+    Setup setup;
+    ActionResult result;
+  };
+  const std::vector<Case> cases = {
+      {"its effect is read", "select-preset", 3, {}, ActionResult::confirmed},
+      {"nothing can prove it", "auto-output", 1, {}, ActionResult::sent},
+      {"a fixed reading proves it", "alarm-reset", 1, {}, ActionResult::confirmed},
+      {"an echo is not a deed",
+       "select-preset",
+       3,
+       {.faults = {"ignore-write"}},
+       ActionResult::not_confirmed},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.setup);
+    const auto result = perform(bench, row.action, row.value);
+    REQUIRE(result.has_value());
+    CHECK(*result == row.result);
+    CHECK(bench.writes() == 1);
+  }
+}
+
+TEST_CASE("an action that fails was sent once all the same") {
+  struct Case {
+    std::string what;
+    Setup setup;
+    Errc code;
+  };
+  const std::vector<Case> cases = {
+      {"the answer is lost", {.faults = {"lost@1"}}, Errc::no_answer},
+      {"the request is lost", {.swallow = [](std::size_t) { return true; }}, Errc::no_answer},
+      {"it is refused", {.faults = {"exception=2@1"}}, Errc::exception_response},
+      {"the connection ends", {.faults = {"close@1"}}, Errc::closed},
+      {"the proof is refused", {.faults = {"exception=2@2"}}, Errc::mismatch},
+      {"the proof does not come", {.faults = {"lost@2"}}, Errc::no_answer},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.setup);
+    const auto result = perform(bench, "select-preset", 3);
+    REQUIRE_FALSE(result.has_value());
+    CHECK(result.error().code == row.code);
+    CHECK(result.error().name == "select-preset");
+    CHECK(bench.writes() == 1);
+  }
+}
+
+TEST_CASE("a proof is awaited for one answer time, and not longer") {
+  Bench bench({.faults = {"ignore-write"}});
+  const TimePoint start = bench.clock.now();
+  REQUIRE(perform(bench, "select-preset", 3) == ActionResult::not_confirmed);
+  const Duration waited = bench.clock.now() - start;
+  CHECK(waited > 900ms);
+  CHECK(waited <= 1s);
+  CHECK(bench.count(FunctionCode::read_input_registers) > 10);
+}
+
+TEST_CASE("an interrupt ends the wait for a proof as an interrupt") {
+  Bench bench({.faults = {"ignore-write"}});
+  bench.clock.at(bench.clock.now() + 100ms, [&] { bench.interrupt.raise(2); });
+  const auto result = perform(bench, "select-preset", 3);
+  REQUIRE_FALSE(result.has_value());
+  CHECK(result.error().code == Errc::interrupted);
+}
+
+TEST_CASE("errors name the tool, its address, and the maker's words for an exception") {
+  Bench bench({.faults = {"exception=14@1"}, .shown = "station3"});
+  const auto written = write(bench);
+  REQUIRE_FALSE(written.has_value());
+  CHECK(written.error().target == "station3");
+  CHECK(written.error().endpoint == "tcp://192.168.10.23:5000");
+  CHECK(written.error().exception == 0x0E);
+  CHECK(describe(written.error()) ==
+        "station3 (tcp://192.168.10.23:5000): preset.1.target-torque: the tool refused 'write "
+        "register 2' with exception 0E (range of data not available: the value is outside the "
+        "tool's limits)");
+}
+
+TEST_CASE("a line that can not be opened is told with the tool's name and address") {
+  test::FakeClock clock;
+  const OpenTransport open = [](const link::Endpoint&, const catalogue::LinkFacts&,
+                                Duration) -> Result<std::unique_ptr<link::Transport>> {
+    return tl::unexpected(Error{.code = Errc::no_route});
+  };
+  const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
+  const auto device = Device::open(*endpoint, bm(), {.shown = "station3"}, open, clock);
+  REQUIRE_FALSE(device.has_value());
+  CHECK(device.error().target == "station3");
+  CHECK(device.error().endpoint == "tcp://192.168.10.23:5000");
+}
+
+TEST_CASE("timeouts come from the user, else from the profile") {
+  for (const auto& [given, expected] :
+       {std::pair<std::optional<Duration>, Duration>{std::nullopt, 1s}, {250ms, 250ms}}) {
+    test::FakeClock clock;
+    Interrupt interrupt;
+    Duration connecting = {};
+    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts& facts,
+                                   Duration timeout) -> Result<std::unique_ptr<link::Transport>> {
+      connecting = timeout;
+      auto tool = sim::make_bm_tool(bm(), store().load_simulation("doga-bm").value(), {});
+      return sim::make_sim_transport(std::move(tool), facts.framing, {*sim::parse_fault("lost")},
+                                     clock, interrupt);
+    };
+    const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
+    auto device = Device::open(*endpoint, bm(),
+                               {.answer_timeout = given, .connect_timeout = given, .retries = 0},
+                               open, clock);
+    REQUIRE(device.has_value());
+    CHECK(connecting == given.value_or(bm().link.connect));
+    CHECK_FALSE(device->report_server_id().has_value());
+    CHECK(clock.now() - test::FakeClock::start == expected);
+  }
+}
+
+TEST_CASE("a ping touches no value, and an exception answers it, too") {
+  for (const std::vector<std::string>& faults :
+       {std::vector<std::string>{}, std::vector<std::string>{"exception=1"}}) {
+    Bench bench({.faults = faults});
+    CHECK(bench.device().ping() == 100us);
+    CHECK(bench.requests.size() == 1);
+    CHECK(bench.count(FunctionCode::report_server_id) == 1);
+  }
+  Bench silent({.faults = {"lost"}});
+  CHECK(silent.device().ping().error().code == Errc::no_answer);
+}
+
+TEST_CASE("the whole last event is read without a frame that looks like a pushed one") {
+  Bench bench;
+  const auto event = bench.device().last_event();
+  REQUIRE(event.has_value());
+  CHECK(event->size() == 14);
+  CHECK(event->front() == 1961);
+  CHECK(event->back() == 402);
+  for (const Pdu& request : bench.requests) CHECK(get_u16(request.data, 2) != 14);
+}

@@ -1,0 +1,293 @@
+#include "cli/grammar.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "spindle/base/text.hpp"
+
+using namespace spindle;
+using spindle::cli::Invocation;
+using spindle::cli::parse;
+
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// Words as a shell would split them: spaces and single quotes.
+Words words(std::string_view line) {
+  Words result;
+  std::optional<std::string> word;
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '\'') {
+      quoted = !quoted;
+      word = word.value_or("");
+    } else if (c == ' ' && !quoted) {
+      if (word) result.push_back(*word);
+      word.reset();
+    } else {
+      word = word.value_or("") + c;
+    }
+  }
+  if (word) result.push_back(*word);
+  return result;
+}
+
+std::string help(Words arguments) {
+  arguments.emplace_back("--help");
+  const auto invocation = parse(arguments);
+  REQUIRE(invocation.has_value());
+  REQUIRE(invocation->text.has_value());
+  return *invocation->text;
+}
+
+/// The lines below a heading, up to the next empty line.
+std::vector<std::string> section(const std::string& text, std::string_view heading) {
+  std::istringstream stream(text);
+  std::vector<std::string> lines;
+  bool inside = false;
+  for (std::string line; std::getline(stream, line);) {
+    if (inside && line.empty()) break;
+    if (inside) lines.push_back(line);
+    if (line == heading) inside = true;
+  }
+  return lines;
+}
+
+/// Every command as one types it: the program itself, its commands, and theirs.
+std::vector<Words> all_commands() {
+  std::vector<Words> commands = {{}};
+  for (std::size_t next = 0; next < commands.size(); ++next) {
+    for (const std::string& line : section(help(commands[next]), "Commands:")) {
+      Words deeper = commands[next];
+      deeper.push_back(words(line).front());
+      commands.push_back(std::move(deeper));
+    }
+  }
+  return commands;
+}
+
+struct OptionLine {
+  std::string text;
+  std::string description;
+};
+
+/// What stands in the two columns of a help's lists.
+std::vector<OptionLine> option_lines(const std::string& text) {
+  constexpr std::size_t column = 34;
+  std::vector<OptionLine> result;
+  for (const std::string_view heading : {"Arguments and options:", "Options of every command:"}) {
+    for (const std::string& line : section(text, heading)) {
+      REQUIRE(line.size() > column);
+      result.push_back({line.substr(0, column), line.substr(column)});
+    }
+  }
+  return result;
+}
+
+Invocation good(std::string_view line) {
+  auto invocation = parse(words(line));
+  CAPTURE(std::string(line));
+  if (!invocation) FAIL(describe(invocation.error()));
+  return std::move(*invocation);
+}
+
+std::string bad(std::string_view line) {
+  const auto invocation = parse(words(line));
+  CAPTURE(std::string(line));
+  REQUIRE_FALSE(invocation.has_value());
+  CHECK(invocation.error().status() == ExitStatus::usage);
+  return describe(invocation.error());
+}
+
+}  // namespace
+
+TEST_CASE("the commands of this version are there") {
+  const auto commands = all_commands();
+  for (const char* name : {"identify", "list", "get", "set", "do", "ping", "simulate", "profile"}) {
+    CAPTURE(std::string(name));
+    CHECK(std::find(commands.begin(), commands.end(), Words{name}) != commands.end());
+  }
+  for (const char* name : {"list", "show", "check"}) {
+    CHECK(std::find(commands.begin(), commands.end(), Words{"profile", name}) != commands.end());
+  }
+}
+
+TEST_CASE("every command has examples, before anything else, and each of them parses") {
+  for (const Words& command : all_commands()) {
+    const std::string text = help(command);
+    CAPTURE(text);
+    const auto examples = section(text, "Examples:");
+    CHECK_FALSE(examples.empty());
+    CHECK(text.find("Examples:") < text.find("Usage:"));
+    for (const std::string& example : examples) {
+      CAPTURE(example);
+      Words typed = words(example);
+      REQUIRE(typed.front() == "spindle");
+      typed.erase(typed.begin());
+      REQUIRE(typed.size() >= command.size());
+      CHECK(std::equal(command.begin(), command.end(), typed.begin()));
+      const auto invocation = parse(typed);
+      CHECK(invocation.has_value());
+      CHECK((invocation && invocation->run));
+    }
+  }
+}
+
+TEST_CASE("every command says what it does, and every option what it is for") {
+  for (const Words& command : all_commands()) {
+    const std::string text = help(command);
+    CAPTURE(text);
+    CHECK(text.front() != '\n');
+    CHECK(text.find("Usage: spindle") != std::string::npos);
+    CHECK(text.find(" \n") == std::string::npos);
+    CHECK_FALSE(option_lines(text).empty());
+    for (const OptionLine& option : option_lines(text)) {
+      CAPTURE(option.text);
+      CHECK(option.text.ends_with(' '));
+      CHECK(option.description.size() > 3);
+      CHECK(option.description.front() != ' ');
+      CHECK_FALSE(option.description.ends_with('.'));
+    }
+  }
+}
+
+TEST_CASE("no option stands twice in a help, and the common ones stand in all") {
+  const auto common = section(help({}), "Options of every command:");
+  CHECK(common.size() == 14);
+  for (const Words& command : all_commands()) {
+    const std::string text = help(command);
+    CAPTURE(text);
+    CHECK(section(text, "Options of every command:") == common);
+    std::vector<std::string> names;
+    for (const OptionLine& option : option_lines(text)) names.push_back(option.text);
+    std::sort(names.begin(), names.end());
+    CHECK(std::adjacent_find(names.begin(), names.end()) == names.end());
+  }
+}
+
+TEST_CASE("help is for the innermost command named, wherever --help stands") {
+  CHECK(parse(words("--help get"))->text == parse(words("get --help"))->text);
+  CHECK(parse(words("get sim:doga-bm -h p1 --json"))->text == parse(words("get -h"))->text);
+  CHECK(parse(words("profile --help show"))->text == parse(words("profile show --help"))->text);
+  CHECK(parse(words("--version"))->text->starts_with("spindle "));
+}
+
+TEST_CASE("common options work before and behind the command's name") {
+  for (const char* line :
+       {"--profile doga-bm -o csv --tools t.yaml --timeout 250ms --connect-timeout 2s --retries 3 "
+        "-y -q -v --color never get sim:doga-bm p1",
+        "get --profile doga-bm -o csv --tools t.yaml --timeout 250ms sim:doga-bm --connect-timeout "
+        "2s --retries 3 -y -q -v --color never p1",
+        "get sim:doga-bm p1 --profile=doga-bm --output=csv --tools=t.yaml --timeout=250ms "
+        "--connect-timeout=2s --retries=3 --yes --quiet --verbose --color=never",
+        "--yes -v get sim:doga-bm p1 -ocsv --profile doga-bm --tools t.yaml --timeout 250ms -q "
+        "--connect-timeout 2s --retries 3 --color never"}) {
+    CAPTURE(std::string(line));
+    const Invocation typed = good(line);
+    CHECK(typed.format == report::Format::csv);
+    CHECK(typed.talk == report::Talk::quiet);
+    CHECK(typed.color == cli::ColorChoice::never);
+    CHECK(typed.tools_file == "t.yaml");
+    CHECK(typed.common.profile == "doga-bm");
+    CHECK(typed.common.timeout == std::chrono::milliseconds(250));
+    CHECK(typed.common.connect_timeout == std::chrono::seconds(2));
+    CHECK(typed.common.retries == 3U);
+    CHECK(typed.common.consent == commands::Consent::given);
+    CHECK(typed.common.verbosity == commands::Verbosity::frames);
+    CHECK(typed.run);
+  }
+}
+
+TEST_CASE("nothing given: the defaults") {
+  const Invocation typed = good("get sim:doga-bm");
+  CHECK(typed.format == report::Format::table);
+  CHECK(typed.talk == report::Talk::normal);
+  CHECK(typed.color == cli::ColorChoice::automatic);
+  CHECK_FALSE(typed.common.timeout.has_value());
+  CHECK_FALSE(typed.common.retries.has_value());
+  CHECK(typed.common.consent == commands::Consent::ask);
+  CHECK(typed.common.verbosity == commands::Verbosity::normal);
+}
+
+TEST_CASE("--json is -o json, and of several the last one wins") {
+  struct Case {
+    std::string line;
+    report::Format format;
+  };
+  const std::vector<Case> cases = {
+      {"get t --json", report::Format::json},
+      {"get t -o json", report::Format::json},
+      {"get t -ojson", report::Format::json},
+      {"--json get t", report::Format::json},
+      {"get t --json --json", report::Format::json},
+      {"get t --json -o csv", report::Format::csv},
+      {"get t -o csv --json", report::Format::json},
+      {"--json get t --output=table", report::Format::table},
+      {"-o csv get t --json", report::Format::json},
+      {"-o csv get t -o table", report::Format::table},
+      {"get t -- --json", report::Format::table},
+      {"get -- t -o json", report::Format::table},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.line);
+    CHECK(good(row.line).format == row.format);
+    CHECK(cli::wanted_format(words(row.line)) == row.format);
+  }
+}
+
+TEST_CASE("repeated options and flags are no error") {
+  CHECK(good("-v get t -v --verbose").common.verbosity == commands::Verbosity::frames);
+  CHECK(good("get t -qq").talk == report::Talk::quiet);
+  CHECK(good("get t -yv").common.verbosity == commands::Verbosity::frames);
+  CHECK(good("--timeout 1s get t --timeout 2s").common.timeout == std::chrono::seconds(2));
+  CHECK(good("get t --profile a --profile b").common.profile == "b");
+  CHECK(good("set t a=1 --dry-run --dry-run").run);
+}
+
+TEST_CASE("--yes answers also where nobody may be asked") {
+  CHECK(good("do t x --no-input").common.consent == commands::Consent::no_input);
+  CHECK(good("do t x --no-input --yes").common.consent == commands::Consent::given);
+  CHECK(good("do t x --yes --no-input").common.consent == commands::Consent::given);
+}
+
+TEST_CASE("arguments that look like options, or are negative, arrive behind -- and =") {
+  CHECK(good("set t preset.1.speed=-5").run);
+  CHECK(good("set t a=-0.5 b=--c").run);
+  CHECK(good("get t -- -x --json").run);
+  CHECK(good("get t -5").run);  // a number is no option; no parameter has such a name
+}
+
+TEST_CASE("what is wrong is named, with a suggestion or where to look") {
+  struct Case {
+    std::string line;
+    std::string text;
+  };
+  const std::vector<Case> cases = {
+      {"", "no command is given; 'spindle --help' lists all commands"},
+      {"gte t", "unknown command 'gte'; did you mean 'get'?"},
+      {"profile lsit", "unknown command 'lsit'; did you mean 'list'?"},
+      {"get t --limit", "unknown option '--limit'; did you mean '--limits'?"},
+      {"get t --limits=yes", "'--limits' takes no value"},
+      {"get t --verbos=2", "unknown option '--verbos'; did you mean '--verbose'?"},
+      {"get t --dry-run", "unknown option '--dry-run'; 'spindle get --help' lists all options"},
+      {"get t --profile", "'--profile' needs a value"},
+      {"get t -o", "'-o' needs a value"},
+      {"get t -o jsn", "--output: 'jsn' is not one of table, json, csv; did you mean 'json'?"},
+      {"get t --timeout 5", "--timeout: '5' is not a duration such as 500ms, 2s or 5min"},
+      {"get t --timeout -1s", "--timeout: '-1s' is not a duration such as 500ms, 2s or 5min"},
+      {"get t --retries 101", "--retries: '101' is not a number from 0 to 100"},
+      {"ping t u", "ping: 'u' is one argument too many; 'spindle ping --help' shows examples"},
+      {"profile show a b",
+       "profile show: 'b' is one argument too many; 'spindle profile show --help' shows examples"},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.line);
+    CHECK(bad(row.line) == row.text);
+  }
+}

@@ -1,0 +1,242 @@
+#include "spindle/commands/target.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+#include <vector>
+
+#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/sim_transport.hpp"
+#include "support/fake_clock.hpp"
+
+using namespace spindle;
+using namespace spindle::commands;
+
+namespace {
+
+/// A world with one tools file and, at 192.168.10.23:5000, one simulated tool.
+struct Bench {
+  explicit Bench(const sim::BmOptions& options = {}) : tool(options) {
+    tools.path = "spindle.yaml";
+    tools.tools = {{.name = "station3",
+                    .url = "tcp://192.168.10.23",
+                    .profile = "doga-bm",
+                    .torque_unit = "N.m",
+                    .verified = {"select-preset"}},
+                   {.name = "station4",
+                    .url = "tcp://192.168.10.24:6000?unit=3",
+                    .profile = {},
+                    .torque_unit = {}},
+                   {.name = "bench", .url = "sim:doga-bmt", .profile = {}, .torque_unit = {}}};
+    tools.groups = {{"line1", {"station3", "station4"}}, {"single", {"station4"}}};
+    renderer = report::make_renderer(report::Format::json, io, report::Talk::quiet);
+  }
+
+  Context context() {
+    return {.io = io,
+            .clock = clock,
+            .interrupt = interrupt,
+            .open = open,
+            .serve = serve,
+            .end_waits = end_waits,
+            .profiles = profiles,
+            .tools = tools,
+            .renderer = *renderer,
+            .common = common};
+  }
+
+  Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& endpoint) {
+    opened.push_back(endpoint.host + ":" + std::to_string(endpoint.port.value_or(0)));
+    if (opened.back() != "192.168.10.23:5000") {
+      return tl::unexpected(Error{.code = Errc::connection_refused});
+    }
+    auto server = sim::make_bm_tool(profiles.load("doga-bm").value(),
+                                    profiles.load_simulation("doga-bm").value(), tool);
+    return sim::make_sim_transport(std::move(server), modbus::Framing::tcp, {}, clock, interrupt);
+  }
+
+  sim::BmOptions tool;
+  report::Streams io{.out = [](std::string_view) { return Result<void>(); },
+                     .err = [](std::string_view) {},
+                     .read_line = [] { return std::optional<std::string>(); }};
+  Interrupt interrupt;
+  test::FakeClock clock{interrupt};
+  std::vector<std::string> opened;
+  device::OpenTransport open = [this](const auto& endpoint, const auto&, Duration) {
+    return connect_to(endpoint);
+  };
+  sim::Serve serve = {};
+  std::function<void()> end_waits = {};
+  files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};
+  files::Tools tools;
+  CommonOptions common = {};
+  std::unique_ptr<report::Renderer> renderer;
+};
+
+std::vector<std::string> shown(const Result<std::vector<Target>>& targets) {
+  std::vector<std::string> names;
+  if (targets) {
+    for (const Target& target : *targets) names.push_back(target.shown);
+  }
+  return names;
+}
+
+Result<OpenTool> open(const std::string& text, Need need, Bench& bench) {
+  const Context context = bench.context();
+  const auto target = resolve_target(text, context);
+  if (!target) return tl::unexpected(target.error());
+  auto profile = load_profile(*target, context);
+  if (!profile) return tl::unexpected(profile.error());
+  return open_tool(*target, std::move(*profile), need, context);
+}
+
+}  // namespace
+
+TEST_CASE("names, groups and URLs become targets, in the order given") {
+  Bench bench;
+  const Context context = bench.context();
+  using Names = std::vector<std::string>;
+  CHECK(shown(resolve_targets({"station4", "tcp://1.2.3.4", "@line1"}, context)) ==
+        Names{"station4", "tcp://1.2.3.4", "station3", "station4"});
+  CHECK(shown(resolve_targets({"@single"}, context)) == Names{"station4"});
+}
+
+TEST_CASE("a named tool brings what the tools file knows") {
+  Bench bench;
+  const auto target = resolve_target("station3", bench.context());
+  REQUIRE(target.has_value());
+  CHECK(target->endpoint.text == "tcp://192.168.10.23");
+  CHECK(target->profile == "doga-bm");
+  CHECK(target->torque_unit == "N.m");
+  CHECK(target->verified == std::vector<std::string>{"select-preset"});
+  CHECK(resolve_target("station4", bench.context())->endpoint.unit == modbus::UnitId{3});
+  CHECK(resolve_target("bench", bench.context())->profile == "doga-bmt");
+}
+
+TEST_CASE("--profile goes before the tools file and before sim:") {
+  Bench bench;
+  bench.common.profile = "mine";
+  for (const char* text : {"station3", "station4", "bench", "sim:doga-bm", "tcp://1.2.3.4"}) {
+    CAPTURE(std::string(text));
+    CHECK(resolve_target(text, bench.context())->profile == "mine");
+  }
+}
+
+TEST_CASE("what is no target says what is near, or what there is") {
+  Bench bench;
+  struct Case {
+    std::string text;
+    Errc code;
+    std::string description;
+  };
+  const std::vector<Case> cases = {
+      {"staton3", Errc::unknown_name, "unknown target 'staton3'; did you mean 'station3'?"},
+      {"@line", Errc::unknown_name, "unknown target '@line'; did you mean '@line1'?"},
+      {"nobody", Errc::unknown_name,
+       "unknown target 'nobody'; name a tool of spindle.yaml, or a URL such as tcp://HOST"},
+      {"@line1", Errc::usage, "'@line1' is 2 tools, and this command takes one"},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.text);
+    const auto target = resolve_target(row.text, bench.context());
+    REQUIRE_FALSE(target.has_value());
+    CHECK(target.error().code == row.code);
+    CHECK(describe(target.error()) == row.description);
+  }
+}
+
+TEST_CASE("a first argument is a target when it is a URL, a tool or a group") {
+  Bench bench;
+  for (const char* text : {"tcp://x", "sim:doga-bm", "rtu:///dev/ttyUSB0", "station3", "@line1"}) {
+    CAPTURE(std::string(text));
+    CHECK(is_target(text, bench.context()));
+  }
+  for (const char* text : {"preset.1.mode", "p2", "*", "@holding:2", "@line9", ""}) {
+    CAPTURE(std::string(text));
+    CHECK_FALSE(is_target(text, bench.context()));
+  }
+}
+
+TEST_CASE("a URL without a port takes the profile's, else 502 and a hint which it might be") {
+  Bench bench;
+  const auto tool = open("station3", Need::named_registers, bench);
+  REQUIRE(tool.has_value());
+  CHECK(tool->target.endpoint.text == "tcp://192.168.10.23:5000");
+
+  const auto guessed = open("tcp://192.168.10.23", Need::named_registers, bench);
+  REQUIRE_FALSE(guessed.has_value());
+  CHECK(bench.opened.back() == "192.168.10.23:502");
+  CHECK(describe(guessed.error()) ==
+        "tcp://192.168.10.23:502: connection refused; no port is named, and BM tools listen on "
+        "port 5000: add :5000 or --profile doga-bm");
+
+  const auto given = open("tcp://192.168.10.23:6000", Need::named_registers, bench);
+  CHECK(given.error().hint.empty());
+}
+
+TEST_CASE("a profile that was not named is found by asking the tool") {
+  Bench bench;
+  const auto tool = open("tcp://192.168.10.23:5000", Need::named_registers, bench);
+  REQUIRE(tool.has_value());
+  CHECK(tool->device.profile().id == "doga-bm");
+}
+
+TEST_CASE("a tool that fits no profile gives only raw registers, with or without --profile") {
+  struct Case {
+    std::string what;
+    sim::BmOptions tool;
+    Errc unnamed;
+  };
+  const std::vector<Case> cases = {
+      {"a later generation", {.firmware = 4001}, Errc::wrong_generation},
+      {"an unknown model", {.tool_model = 99}, Errc::mismatch},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.what);
+    Bench bench(row.tool);
+    const auto unnamed = open("tcp://192.168.10.23:5000", Need::named_registers, bench);
+    REQUIRE_FALSE(unnamed.has_value());
+    CHECK(unnamed.error().code == row.unnamed);
+    CHECK(unnamed.error().status() == ExitStatus::mismatch);
+    const auto named = open("station3", Need::named_registers, bench);
+    REQUIRE_FALSE(named.has_value());
+    CHECK(named.error().status() == ExitStatus::mismatch);
+    CHECK(named.error().target == "station3");
+    CHECK(open("tcp://192.168.10.23:5000", Need::raw_registers, bench).has_value());
+    CHECK(open("station3", Need::raw_registers, bench).has_value());
+  }
+}
+
+TEST_CASE("names are checked before connecting where the profile is known") {
+  Bench bench;
+  const Context context = bench.context();
+  const auto target = resolve_target("station3", context);
+  const auto opened = open_prepared(
+      *target, Need::named_registers, context,
+      [](const catalogue::Profile& profile) { return profile.select({"preset.1.torqe"}); });
+  REQUIRE_FALSE(opened.has_value());
+  CHECK(opened.error().code == Errc::unknown_name);
+  CHECK(bench.opened.empty());
+}
+
+TEST_CASE("an answer is matched against all profiles, or against one") {
+  Bench bench;
+  const Context context = bench.context();
+  // Four bytes of serial tell nothing of the product; five with 19 in the middle are a BMT.
+  const Bytes short_answer = {0, 1, 0, 1, 0, 3, 0x08, 0x37, 0x3C, 0xDC, 0xC0, 0x0A};
+  const Bytes bmt_answer = {0, 1, 0, 2, 0, 9, 0x08, 0xA7, 0x2A, 0x07, 0x13, 0x17, 0x01};
+  const auto both = match_identity(short_answer, {}, context);
+  CHECK(both->candidates == std::vector<std::string>{"doga-bm", "doga-bmt"});
+  CHECK(both->profile.empty());
+  CHECK(both->series == "BM or BMT");
+  CHECK(both->generation == catalogue::Generation::known);
+
+  CHECK(match_identity(bmt_answer, {}, context)->profile == "doga-bmt");
+  const auto misfit = match_identity(bmt_answer, "doga-bm", context);
+  CHECK(misfit->candidates.empty());
+  CHECK(misfit->identity.notes ==
+        std::vector<std::string>{"the serial number is that of a doga-bmt, not of a doga-bm"});
+  const auto foreign = match_identity(Bytes{1, 2, 3}, {}, context);
+  CHECK(foreign->generation == catalogue::Generation::unknown);
+  CHECK(foreign->identity.raw == Bytes{1, 2, 3});
+}
