@@ -16,9 +16,9 @@ int main(int count, char** arguments) {
                             .interrupt = signals.interrupt(),
                             .open = line_opener(clock, signals.interrupt()),
                             .calm = {calm_clock, calm, line_opener(calm_clock, calm)},
-      .serve = tool_server(clock, signals.interrupt()),
+                            .serve = tool_server(clock, signals.interrupt()),
                             .end_waits = [&signals] { signals.end_waits(); },
-      .environment = environment,
+                            .environment = environment,
                             .file_exists = file_exists,
                             .program_folder = program_folder()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
