@@ -15,7 +15,7 @@ struct World {
   report::Streams io;
   Clock& clock;
   const Interrupt& interrupt;
-  device::OpenTransport open;       ///< real lines
+  device::OpenTransport open;  ///< real lines
   commands::Calm calm;
   sim::Serve serve;                 ///< puts a simulated tool on a port
   std::function<void()> end_waits;  ///< ends every wait, as a signal would
