@@ -80,6 +80,16 @@ shown() {
   grep -Eq -- "$1" "$scratch/output" || fail "the output lacks '$1'"
 }
 
+# Waits, for at most five seconds, until a file has a line that a pattern of grep describes.
+await() {
+  local tries
+  for ((tries = 0; tries < 50; ++tries)); do
+    grep -Eq -- "$1" "$2" 2>/dev/null && return 0
+    sleep 0.1
+  done
+  fail "waited in vain for '$1'"
+}
+
 say "a simulated DOGA BM screwdriver on a free port of this machine"
 typed simulate doga-bm --listen tcp://127.0.0.1:0
 mkfifo answers
@@ -111,5 +121,21 @@ say "what it allows is written and read back"
 run 0 set "$url" --profile doga-bm preset.1.target-torque=3.10
 run 0 get "$url" --profile doga-bm 'preset.1.*torque*'
 shown 'preset\.1\.target-torque +3\.10'
+
+say "somebody watches, and the tool is started: under a guard that always ends in a stop"
+typed watch "$url" --profile doga-bm --count 1 --duration 20s
+"$program" watch "$url" --profile doga-bm --count 1 --duration 20s >watched 2>&1 &
+watcher=$!
+await 'connected' watched
+run 0 remote-start "$url" --profile doga-bm --accept-unverified --yes
+shown 'fastening-ok'
+wait "$watcher" || fail "watch ended with status $?"
+printf '# and what the watcher saw:\n'
+cat watched
+grep -q 'fastening-ok' watched || fail "the watcher saw no result"
+
+say "is there an alarm?"
+run 0 alarms "$url" --profile doga-bm
+shown 'present'
 
 say "that was the tour; 'spindle --help' shows the rest, and so does ./check"
