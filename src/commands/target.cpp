@@ -117,9 +117,7 @@ Result<void> find_profile(OpenTool& tool, const Context& context) {
                                     fmt::join(identification->identity.notes, "; ")))));
   }
   // Products that their answer does not tell apart share the register map of their common base.
-  auto profile = context.profiles.load(identification->candidates.front());
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*profile));
+  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
   tool.device.use(*tool.profile);
   return {};
 }
@@ -153,28 +151,32 @@ struct Match {
   }
 };
 
+Result<std::vector<catalogue::Profile>> profiles_to_match(const std::string& only,
+                                                          const Context& context) {
+  if (only.empty()) return context.profiles.load_all();
+  auto profile = context.profiles.load(only);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  std::vector<catalogue::Profile> profiles;
+  profiles.push_back(std::move(*profile));
+  return profiles;
+}
+
 Result<std::vector<Match>> matches_of(ByteView answer, const std::string& only,
                                       const Context& context) {
-  std::vector<std::string> ids;
-  if (!only.empty()) ids.push_back(only);
-  if (only.empty()) {
-    for (const files::ProfileEntry& entry : context.profiles.list()) ids.push_back(entry.id);
-  }
+  auto profiles = profiles_to_match(only, context);
+  if (!profiles) return tl::unexpected(std::move(profiles.error()));
   std::vector<Match> matches;
-  for (const std::string& id : ids) {
-    auto profile = context.profiles.load(id);
-    if (!profile && !only.empty()) return tl::unexpected(std::move(profile.error()));
-    // A user's broken file must not hide the other profiles.
-    if (!profile || !profile->identity) continue;
-    auto identity = catalogue::decode_identity(*profile->identity, answer);
-    const auto generation = catalogue::generation_of(*profile->identity, identity);
+  for (catalogue::Profile& profile : *profiles) {
+    if (!profile.identity) continue;
+    auto identity = catalogue::decode_identity(*profile.identity, answer);
+    const auto generation = catalogue::generation_of(*profile.identity, identity);
     if (generation == catalogue::Generation::unknown) continue;
-    matches.push_back({std::move(*profile), std::move(identity), generation});
+    matches.push_back({std::move(profile), std::move(identity), generation});
   }
   return matches;
 }
 
-const Match* best_of(const std::vector<Match>& matches) {
+Match* best_of(std::vector<Match>& matches) {
   const auto fitting =
       std::find_if(matches.begin(), matches.end(), [](const Match& match) { return match.fits(); });
   if (fitting != matches.end()) return &*fitting;
@@ -291,7 +293,7 @@ Result<Identification> match_identity(ByteView answer, const std::string& only,
     result.series += match.profile.series;
   }
   if (result.candidates.size() == 1) result.profile = result.candidates.front();
-  const Match* best = best_of(*matches);
+  Match* best = best_of(*matches);
   if (best == nullptr) {
     result.identity.raw.assign(answer.begin(), answer.end());
     result.identity.notes.emplace_back("this is not the identity of any known product");
@@ -300,7 +302,11 @@ Result<Identification> match_identity(ByteView answer, const std::string& only,
   result.generation = best->generation;
   result.maker = best->profile.maker;
   result.identity = best->identity;
-  if (result.candidates.empty()) result.identity.notes.push_back(misfit_of(*best));
+  if (result.candidates.empty()) {
+    result.identity.notes.push_back(misfit_of(*best));
+  } else {
+    result.matched = std::move(best->profile);
+  }
   return result;
 }
 

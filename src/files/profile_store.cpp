@@ -39,10 +39,14 @@ struct Layer {
   std::size_t file = 0;  ///< number for findings
   std::vector<YamlNode> documents;
   ProfileHead head;
+  bool sound = true;  ///< nothing was wrong when it was read
 };
 
-/// A profile file and those it extends, the file itself first.
-using Chain = std::vector<Layer>;
+/// Every file that was read, by path: a base that several profiles extend is parsed once.
+using Library = std::map<std::string, Layer>;
+
+/// A profile file and those it extends, the file itself first. Points into a library.
+using Chain = std::vector<const Layer*>;
 
 /// The base of a layer: beside it, else in the store's folders.
 std::optional<std::string> locate_base(const Layer& layer,
@@ -64,7 +68,13 @@ bool same_file(const std::string& a, const std::string& b) {
   return std::filesystem::equivalent(a, b, problem);
 }
 
-Result<Layer> read_layer(const std::string& path, Documents documents, Findings& findings) {
+Result<const Layer*> read_layer(const std::string& path, Documents documents, Library& library,
+                                Findings& findings) {
+  if (const auto known = library.find(path); known != library.end()) {
+    const bool sound = known->second.sound;
+    if (!sound) findings.add({findings.add_file(path), 1, 1}, "the file has faults of its own");
+    return &known->second;
+  }
   auto text = read_text_file(path);
   if (!text) return tl::unexpected(std::move(text.error()));
   Layer layer{.path = path, .file = findings.add_file(path), .documents = {}, .head = {}};
@@ -74,25 +84,26 @@ Result<Layer> read_layer(const std::string& path, Documents documents, Findings&
   } else if (findings.empty()) {
     findings.add({layer.file, 1, 1}, "the file is empty");
   }
-  return layer;
+  layer.sound = findings.empty();
+  return &library.emplace(path, std::move(layer)).first->second;
 }
 
 /// The next file of the chain; empty at its end, or after a finding.
 std::optional<std::string> next_of(const Chain& chain, const std::vector<std::string>& folders,
                                    Findings& findings) {
-  const ProfileHead& head = chain.back().head;
+  const ProfileHead& head = chain.back()->head;
   if (head.extends.empty()) return std::nullopt;
   if (!is_catalogue_name(head.extends)) {
     findings.add(head.extends_at, fmt::format("'{}' is no profile id", head.extends));
     return std::nullopt;
   }
-  auto path = locate_base(chain.back(), folders);
+  auto path = locate_base(*chain.back(), folders);
   if (!path) {
     findings.add(head.extends_at, fmt::format("base profile '{}' is not found", head.extends));
     return std::nullopt;
   }
   const bool cycle = std::any_of(chain.begin(), chain.end(),
-                                 [&](const Layer& layer) { return same_file(layer.path, *path); });
+                                 [&](const Layer* layer) { return same_file(layer->path, *path); });
   if (cycle || chain.size() == deepest_chain) {
     findings.add(head.extends_at,
                  cycle ? fmt::format("'{}' extends itself in the end", head.extends)
@@ -103,13 +114,14 @@ std::optional<std::string> next_of(const Chain& chain, const std::vector<std::st
 }
 
 Result<Chain> read_chain(const std::string& path, Documents documents,
-                         const std::vector<std::string>& folders, Findings& findings) {
+                         const std::vector<std::string>& folders, Library& library,
+                         Findings& findings) {
   Chain chain;
   std::optional<std::string> next = path;
   while (next) {
-    auto layer = read_layer(*next, documents, findings);
+    auto layer = read_layer(*next, documents, library, findings);
     if (!layer) return tl::unexpected(std::move(layer.error()));
-    chain.push_back(std::move(*layer));
+    chain.push_back(*layer);
     next = next_of(chain, folders, findings);
   }
   return chain;
@@ -117,12 +129,13 @@ Result<Chain> read_chain(const std::string& path, Documents documents,
 
 Profile build(const Chain& chain, Findings& findings) {
   ProfileDraft draft;
-  draft.profile.path = chain.front().path;
+  draft.profile.path = chain.front()->path;
   for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
-    if (!layer->documents.empty()) read_profile(layer->documents.front(), draft, findings);
+    if ((*layer)->documents.empty()) continue;
+    read_profile((*layer)->documents.front(), draft, findings);
   }
   const bool complete = findings.empty();
-  const bool concrete = !chain.front().head.abstract;
+  const bool concrete = !chain.front()->head.abstract;
   if (complete && concrete && draft.link.entry == nullptr) {
     findings.add(draft.top.entry->at, "key 'link' is missing");
   }
@@ -135,7 +148,7 @@ Profile build(const Chain& chain, Findings& findings) {
 catalogue::CodeTexts collect_texts(const Chain& chain, Findings& findings) {
   catalogue::CodeTexts codes;
   for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
-    if (const YamlNode* part = find_part(layer->documents, "texts", findings)) {
+    if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
       read_texts(*part, codes, findings);
     }
   }
@@ -143,16 +156,34 @@ catalogue::CodeTexts collect_texts(const Chain& chain, Findings& findings) {
 }
 
 const YamlNode* nearest_simulation(const Chain& chain, Findings& findings) {
-  for (const Layer& layer : chain) {
-    if (const YamlNode* part = find_part(layer.documents, "simulation", findings)) return part;
+  for (const Layer* layer : chain) {
+    if (const YamlNode* part = find_part(layer->documents, "simulation", findings)) return part;
   }
   return nullptr;
 }
 
+/// Every profile file by id; the first folder that has one wins.
+std::map<std::string, std::string> profile_files(const std::vector<std::string>& folders) {
+  std::map<std::string, std::string> found;
+  for (const std::string& folder : folders) {
+    std::error_code problem;
+    for (auto file = std::filesystem::directory_iterator(folder, problem);
+         !problem && file != std::filesystem::directory_iterator(); file.increment(problem)) {
+      const std::filesystem::path& path = file->path();
+      const std::string id = path.stem().string();
+      if (path.extension() == extension && is_catalogue_name(id)) {
+        found.try_emplace(id, in_folder(folder, id));
+      }
+    }
+  }
+  return found;
+}
+
 bool is_abstract(const std::string& path) {
+  Library library;
   Findings findings;
-  const auto layer = read_layer(path, Documents::first, findings);
-  return layer && layer->head.abstract;
+  const auto layer = read_layer(path, Documents::first, library, findings);
+  return layer && (*layer)->head.abstract;
 }
 
 Error with_check_hint(Error error, const std::string& path) {
@@ -183,12 +214,13 @@ Result<std::string> ProfileStore::locate(std::string_view name_or_file) const {
 Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
   const auto path = locate(name_or_file);
   if (!path) return tl::unexpected(path.error());
+  Library library;
   Findings findings;
-  const auto chain = read_chain(*path, Documents::first, folders_, findings);
+  const auto chain = read_chain(*path, Documents::first, folders_, library, findings);
   if (!chain) return tl::unexpected(chain.error());
   Profile profile = build(*chain, findings);
   if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
-  if (chain->front().head.abstract) {
+  if (chain->front()->head.abstract) {
     return tl::unexpected(Error{.code = Errc::bad_file,
                                 .message = "is only a base for other profiles",
                                 .hint = "'spindle profile list' shows those of products",
@@ -201,8 +233,9 @@ Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
   const auto path = locate(name_or_file);
   if (!path) return tl::unexpected(path.error());
+  Library library;
   Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
   if (!chain) return tl::unexpected(chain.error());
   const YamlNode* part = nearest_simulation(*chain, findings);
   catalogue::SimulationFacts facts;
@@ -219,8 +252,9 @@ Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
 Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {
   const auto path = locate(name_or_file);
   if (!path) return tl::unexpected(path.error());
+  Library library;
   Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
   if (!chain) return tl::unexpected(chain.error());
   catalogue::CodeTexts codes = collect_texts(*chain, findings);
   if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
@@ -230,8 +264,9 @@ Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view nam
 Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
   const auto path = locate(name_or_file);
   if (!path) return tl::unexpected(path.error());
+  Library library;
   Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, findings);
+  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
   if (!chain) return tl::unexpected(chain.error());
   const Profile profile = build(*chain, findings);
   collect_texts(*chain, findings);
@@ -243,23 +278,24 @@ Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) 
 }
 
 std::vector<ProfileEntry> ProfileStore::list() const {
-  std::map<std::string, std::string> found;
-  for (const std::string& folder : folders_) {
-    std::error_code problem;
-    for (auto file = std::filesystem::directory_iterator(folder, problem);
-         !problem && file != std::filesystem::directory_iterator(); file.increment(problem)) {
-      const std::filesystem::path& path = file->path();
-      const std::string id = path.stem().string();
-      if (path.extension() == extension && is_catalogue_name(id)) {
-        found.try_emplace(id, in_folder(folder, id));
-      }
-    }
-  }
   std::vector<ProfileEntry> entries;
-  for (auto& [id, path] : found) {
+  for (auto& [id, path] : profile_files(folders_)) {
     if (!is_abstract(path)) entries.push_back({id, path});
   }
   return entries;
+}
+
+std::vector<Profile> ProfileStore::load_all() const {
+  std::vector<Profile> profiles;
+  Library library;
+  for (const auto& [id, path] : profile_files(folders_)) {
+    Findings findings;
+    const auto chain = read_chain(path, Documents::first, folders_, library, findings);
+    if (!chain || chain->front()->head.abstract) continue;
+    Profile profile = build(*chain, findings);
+    if (findings.empty()) profiles.push_back(std::move(profile));
+  }
+  return profiles;
 }
 
 }  // namespace spindle::files

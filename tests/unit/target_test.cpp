@@ -37,6 +37,7 @@ struct Bench {
             .clock = clock,
             .interrupt = interrupt,
             .open = open,
+            .calm = calm,
             .serve = serve,
             .end_waits = end_waits,
             .profiles = profiles,
@@ -65,6 +66,7 @@ struct Bench {
   device::OpenTransport open = [this](const auto& endpoint, const auto&, Duration) {
     return connect_to(endpoint);
   };
+  commands::Calm calm{clock, interrupt, open};
   sim::Serve serve = {};
   std::function<void()> end_waits = {};
   files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};

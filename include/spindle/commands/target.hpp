@@ -95,8 +95,9 @@ struct Identification {
   catalogue::Identity identity;
   /// `known` when a profile fits, `later` when only the firmware does not.
   catalogue::Generation generation = catalogue::Generation::unknown;
-  std::string profile = {};                  ///< empty: unknown, or several fit
-  std::vector<std::string> candidates = {};  ///< all that fit
+  std::string profile = {};                        ///< empty: unknown, or several fit
+  std::vector<std::string> candidates = {};        ///< all that fit
+  std::optional<catalogue::Profile> matched = {};  ///< the first of the candidates
   std::string maker = {};
   std::string series = {};
 };

@@ -50,6 +50,10 @@ class ProfileStore {
   /// only when the file can not be read or found.
   [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;
 
+  /// Every valid profile that list() names, sorted by id; each file is read once. Files with faults
+  /// are left out: one of a user's must not hide the others.
+  [[nodiscard]] std::vector<catalogue::Profile> load_all() const;
+
   /// All profiles in all folders, sorted by id, shadowed ones left out. Base profiles that say
   /// `abstract: true` are left out.
   [[nodiscard]] std::vector<ProfileEntry> list() const;
