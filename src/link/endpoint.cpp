@@ -51,7 +51,12 @@ struct Parts {
 };
 
 Result<Parts> take_apart(std::string_view url) {
+  const std::string forms =
+      "a target is tcp://HOST, rtu:///DEVICE, rtu+tcp://HOST:PORT or sim:PROFILE";
   const auto colon = url.find(':');
+  if (colon == std::string_view::npos) {
+    return tl::unexpected(bad_target(url, "the ':' of a URL is missing", forms));
+  }
   const std::string_view name = url.substr(0, colon);
   for (const Scheme& scheme : schemes) {
     if (scheme.name != name) continue;
@@ -62,8 +67,7 @@ Result<Parts> take_apart(std::string_view url) {
         question == std::string_view::npos ? std::string_view() : rest.substr(question + 1)};
   }
   std::string hint = suggestion(name, scheme_names());
-  if (hint.empty())
-    hint = "a target is tcp://HOST, rtu:///DEVICE, rtu+tcp://HOST:PORT or sim:PROFILE";
+  if (hint.empty()) hint = forms;
   return tl::unexpected(bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint));
 }
 

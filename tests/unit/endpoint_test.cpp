@@ -70,14 +70,15 @@ struct Bad {
 
 std::vector<Bad> bad_urls() {
   return {
-      {"", "unknown kind of target ':'",
+      {"sim", "the ':' of a URL is missing"},
+      {"", "the ':' of a URL is missing",
        "a target is tcp://HOST, rtu:///DEVICE, rtu+tcp://HOST:PORT or sim:PROFILE"},
       {"tpc://station3", "unknown kind of target 'tpc:'", "did you mean 'tcp'?"},
       {"TCP://station3", "unknown kind of target 'TCP:'"},
       {"http://station3", "unknown kind of target 'http:'"},
       {"rtu+tpc://h:1", "unknown kind of target 'rtu+tpc:'", "did you mean 'rtu+tcp'?"},
       {"://station3", "unknown kind of target ':'"},
-      {"tcp", "'//' is missing"},
+      {"tcp", "the ':' of a URL is missing"},
       {"tcp:station3", "'//' is missing", "write tcp://HOST[:PORT][?unit=N]"},
       {"tcp:/station3", "'//' is missing"},
       {"tcp://", "the host is missing", "write tcp://HOST[:PORT][?unit=N]"},
