@@ -16,14 +16,18 @@ constexpr std::uint32_t numbers = 65536;
 
 }  // namespace
 
-Tracked EventTracker::judge(std::uint16_t number) const {
+bool EventTracker::is_blank(RegisterView block) {
+  return std::all_of(block.begin(), block.end(), [](std::uint16_t word) { return word == 0; });
+}
+
+Tracked EventTracker::judge(std::uint16_t number, RegisterView block) const {
   if (!last_) return {Novelty::baseline};
   const std::uint32_t step = (number + numbers - *last_) % numbers;
   if (step == 0) return {Novelty::repeat};
   if (number > *last_) {
     return step == 1 ? Tracked{Novelty::next} : Tracked{Novelty::jump, step - 1};
   }
-  if (step <= wrap_reach) return {Novelty::wrap, step - 1};
+  if (step <= wrap_reach && !is_blank(block)) return {Novelty::wrap, step - 1};
   return {Novelty::restart};
 }
 
@@ -32,7 +36,7 @@ Tracked EventTracker::track(std::uint16_t number, RegisterView block) {
     return std::equal(earlier.begin(), earlier.end(), block.begin(), block.end());
   });
   if (known) return {Novelty::repeat};
-  const Tracked tracked = judge(number);
+  const Tracked tracked = judge(number, block);
   if (tracked.novelty == Novelty::repeat) return tracked;
   last_ = number;
   recent_.emplace_back(block.begin(), block.end());

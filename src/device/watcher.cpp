@@ -14,8 +14,14 @@ namespace {
 constexpr Duration first_back_off = std::chrono::milliseconds(250);
 constexpr Duration last_back_off = std::chrono::seconds(10);
 
+/// How long a wait may be before it is asked anew when to end.
+constexpr Duration longest_pause = std::chrono::seconds(1);
+
 /// The last words to a tool must not hold up the end of the program.
 constexpr Duration farewell_timeout = std::chrono::milliseconds(500);
+
+/// How many frames are taken at once: a tool that never falls silent must not keep us from others.
+constexpr std::size_t max_taken = 4096;
 
 /// Trouble that may pass by itself, so that trying again makes sense.
 bool may_pass(const Error& error) {
@@ -32,21 +38,52 @@ bool may_pass(const Error& error) {
 /// A little earlier than asked for, so that the time between two is never longer than it.
 Duration with_margin(Duration period) { return period - period / 10; }
 
+/// Asks once more where no answer came: one lost answer is no reason to give up a connection.
+template <typename Ask>
+Result<void> ask_twice(Ask ask) {
+  Result<void> answered = ask();
+  if (!answered && answered.error().code == Errc::no_answer) answered = ask();
+  return answered;
+}
+
+/// Whether one event number is older than another, across the end of the counter.
+bool is_before(std::uint16_t number, std::uint16_t other) {
+  constexpr std::uint16_t half = 0x8000;
+  return number != other && static_cast<std::uint16_t>(other - number) < half;
+}
+
+std::optional<GapNews> gap_of(const Tracked& tracked, EventSource source) {
+  switch (tracked.novelty) {
+    case Novelty::restart:
+      return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
+    case Novelty::wrap:
+      return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
+    case Novelty::jump:
+      break;
+    case Novelty::baseline:
+    case Novelty::repeat:
+    case Novelty::next:
+      return std::nullopt;
+  }
+  switch (source) {
+    case EventSource::catch_up:
+      return GapNews{tracked.missed, "events while nobody was connected"};
+    case EventSource::poll:
+      return GapNews{tracked.missed, "events came faster than they were polled"};
+    case EventSource::push:
+      break;
+  }
+  return GapNews{tracked.missed, "the tool's event counter jumped"};
+}
+
 }  // namespace
 
-Watcher::Watcher(Open open, const catalogue::Profile& profile, WatchPlan plan, Clock& clock,
-                 Tell tell)
+Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell)
     : open_(std::move(open)),
-      profile_(&profile),
-      plan_(std::move(plan)),
+      make_plan_(std::move(plan)),
+      reconnection_(reconnection),
       clock_(&clock),
-      tell_(std::move(tell)),
-      previous_(plan_.values.size()) {
-  if (!profile.events) return;
-  if (const auto number = profile.find(profile.events->number)) {
-    number_at_ = number->address.value - profile.events->first;
-  }
-}
+      tell_(std::move(tell)) {}
 
 Result<void> Watcher::run(const Until& until) {
   auto watched = watch(until);
@@ -54,53 +91,99 @@ Result<void> Watcher::run(const Until& until) {
   return watched;
 }
 
+bool Watcher::goes_on(const Until& until) const { return !stopped_ && clock_->now() < until(); }
+
 Result<void> Watcher::watch(const Until& until) {
-  while (!stopped_ && clock_->now() < until()) {
+  while (goes_on(until)) {
     auto done = link_ ? serve(until) : connect(until);
     if (done) continue;
-    if (!may_pass(done.error()) || plan_.reconnection == Reconnection::never) return done;
-    lose(done.error());
+    if (!may_pass(done.error())) return done;
+    tell_trouble(done.error());
+    if (reconnection_ == Reconnection::never) return done;
+    link_.reset();
   }
   return {};
 }
 
+// ---- connecting ----
+
 Result<void> Watcher::connect(const Until& until) {
+  if (auto paused = pause(until); !paused || !goes_on(until)) return paused;
   auto link = open_();
-  if (link) return greet(std::move(*link));
-  if (!may_pass(link.error()) || plan_.reconnection == Reconnection::never) {
-    return tl::unexpected(std::move(link.error()));
-  }
-  ++attempt_;
-  tell(LinkNews{LinkState::reconnecting, attempt_, message_of(link.error())});
-  if (stopped_) return {};
-  return clock_->sleep_until(std::min(until(), clock_->now() + back_off()));
+  if (!link) return tl::unexpected(std::move(link.error()));
+  return greet(std::move(*link));
 }
 
-/// A quarter of a second, doubling up to ten seconds, a fifth more or less so that many watchers of
-/// one access point do not come back all at once.
+Result<void> Watcher::pause(const Until& until) {
+  while (goes_on(until) && clock_->now() < retry_at_) {
+    auto slept = clock_->sleep_until(std::min({retry_at_, until(), clock_->now() + longest_pause}));
+    if (!slept) return slept;
+  }
+  return {};
+}
+
+/// At once after a link that served; else a quarter of a second, doubling up to ten seconds. Up to
+/// a fifth less, so that many watchers of one access point do not come back all at once.
 Duration Watcher::back_off() const {
-  const unsigned doublings = std::min(attempt_ - 1, 10U);
+  if (failures_ == 0) return Duration::zero();
+  const unsigned doublings = std::min(failures_ - 1, 10U);
   const Duration even = std::min(last_back_off, first_back_off * (std::int64_t{1} << doublings));
-  constexpr std::int64_t steps = 401;
-  const std::int64_t spread = clock_->now().time_since_epoch().count() % steps;
-  return even * (800 + spread) / 1000;
+  constexpr std::int64_t whole = 1000;
+  constexpr std::int64_t steps = 201;
+  return even * (whole - clock_->now().time_since_epoch().count() % steps) / whole;
+}
+
+/// Says what became of the link, and when it is tried again.
+void Watcher::tell_trouble(const Error& error) {
+  if (link_) {
+    hear_waiting();  // what had arrived before the line broke is still true
+    tell(LinkNews{LinkState::lost, 0, message_of(error)});
+  } else if (reconnection_ == Reconnection::forever) {
+    tell(LinkNews{LinkState::reconnecting, failures_ + 1, message_of(error)});
+  }
+  failures_ = served_ ? 0 : failures_ + 1;
+  served_ = false;
+  retry_at_ = clock_->now() + back_off();
 }
 
 Result<void> Watcher::greet(Link link) {
-  std::string message = "connected";
-  if (!link.identity.empty()) message += ": " + link.identity;
-  const bool other = !known_identity_.empty() && known_identity_ != link.identity;
-  if (other) {
-    message =
-        fmt::format("another tool answers now: {} (before: {})", link.identity, known_identity_);
-    tracker_ = {};
-    previous_.assign(plan_.values.size(), std::nullopt);
+  if (profile_ != &link.device.profile()) {
+    if (auto learned = learn(link.device.profile()); !learned) return learned;
   }
-  known_identity_ = link.identity;
   link_ = std::move(link);
-  tell(LinkNews{LinkState::connected, attempt_, message});
-  attempt_ = 0;
+  compare_identity(link_->identity);
   return begin();
+}
+
+Result<void> Watcher::learn(const catalogue::Profile& profile) {
+  auto plan = make_plan_(profile);
+  if (!plan) return tl::unexpected(std::move(plan.error()));
+  plan_ = std::move(*plan);
+  previous_.assign(plan_.values.size(), std::nullopt);
+  profile_ = &profile;
+  if (!profile.events) return {};
+  const auto number = profile.find(profile.events->number);
+  if (!number) return tl::unexpected(number.error());
+  number_at_ = number->address.value - profile.events->first;
+  return {};
+}
+
+void Watcher::compare_identity(const std::string& identity) {
+  const bool other = !known_identity_.empty() && known_identity_ != identity;
+  std::string message = "connected";
+  if (other) {
+    message = fmt::format("not the tool of before: {} (before: {})", identity, known_identity_);
+  } else if (!identity.empty()) {
+    message += ": " + identity;
+  }
+  known_identity_ = identity;
+  tell(LinkNews{LinkState::connected, failures_, message});
+  if (!other) return;
+  if (plan_.events != EventMode::none) {
+    tell(GapNews{std::nullopt, "what the tool of before did after its link was lost is not known"});
+  }
+  tracker_ = {};
+  previous_.assign(plan_.values.size(), std::nullopt);
 }
 
 /// The counter is read before the output is armed, and the last event once more after it: whatever
@@ -110,21 +193,28 @@ Result<void> Watcher::begin() {
   keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
   poll_due_ = now;
   if (plan_.events == EventMode::none) return {};
+  tracker_.forget_blocks();
   if (!tracker_.last()) {
     const auto number = link_->device.event_number();
     if (!number) return tl::unexpected(number.error());
     tracker_.set_baseline(*number);
+    take_waiting();  // pushed before the counter was read, so they are old
   }
   if (plan_.events == EventMode::push) {
-    if (auto armed = link_->device.switch_events(EventOutput::on); !armed) return armed;
+    auto armed = ask_twice([&] { return link_->device.switch_events(EventOutput::on); });
+    if (!armed) return armed;
     arm_due_ = now + with_margin(profile_->events->arm_every);
   }
   return fetch_last(EventSource::catch_up);
 }
 
+// ---- serving ----
+
 Result<void> Watcher::serve(const Until& until) {
-  while (!stopped_ && clock_->now() < until()) {
-    auto frame = link_->device.session().next_spontaneous(std::min(until(), next_due()));
+  while (!stopped_) {
+    const TimePoint end = until();
+    if (clock_->now() >= end) break;
+    auto frame = link_->device.session().next_spontaneous(std::min(end, next_due()));
     if (!frame) return tl::unexpected(std::move(frame.error()));
     if (*frame) hear(**frame);
     if (stopped_) break;
@@ -134,7 +224,7 @@ Result<void> Watcher::serve(const Until& until) {
 }
 
 TimePoint Watcher::next_due() const {
-  TimePoint due = TimePoint::max();
+  TimePoint due = clock_->now() + longest_pause;
   if (profile_->link.keep_alive > Duration::zero()) due = std::min(due, keep_alive_due_);
   if (plan_.events == EventMode::push) due = std::min(due, arm_due_);
   if (plan_.events == EventMode::poll || !plan_.values.empty()) due = std::min(due, poll_due_);
@@ -145,16 +235,31 @@ Result<void> Watcher::run_due() {
   const TimePoint now = clock_->now();
   if (plan_.events == EventMode::push && now >= arm_due_) {
     arm_due_ = now + with_margin(profile_->events->arm_every);
-    if (auto armed = link_->device.switch_events(EventOutput::on); !armed) return armed;
+    auto armed = ask_twice([&] { return link_->device.switch_events(EventOutput::on); });
+    if (!armed) return armed;
   }
   if (profile_->link.keep_alive > Duration::zero() && now >= keep_alive_due_) {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
-    if (auto alive = link_->device.ping(); !alive) return tl::unexpected(std::move(alive.error()));
+    if (auto alive = keep_alive(); !alive) return alive;
   }
   if (now < poll_due_) return {};
   poll_due_ = now + plan_.interval;
+  return poll();
+}
+
+Result<void> Watcher::keep_alive() {
+  return ask_twice([&] { return link_->device.ping().map([](Duration) {}); }).map([&] {
+    served_ = true;
+  });
+}
+
+Result<void> Watcher::poll() {
   if (plan_.events == EventMode::poll) {
-    if (auto polled = poll_number(); !polled) return polled;
+    const auto number = link_->device.event_number();
+    if (!number) return tl::unexpected(number.error());
+    if (*number != tracker_.last()) {
+      if (auto fetched = fetch_last(EventSource::poll); !fetched) return fetched;
+    }
   }
   return plan_.values.empty() ? Result<void>() : poll_values();
 }
@@ -165,31 +270,62 @@ Result<void> Watcher::poll_values() {
   for (std::size_t index = 0; index < readings->size() && !stopped_; ++index) {
     Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(std::move(reading.value.error()));
-    std::optional<catalogue::Value>& previous = previous_[index];
-    const bool first = !previous.has_value();
-    const bool changed = !first && !(*previous == *reading.value);
-    const bool wanted = plan_.samples == Samples::all || changed ||
-                        (first && plan_.samples == Samples::changes_and_first);
-    if (wanted) {
-      tell(
-          ValueNews{&plan_.values[index], std::move(*reading.registers), *reading.value, previous});
-    }
-    previous = std::move(*reading.value);
+    tell_reading(index, reading);
   }
   return {};
 }
 
-Result<void> Watcher::poll_number() {
-  const auto number = link_->device.event_number();
-  if (!number) return tl::unexpected(number.error());
-  return *number == tracker_.last() ? Result<void>() : fetch_last(EventSource::poll);
+void Watcher::tell_reading(std::size_t index, Reading& reading) {
+  std::optional<catalogue::Value>& previous = previous_[index];
+  const bool changed = previous && !(*previous == *reading.value);
+  const bool wanted = plan_.samples == Samples::all || changed ||
+                      (!previous && plan_.samples == Samples::changes_and_first);
+  if (wanted) {
+    tell(ValueNews{&plan_.values[index], std::move(*reading.registers), *reading.value, previous});
+  }
+  previous = std::move(*reading.value);
 }
 
+// ---- events ----
+
+/// Events may have been pushed while the last one was fetched: it is told in its place among them,
+/// and only if it is not one of them.
 Result<void> Watcher::fetch_last(EventSource source) {
-  auto block = link_->device.last_event();
-  if (!block) return tl::unexpected(std::move(block.error()));
-  judge(source, std::move(*block), clock_->wall());
-  return {};
+  const auto block = link_->device.last_event();
+  const WallTime fetched = clock_->wall();
+  const auto pushed = take_waiting();
+  const auto block_of = [](const link::Spontaneous& frame) {
+    return modbus::registers_of(frame.pdu);
+  };
+  const bool needed =
+      block && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
+        return number_of(block_of(frame)) == number_of(*block);
+      });
+  auto next = pushed.begin();
+  for (; needed && next != pushed.end(); ++next) {
+    if (!is_before(number_of(block_of(*next)), number_of(*block))) break;
+    hear(*next);
+  }
+  if (needed) judge(source, *block, fetched);
+  for (; next != pushed.end(); ++next) hear(*next);
+  // A tool whose events come faster than the last one can be fetched has pushed them meanwhile.
+  if (block || (!pushed.empty() && block.error().code == Errc::no_answer)) return {};
+  return tl::unexpected(block.error());
+}
+
+/// What was pushed and not heard yet, without waiting.
+std::vector<link::Spontaneous> Watcher::take_waiting() {
+  std::vector<link::Spontaneous> waiting;
+  while (waiting.size() < max_taken) {
+    auto frame = link_->device.session().next_spontaneous(clock_->now());
+    if (!frame || !*frame) break;  // a broken line is noticed by whoever uses it next
+    waiting.push_back(std::move(**frame));
+  }
+  return waiting;
+}
+
+void Watcher::hear_waiting() {
+  for (const link::Spontaneous& frame : take_waiting()) hear(frame);
 }
 
 void Watcher::hear(const link::Spontaneous& frame) {
@@ -197,47 +333,23 @@ void Watcher::hear(const link::Spontaneous& frame) {
   judge(EventSource::push, modbus::registers_of(frame.pdu), frame.wall);
 }
 
-void Watcher::judge(EventSource source, Registers block, WallTime time) {
-  const Tracked tracked = tracker_.track(block[number_at_], block);
+void Watcher::judge(EventSource source, const Registers& block, WallTime time) {
+  const Tracked tracked = tracker_.track(number_of(block), block);
   if (!tracked.is_new()) return;
-  tell_gap(tracked, source);
-  if (!stopped_) tell(EventNews{source, std::move(block), time});
-}
-
-void Watcher::tell_gap(const Tracked& tracked, EventSource source) {
-  switch (tracked.novelty) {
-    case Novelty::restart:
-      tell(GapNews{std::nullopt, "the tool counts its events anew: it was restarted"});
-      return;
-    case Novelty::wrap:
-      tell(GapNews{tracked.missed, "the tool's event counter began again behind 65535"});
-      return;
-    case Novelty::jump:
-      tell(GapNews{tracked.missed, source == EventSource::catch_up
-                                       ? "events while nobody was connected"
-                                       : "the tool's event counter jumped"});
-      return;
-    case Novelty::baseline:
-    case Novelty::repeat:
-    case Novelty::next:
-      return;
-  }
+  if (const auto gap = gap_of(tracked, source)) tell(*gap);
+  // Since it was restarted the tool has had no event; what stands in its registers is none.
+  const bool nothing_yet = tracked.novelty == Novelty::restart && number_of(block) == 0 &&
+                           (source != EventSource::push || EventTracker::is_blank(block));
+  if (nothing_yet) return;
+  served_ = true;
+  tell(EventNews{source, block, time});
 }
 
 void Watcher::tell(const News& news) {
   if (!stopped_ && tell_(news) == Heed::stop) stopped_ = true;
 }
 
-void Watcher::lose(const Error& error) {
-  // What had arrived before the line broke is still true.
-  while (link_) {
-    auto frame = link_->device.session().next_spontaneous(clock_->now());
-    if (!frame || !*frame) break;
-    hear(**frame);
-  }
-  link_.reset();
-  tell(LinkNews{LinkState::lost, 0, message_of(error)});
-}
+// ---- leaving ----
 
 void Watcher::leave() {
   if (!link_ || plan_.events != EventMode::push) return;
@@ -247,6 +359,7 @@ void Watcher::leave() {
   // The tool switches itself off when it hears nothing; a lost farewell costs only time.
   const auto ignored = link_->device.switch_events(EventOutput::off);
   static_cast<void>(ignored);
+  hear_waiting();
 }
 
 }  // namespace spindle::device

@@ -41,10 +41,16 @@ class EventTracker {
   /// A number that was read without its block: the next event is judged against it.
   void set_baseline(std::uint16_t number) { last_ = number; }
 
+  /// On a new connection nothing comes late, and a tool that was restarted may have equal events.
+  void forget_blocks() { recent_.clear(); }
+
   [[nodiscard]] std::optional<std::uint16_t> last() const { return last_; }
 
+  /// The registers of a tool that has had no event since it was switched on.
+  [[nodiscard]] static bool is_blank(RegisterView block);
+
  private:
-  [[nodiscard]] Tracked judge(std::uint16_t number) const;
+  [[nodiscard]] Tracked judge(std::uint16_t number, RegisterView block) const;
 
   std::optional<std::uint16_t> last_ = std::nullopt;
   std::deque<Registers> recent_ = {};

@@ -64,7 +64,6 @@ struct WatchPlan {
   std::vector<catalogue::Parameter> values = {};
   Duration interval = std::chrono::milliseconds(200);  ///< between two polls
   Samples samples = Samples::changes;
-  Reconnection reconnection = Reconnection::forever;
 };
 
 /// What whoever hears the news wants next.
@@ -74,48 +73,62 @@ enum class Heed : std::uint8_t { go_on, stop };
 /// re-arming, reconnection with back-off. Every loss of knowledge is in the stream. One thread.
 class Watcher {
  public:
-  /// Opens the tool anew, identified: the serial and firmware that it reports (empty where the
-  /// profile has no identity).
+  /// An open tool whose registers are known. Its profile outlives the watcher and may only be found
+  /// while opening.
   struct Link {
     Device device;
-    std::string identity;
+    std::string identity;  ///< serial and firmware as it reports them; empty without an identity
   };
   using Open = std::function<Result<Link>()>;
+  /// What to watch on a tool of this profile; asked once for every profile that a tool turns out to
+  /// have.
+  using Plan = std::function<Result<WatchPlan>(const catalogue::Profile&)>;
   using Tell = std::function<Heed(const News&)>;
-  /// When to end, asked anew at least once per keep-alive; a point in the past ends at once.
+  /// When to end, asked anew at least once a second; a point in the past ends at once.
   using Until = std::function<TimePoint()>;
 
-  Watcher(Open open, const catalogue::Profile& profile, WatchPlan plan, Clock& clock, Tell tell);
+  Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell);
 
   /// Returns at its end, or when whoever hears the news wants to stop; then the tool's output
-  /// is switched off again where the link still allows it. Errors: an interrupt; with
-  /// Reconnection::never any trouble; without it what no retry can mend (another product).
+  /// is switched off again where the link still allows it, and what had arrived is told. Errors: an
+  /// interrupt; what no retry can mend (another product, a refusal); with Reconnection::never any
+  /// trouble.
   Result<void> run(const Until& until);
 
  private:
   Result<void> watch(const Until& until);
   Result<void> connect(const Until& until);
+  Result<void> pause(const Until& until);
   Result<void> greet(Link link);
+  Result<void> learn(const catalogue::Profile& profile);
+  void compare_identity(const std::string& identity);
   Result<void> begin();
   Result<void> serve(const Until& until);
   Result<void> run_due();
+  Result<void> keep_alive();
+  Result<void> poll();
   Result<void> poll_values();
-  Result<void> poll_number();
+  void tell_reading(std::size_t index, Reading& reading);
   Result<void> fetch_last(EventSource source);
+  std::vector<link::Spontaneous> take_waiting();
+  void hear_waiting();
   void hear(const link::Spontaneous& frame);
-  void judge(EventSource source, Registers block, WallTime time);
+  void judge(EventSource source, const Registers& block, WallTime time);
   void tell(const News& news);
-  void tell_gap(const Tracked& tracked, EventSource source);
-  void lose(const Error& error);
+  void tell_trouble(const Error& error);
   void leave();
+  [[nodiscard]] bool goes_on(const Until& until) const;
+  [[nodiscard]] std::uint16_t number_of(const Registers& block) const { return block[number_at_]; }
   [[nodiscard]] TimePoint next_due() const;
   [[nodiscard]] Duration back_off() const;
 
   Open open_;
-  const catalogue::Profile* profile_;
-  WatchPlan plan_;
+  Plan make_plan_;
+  Reconnection reconnection_;
   Clock* clock_;
   Tell tell_;
+  const catalogue::Profile* profile_ = nullptr;  ///< empty until the first link
+  WatchPlan plan_ = {};
   std::optional<Link> link_ = std::nullopt;
   std::string known_identity_ = {};
   EventTracker tracker_ = {};
@@ -124,7 +137,9 @@ class Watcher {
   TimePoint arm_due_ = {};
   TimePoint keep_alive_due_ = {};
   TimePoint poll_due_ = {};
-  unsigned attempt_ = 0;
+  TimePoint retry_at_ = {};
+  unsigned failures_ = 0;  ///< attempts that came to nothing since the last link that served
+  bool served_ = false;    ///< this link has kept the tool alive, or brought an event
   bool stopped_ = false;
 };
 

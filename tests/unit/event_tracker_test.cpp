@@ -1,0 +1,114 @@
+#include "spindle/device/event_tracker.hpp"
+
+#include <doctest/doctest.h>
+
+#include <vector>
+
+using namespace spindle;
+using device::EventTracker;
+using device::Novelty;
+using device::Tracked;
+
+namespace {
+
+/// A block with its number in front; `rest` tells two events of one number apart.
+Registers block(std::uint16_t number, std::uint16_t rest = 7) {
+  return {number, rest, static_cast<std::uint16_t>(number * 3U)};
+}
+
+Tracked track(EventTracker& tracker, std::uint16_t number, std::uint16_t rest = 7) {
+  return tracker.track(number, block(number, rest));
+}
+
+struct Row {
+  const char* what;
+  std::uint16_t last;
+  std::uint16_t number;
+  Novelty novelty;
+  std::uint32_t missed;
+};
+
+}  // namespace
+
+TEST_CASE("the number of an event says what it is") {
+  const std::vector<Row> rows = {
+      {"the same again", 1962, 1962, Novelty::repeat, 0},
+      {"one more", 1962, 1963, Novelty::next, 0},
+      {"one was missed", 1962, 1964, Novelty::jump, 1},
+      {"many were missed", 10, 60010, Novelty::jump, 59999},
+      {"the last number", 65534, 65535, Novelty::next, 0},
+      {"from the first number", 0, 1, Novelty::next, 0},
+      {"behind the last number", 65535, 0, Novelty::wrap, 0},
+      {"behind the last number, some missed", 65530, 4, Novelty::wrap, 9},
+      {"as far as a wrap is believed", 65535, 1023, Novelty::wrap, 1023},
+      {"farther", 65535, 1024, Novelty::restart, 0},
+      {"as early as a wrap is believed", 64512, 0, Novelty::wrap, 1023},
+      {"earlier", 64511, 0, Novelty::restart, 0},
+      {"a restarted tool", 1962, 1, Novelty::restart, 0},
+      {"a restarted tool that had few events", 2, 1, Novelty::restart, 0},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    EventTracker tracker;
+    CHECK(track(tracker, row.last).novelty == Novelty::baseline);
+    const Tracked tracked = track(tracker, row.number);
+    CHECK(tracked.novelty == row.novelty);
+    CHECK(tracked.missed == row.missed);
+    CHECK(tracked.is_new() == (row.novelty != Novelty::repeat));
+    CHECK(tracker.last() == row.number);
+  }
+}
+
+TEST_CASE("the first event is an old one, unless its number was read before") {
+  EventTracker fresh;
+  CHECK_FALSE(fresh.last());
+  CHECK_FALSE(track(fresh, 1962).is_new());
+  CHECK(fresh.last() == 1962);
+
+  EventTracker informed;
+  informed.set_baseline(1961);
+  CHECK(informed.last() == 1961);
+  CHECK(track(informed, 1962).novelty == Novelty::next);
+}
+
+TEST_CASE("a late repeat of an older event is no restart") {
+  EventTracker tracker;
+  tracker.set_baseline(99);
+  for (std::uint16_t number = 100; number < 116; ++number) {
+    CHECK(track(tracker, number).novelty == Novelty::next);
+  }
+  for (std::uint16_t number = 100; number < 116; ++number) {
+    CAPTURE(number);
+    CHECK(track(tracker, number).novelty == Novelty::repeat);
+    CHECK(tracker.last() == 115);
+  }
+  CHECK(track(tracker, 116).novelty == Novelty::next);
+
+  SUBCASE("an older number with other registers is another event") {
+    CHECK(track(tracker, 110, 8).novelty == Novelty::restart);
+  }
+  SUBCASE("a new connection brings nothing late") {
+    tracker.forget_blocks();
+    CHECK(track(tracker, 110).novelty == Novelty::restart);
+    CHECK(track(tracker, 111).novelty == Novelty::next);
+  }
+}
+
+TEST_CASE("the number decides: the last one with other registers is still a repeat") {
+  EventTracker tracker;
+  tracker.set_baseline(1962);
+  CHECK(track(tracker, 1962, 8).novelty == Novelty::repeat);
+  CHECK(track(tracker, 1963, 8).novelty == Novelty::next);
+}
+
+TEST_CASE(
+    "registers that are all zero come from a tool that was just switched on, not from a wrap") {
+  EventTracker tracker;
+  tracker.set_baseline(65530);
+  const Registers zeros(3);
+  CHECK(EventTracker::is_blank(zeros));
+  CHECK_FALSE(EventTracker::is_blank(block(0)));
+  CHECK(tracker.track(0, zeros).novelty == Novelty::restart);
+  CHECK(tracker.track(0, zeros).novelty == Novelty::repeat);
+  CHECK(track(tracker, 1).novelty == Novelty::next);
+}

@@ -1,0 +1,459 @@
+#include "spindle/device/watcher.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/sim_transport.hpp"
+#include "support/bm_profile.hpp"
+#include "support/fake_clock.hpp"
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using device::EventMode;
+using device::EventNews;
+using device::EventSource;
+using device::GapNews;
+using device::Heed;
+using device::LinkNews;
+using device::LinkState;
+using device::News;
+using device::Reconnection;
+using device::Samples;
+using device::ValueNews;
+using device::Watcher;
+using device::WatchPlan;
+
+namespace {
+
+constexpr std::uint8_t read_input = 0x04;
+constexpr std::uint8_t write_single = 0x06;
+constexpr std::uint8_t report_server_id = 0x11;
+
+struct Asked {
+  TimePoint at;
+  modbus::Pdu pdu;
+
+  [[nodiscard]] bool is(std::uint8_t function, std::uint16_t address, std::uint16_t word) const {
+    return pdu.function == function && get_u16(pdu.data, 0) == address &&
+           get_u16(pdu.data, 2) == word;
+  }
+};
+
+catalogue::Profile profile_with_keep_alive() {
+  catalogue::Profile profile = test::bm_profile();
+  profile.link.keep_alive = 1s;
+  profile.identity->models = {{3, "3204"}};
+  profile.identity->firmware_below = 4000;
+  return profile;
+}
+
+/// A simulated tool, the line to it, and everything that is asked and told.
+class Workshop {
+ public:
+  explicit Workshop(const sim::BmOptions& options = {}) { power_on(options); }
+
+  /// Another tool, or the same one that lost its memory, on the same address.
+  void power_on(const sim::BmOptions& options) {
+    tool = sim::make_bm_tool(profile, test::bm_start(), options);
+  }
+
+  [[nodiscard]] Result<void> watch(Duration time) {
+    const TimePoint end = clock.now() + time;
+    Watcher watcher([this] { return open(); },
+                    [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
+                    reconnection, clock, [this](const News& one) { return hear(one); });
+    return watcher.run([end] { return end; });
+  }
+
+  template <typename Kind>
+  [[nodiscard]] std::vector<Kind> told() const {
+    std::vector<Kind> chosen;
+    for (const News& one : news) {
+      if (const auto* kind = std::get_if<Kind>(&one)) chosen.push_back(*kind);
+    }
+    return chosen;
+  }
+  [[nodiscard]] std::vector<std::uint16_t> numbers() const {
+    std::vector<std::uint16_t> all;
+    for (const EventNews& event : told<EventNews>()) all.push_back(event.block.front());
+    return all;
+  }
+  [[nodiscard]] std::vector<TimePoint> times(std::uint8_t function) const {
+    std::vector<TimePoint> all;
+    for (const Asked& one : asked) {
+      if (one.pdu.function == function) all.push_back(one.at);
+    }
+    return all;
+  }
+  void lose_line() { ++generation; }
+
+  Interrupt interrupt;
+  test::FakeClock clock{interrupt};
+  catalogue::Profile profile = profile_with_keep_alive();
+  std::unique_ptr<sim::BmTool> tool;
+  sim::FaultPlan faults;
+  sim::AnswerCounter answers;
+  WatchPlan plan;
+  Reconnection reconnection = Reconnection::forever;
+  TimePoint unreachable_until = TimePoint::min();
+  std::vector<TimePoint> attempts;
+  std::vector<Asked> asked;
+  std::vector<News> news;
+  std::size_t wanted = 1'000'000;  ///< news, then stop
+  unsigned generation = 0;         ///< of connections; older ones are broken
+
+ private:
+  class Line;
+
+  Result<Watcher::Link> open();
+  Heed hear(const News& one) {
+    news.push_back(one);
+    return news.size() < wanted ? Heed::go_on : Heed::stop;
+  }
+};
+
+/// Keeps the requests, and breaks when the workshop says so.
+class Workshop::Line final : public link::Transport {
+ public:
+  Line(Workshop& shop, std::unique_ptr<link::Transport> inner)
+      : shop_(&shop), generation_(shop.generation), inner_(std::move(inner)) {}
+
+  Result<void> send(ByteView bytes, TimePoint deadline) override {
+    if (broken()) return tl::unexpected(Error{.code = Errc::closed});
+    const auto frame = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, bytes);
+    auto sent = inner_->send(bytes, deadline);
+    if (sent)
+      shop_->asked.push_back({shop_->clock.now(), std::get<modbus::Deframed>(frame).adu.pdu});
+    return sent;
+  }
+  Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
+    if (broken()) return tl::unexpected(Error{.code = Errc::closed});
+    return inner_->receive(into, deadline);
+  }
+  void shield() override { inner_->shield(); }
+
+ private:
+  [[nodiscard]] bool broken() const { return generation_ != shop_->generation; }
+
+  Workshop* shop_;
+  unsigned generation_;
+  std::unique_ptr<link::Transport> inner_;
+};
+
+Result<Watcher::Link> Workshop::open() {
+  attempts.push_back(clock.now());
+  const auto connect = [this](const auto&, const auto&,
+                              Duration) -> Result<std::unique_ptr<link::Transport>> {
+    if (clock.now() < unreachable_until) {
+      return tl::unexpected(Error{.code = Errc::connection_refused});
+    }
+    const sim::ConnectionId connection{static_cast<std::uint32_t>(attempts.size())};
+    return std::make_unique<Line>(
+        *this, sim::make_sim_transport(*tool, connection, modbus::Framing::tcp, faults, answers,
+                                       clock, interrupt));
+  };
+  auto device = device::Device::open(link::parse_endpoint("tcp://tool:5000").value(), profile, {},
+                                     connect, clock);
+  if (!device) return tl::unexpected(device.error());
+  if (auto known = device->require_known_registers(); !known) {
+    return tl::unexpected(known.error());
+  }
+  std::string identity = device->identity_text();
+  return Watcher::Link{std::move(*device), std::move(identity)};
+}
+
+Duration longest_pause(const std::vector<TimePoint>& times) {
+  Duration longest = Duration::zero();
+  for (std::size_t at = 1; at < times.size(); ++at) {
+    longest = std::max(longest, times[at] - times[at - 1]);
+  }
+  return longest;
+}
+
+bool reads_full_block(const Asked& asked) {
+  return asked.pdu.function == read_input && get_u16(asked.pdu.data, 2) == 14;
+}
+
+/// An operator who works every two seconds; a run-down takes less.
+sim::BmOptions busy(unsigned ng_every = 0) { return {.rundown_every = 2s, .ng_every = ng_every}; }
+
+}  // namespace
+
+TEST_CASE("pushed events are told once each, in order, with their blocks") {
+  Workshop shop(busy(3));
+  REQUIRE(shop.watch(60s));
+  const auto numbers = shop.numbers();
+  REQUIRE(numbers.size() > 20);
+  for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
+  for (const EventNews& event : shop.told<EventNews>()) {
+    CHECK(event.source == EventSource::push);
+    CHECK(event.block.size() == 14);
+  }
+  CHECK(shop.told<GapNews>().empty());
+}
+
+TEST_CASE("the old event is not a result") {
+  Workshop shop;
+  REQUIRE(shop.watch(3s));
+  CHECK(shop.numbers().empty());
+  REQUIRE(shop.news.size() == 1);
+  CHECK(shop.told<LinkNews>().front().message == "connected: serial 1021100042, firmware 2103");
+}
+
+TEST_CASE("output is armed again in time, the tool kept alive, and no block is read whole") {
+  Workshop shop(busy());
+  REQUIRE(shop.watch(60s));
+  const auto arms = shop.times(write_single);
+  REQUIRE(arms.size() >= 12);
+  CHECK(longest_pause(arms) <= shop.profile.events->arm_every);
+  CHECK(longest_pause(shop.times(report_server_id)) <= 1s);
+  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
+  for (std::size_t at = 0; at + 1 < shop.asked.size(); ++at) {
+    CHECK_FALSE(shop.asked[at].is(write_single, 4002, 0));
+  }
+  CHECK(shop.asked.back().is(write_single, 4002, 0));
+}
+
+TEST_CASE("the tool is disarmed on every way out") {
+  Workshop shop(busy());
+  SUBCASE("at its end") { CHECK(shop.watch(5s)); }
+  SUBCASE("when nobody wants more") {
+    shop.wanted = 2;
+    CHECK(shop.watch(60s));
+    CHECK(shop.news.size() == 2);
+  }
+  SUBCASE("after an interrupt") {
+    shop.clock.at(shop.clock.now() + 5s, [&] { shop.interrupt.raise(15); });
+    const auto watched = shop.watch(60s);
+    REQUIRE_FALSE(watched);
+    CHECK(watched.error().code == Errc::terminated);
+  }
+  SUBCASE("after a refused value") {
+    shop.plan.values = {catalogue::parse_raw_register("@holding:9999")->value()};
+    const auto watched = shop.watch(60s);
+    REQUIRE_FALSE(watched);
+    CHECK(watched.error().code == Errc::exception_response);
+    CHECK(watched.error().name == "@holding:9999");
+    CHECK(shop.told<LinkNews>().size() == 1);
+  }
+  CHECK(shop.asked.back().is(write_single, 4002, 0));
+}
+
+TEST_CASE("an interrupt ends the wait for a tool that is not there") {
+  Workshop shop;
+  shop.unreachable_until = TimePoint::max();
+  shop.clock.at(shop.clock.now() + 25s, [&] { shop.interrupt.raise(2); });
+  const auto watched = shop.watch(3600s);
+  REQUIRE_FALSE(watched);
+  CHECK(watched.error().code == Errc::interrupted);
+  CHECK(shop.clock.now() == test::FakeClock::start + 25s);
+}
+
+TEST_CASE("attempts come at once, then after 0.25 s, doubling up to 10 s, a fifth less at most") {
+  Workshop shop;
+  shop.unreachable_until = TimePoint::max();
+  REQUIRE(shop.watch(120s));
+  const auto links = shop.told<LinkNews>();
+  REQUIRE(links.size() == shop.attempts.size());
+  REQUIRE(links.size() > 10);
+  CHECK(shop.attempts.front() == test::FakeClock::start);
+  Duration even = 250ms;
+  bool jitters = false;
+  for (std::size_t at = 1; at < shop.attempts.size();
+       ++at, even = std::min<Duration>(10s, 2 * even)) {
+    const Duration pause = shop.attempts[at] - shop.attempts[at - 1];
+    CAPTURE(at);
+    CHECK(pause <= even);
+    CHECK(pause >= even * 4 / 5);
+    jitters = jitters || pause != even;
+    CHECK(links[at].attempt == at + 1);
+    CHECK(links[at].state == LinkState::reconnecting);
+  }
+  CHECK(jitters);
+}
+
+TEST_CASE("after a lost link the missed events are a gap and the last one is fetched") {
+  Workshop shop(busy());
+  // Run-downs end about every two seconds; the line is away for ten of them.
+  shop.clock.at(shop.clock.now() + 10s, [&] {
+    shop.lose_line();
+    shop.unreachable_until = shop.clock.now() + 20s;
+  });
+  REQUIRE(shop.watch(60s));
+  const auto links = shop.told<LinkNews>();
+  REQUIRE(links.size() > 4);
+  CHECK(links[0].state == LinkState::connected);
+  CHECK(links[1].state == LinkState::lost);
+  CHECK(links[2].state == LinkState::reconnecting);
+  CHECK(links.back().state == LinkState::connected);
+
+  const auto gaps = shop.told<GapNews>();
+  REQUIRE(gaps.size() == 1);
+  REQUIRE(gaps.front().missed);
+  CHECK(*gaps.front().missed > 5);
+  const auto events = shop.told<EventNews>();
+  std::uint32_t jumps = 0;
+  for (std::size_t at = 1; at < events.size(); ++at) {
+    const std::uint32_t step = events[at].block.front() - events[at - 1].block.front();
+    if (step == 1) continue;
+    ++jumps;
+    CHECK(step == *gaps.front().missed + 1);
+    CHECK(events[at].source == EventSource::catch_up);
+  }
+  CHECK(jumps == 1);
+}
+
+TEST_CASE("a link that never serves is tried ever more seldom") {
+  Workshop shop;
+  shop.faults = {sim::parse_fault("close@every:3").value()};
+  REQUIRE(shop.watch(60s));
+  CHECK(shop.attempts.size() < 14);
+  CHECK(shop.told<LinkNews>().size() > 6);
+}
+
+TEST_CASE("one lost answer to a keep-alive or an arming is no reason to reconnect") {
+  Workshop shop(busy());
+  shop.profile.link.retries = 1;
+  shop.faults = {sim::parse_fault("lost@every:7").value()};
+  REQUIRE(shop.watch(60s));
+  CHECK(shop.told<LinkNews>().size() == 1);
+  CHECK(shop.told<GapNews>().empty());
+  CHECK(shop.numbers().size() > 20);
+}
+
+TEST_CASE("a restarted tool is said, and what stands in its registers is no event") {
+  Workshop shop(busy());
+  shop.clock.at(shop.clock.now() + 10s, [&] {
+    shop.tool->reboot(shop.clock.now());
+    shop.lose_line();
+  });
+  REQUIRE(shop.watch(20s));
+  const auto gaps = shop.told<GapNews>();
+  REQUIRE(gaps.size() == 1);
+  CHECK_FALSE(gaps.front().missed);
+  CHECK(gaps.front().reason.find("restarted") != std::string::npos);
+  const auto numbers = shop.numbers();
+  CHECK(std::count(numbers.begin(), numbers.end(), 0) == 0);
+  CHECK(std::count(numbers.begin(), numbers.end(), 1) == 1);
+  CHECK(std::count(numbers.begin(), numbers.end(), 2) == 1);
+}
+
+TEST_CASE("another tool or firmware behind the address is said, and its old event is no result") {
+  Workshop shop;
+  sim::BmOptions other;
+  SUBCASE("serial") { other.serial = 1021100099; }
+  SUBCASE("firmware") { other.firmware = 2200; }
+  std::unique_ptr<sim::BmTool> gone;
+  shop.clock.at(shop.clock.now() + 3s, [&] {
+    shop.lose_line();
+    gone = std::move(shop.tool);  // the old line still refers to it
+    shop.power_on(other);
+  });
+  REQUIRE(shop.watch(10s));
+  const auto links = shop.told<LinkNews>();
+  REQUIRE(links.size() == 3);
+  CHECK(links[2].message.starts_with("not the tool of before: serial "));
+  CHECK(links[2].message.find("before: serial 1021100042, firmware 2103") != std::string::npos);
+  REQUIRE(shop.told<GapNews>().size() == 1);
+  CHECK_FALSE(shop.told<GapNews>().front().missed);
+  CHECK(shop.numbers().empty());
+}
+
+TEST_CASE("another product ends the watch, because no retry mends it") {
+  Workshop shop;
+  std::unique_ptr<sim::BmTool> gone;
+  shop.clock.at(shop.clock.now() + 3s, [&] {
+    shop.lose_line();
+    gone = std::move(shop.tool);
+    shop.power_on({.firmware = std::uint16_t{4001}});
+  });
+  const auto watched = shop.watch(10s);
+  REQUIRE_FALSE(watched);
+  CHECK(watched.error().code == Errc::wrong_generation);
+}
+
+TEST_CASE("without reconnection the first trouble ends it") {
+  Workshop shop(busy());
+  shop.reconnection = Reconnection::never;
+  SUBCASE("the link is lost") {
+    shop.clock.at(shop.clock.now() + 5s, [&] { shop.lose_line(); });
+    const auto watched = shop.watch(60s);
+    REQUIRE_FALSE(watched);
+    CHECK(watched.error().code == Errc::closed);
+    CHECK(shop.told<LinkNews>().back().state == LinkState::lost);
+  }
+  SUBCASE("nobody is there") {
+    shop.unreachable_until = TimePoint::max();
+    const auto watched = shop.watch(60s);
+    REQUIRE_FALSE(watched);
+    CHECK(watched.error().code == Errc::connection_refused);
+    CHECK(shop.news.empty());
+  }
+  CHECK(shop.attempts.size() == 1);
+}
+
+TEST_CASE("polling the counter finds every event and arms nothing") {
+  Workshop shop(busy());
+  shop.plan.events = EventMode::poll;
+  REQUIRE(shop.watch(60s));
+  const auto numbers = shop.numbers();
+  REQUIRE(numbers.size() > 20);
+  for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
+  CHECK(shop.told<EventNews>().front().source == EventSource::poll);
+  CHECK(shop.times(write_single).empty());
+  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
+}
+
+TEST_CASE("events that come between two polls are a gap") {
+  Workshop shop(busy());
+  shop.plan.events = EventMode::poll;
+  shop.plan.interval = 10s;
+  REQUIRE(shop.watch(35s));
+  const auto gaps = shop.told<GapNews>();
+  REQUIRE(gaps.size() >= 2);
+  CHECK(gaps.front().reason == "events came faster than they were polled");
+}
+
+TEST_CASE("values are told when they change, first, or always") {
+  Workshop shop(busy());
+  shop.plan.events = EventMode::none;
+  shop.plan.values = {shop.profile.find("status.running").value()};
+  const auto watched = [&](Samples samples) {
+    shop.plan.samples = samples;
+    REQUIRE(shop.watch(10s));
+    return shop.told<ValueNews>();
+  };
+  SUBCASE("changes") {
+    const auto values = watched(Samples::changes);
+    REQUIRE(values.size() > 4);
+    for (const ValueNews& value : values) {
+      REQUIRE(value.previous);
+      CHECK_FALSE(*value.previous == value.value);
+    }
+  }
+  SUBCASE("the first too") {
+    const auto values = watched(Samples::changes_and_first);
+    REQUIRE(values.size() > 4);
+    CHECK_FALSE(values.front().previous);
+    CHECK(values[1].previous);
+  }
+  SUBCASE("all") { CHECK(watched(Samples::all).size() == 50); }
+  CHECK(shop.numbers().empty());
+  CHECK(shop.times(write_single).empty());
+}
+
+TEST_CASE("whole blocks of event and status are polled in parts while output is armed") {
+  Workshop shop(busy());
+  for (const catalogue::Parameter& parameter : shop.profile.parameters) {
+    if (parameter.table == modbus::RegisterTable::input) shop.plan.values.push_back(parameter);
+  }
+  REQUIRE(shop.plan.values.size() > 20);
+  REQUIRE(shop.watch(20s));
+  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
+  CHECK(longest_pause(shop.times(report_server_id)) <= 1s);
+}
