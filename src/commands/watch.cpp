@@ -166,6 +166,9 @@ Result<void> check_for_any_profile(const WatchOptions& options, ProfileShelf& sh
     if (plan) return {};
     checked = tl::unexpected(std::move(plan.error()));
   }
+  if (!checked && checked.error().code == Errc::unknown_name) {
+    checked.error().message = "neither a tool, nor a parameter of any profile that is known";
+  }
   return checked;
 }
 

@@ -1,0 +1,454 @@
+"""watch against tools that push, repeat, stumble, vanish and come back: nothing lost in silence,
+nothing twice, nothing invented, and the tool left disarmed.
+
+With SPINDLE_LONG=1 the long runs of the same kind: 10,000 events at 200 per second, and 30 seconds
+of keep-alives.
+"""
+
+import contextlib
+import os
+import signal
+import socket
+import threading
+import time
+import unittest
+
+import support
+from event_server import ARM_REGISTER, NUMBERS, Chance, EventServer
+
+LONG = os.environ.get("SPINDLE_LONG") == "1"
+EVENTS, RATE = (10000, 200) if LONG else (2000, 1000)
+SECONDS = 30 if LONG else 5
+PROFILE = ("--profile", "doga-bm")
+JSON = (*PROFILE, "--json")
+KEEP_ALIVE, ARM_EXPIRES = 1.0, 10.0
+QUICK = 0.75  # seconds that an end may take, farewell included, on a busy machine
+
+
+def tearDownModule():
+    support.remove_home()
+
+
+class Watching(support.Running):
+    """A watch whose records are read as they come, so that it never waits for its reader."""
+
+    def __init__(self, *arguments):
+        super().__init__("watch", *arguments)
+        self.arrivals = []  # (time, record)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self._reader.join(support.DEADLINE)
+        super().__exit__()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.arrivals.append((time.monotonic(), support.parse_json(line)))
+
+    def records(self, kind=None):
+        return [record for _, record in list(self.arrivals) if kind in (None, record["type"])]
+
+    def links(self):
+        return [record["state"] for record in self.records("link")]
+
+    def numbers(self):
+        return [record["number"] for record in self.records("event")]
+
+    def end(self, number=signal.SIGTERM):
+        """Sends the signal; returns status, seconds and what was said on stderr."""
+        began = time.monotonic()
+        if number is not None:
+            self.process.send_signal(number)
+        status = self.process.wait(support.DEADLINE)
+        seconds = time.monotonic() - began
+        self._reader.join(support.DEADLINE)
+        return status, seconds, self.process.stderr.read().decode()
+
+
+def unaccounted(records, first, last):
+    """Goes through events and gaps in order; what is wrong with them, or nothing."""
+    expected, missed = first, 0
+    for record in records:
+        if record["type"] == "gap":
+            if missed or not record["missed"]:
+                return f"a gap behind a gap, or an empty one, before {expected}: {record}"
+            missed = record["missed"]
+        elif record["type"] == "event":
+            if record["number"] != (expected + missed) % NUMBERS:
+                return f"{record['number']} where {expected} + {missed} missed was to come"
+            expected, missed = (record["number"] + 1) % NUMBERS, 0
+    if missed or expected != (last + 1) % NUMBERS:
+        return f"ended before {expected}, {missed} missed, and not behind {last}"
+    return ""
+
+
+class CompletenessTest(unittest.TestCase):
+    def test_every_event_once_and_in_order(self):
+        chance = Chance(seed=3, split=0.5, glue=0.4, repeat=0.05, late_repeat=0.03)
+        # The counter goes over its end on the way.
+        with EventServer(chance, first=NUMBERS - EVENTS // 2) as server:
+            first = server.number + 1
+            with Watching(server.url, *JSON, "--count", EVENTS) as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                server.run(EVENTS, RATE)
+                status, _, stderr = watching.end(None)
+            self.assertEqual((status, stderr), (0, ""))
+            expected = [(first + offset) % NUMBERS for offset in range(EVENTS)]
+            self.assertEqual(watching.numbers(), expected)
+            gaps = watching.records("gap")
+            self.assertEqual([gap["missed"] for gap in gaps], [0])  # the end of the counter
+            summary = watching.records()[-1]
+            facts = {key: summary[key] for key in ("type", "events", "ok", "ng", "reconnects")}
+            ng = EVENTS // 10
+            self.assertEqual(
+                facts,
+                {"type": "summary", "events": EVENTS, "ok": EVENTS - ng, "ng": ng, "reconnects": 0},
+            )
+            self.assertEqual(server.full_block_reads(), [])
+
+    def test_connections_cut_at_random(self):
+        for seed in (5, 6) if not LONG else range(5, 9):
+            chance = Chance(seed, split=0.5, glue=0.4, repeat=0.05, late_repeat=0.03, cut=0.004)
+            with self.subTest(seed), EventServer(chance) as server:
+                first = server.number + 1
+                with Watching(server.url, *JSON) as watching:
+                    support.wait_until(lambda: server.armed, "the watch arms the output")
+                    server.run(EVENTS, RATE)
+                    support.wait_until(
+                        lambda: watching.numbers()[-1:] == [server.number],
+                        "the last event is told, though its frame may have been cut off",
+                    )
+                    status, _, _ = watching.end()
+                self.assertEqual(status, 143)
+                self.assertGreater(server.cuts, 2)
+                self.assertEqual(unaccounted(watching.records(), first, server.number), "")
+                lost = watching.links().count("lost")
+                self.assertEqual(watching.links().count("connected"), lost + 1)
+                self.assertEqual(watching.records()[-1]["reconnects"], lost)
+                print(f"seed {seed}: {lost} cuts, {len(watching.numbers())} of {EVENTS} told")
+
+    def test_old_event_is_no_result_and_a_missed_one_is_caught_up(self):
+        with EventServer() as server, Watching(server.url, *JSON) as watching:
+            support.wait_until(lambda: server.armed, "the watch arms the output")
+            server.cut()
+            server.event()
+            support.wait_until(lambda: watching.numbers(), "the missed event is caught up")
+            server.event()
+            support.wait_until(lambda: len(watching.numbers()) == 2, "the next one is pushed")
+            server.cut()
+            for _ in range(3):
+                server.event()
+            support.wait_until(lambda: len(watching.numbers()) == 3, "the last one is caught up")
+            watching.end()
+            events = watching.records("event")
+            self.assertEqual(
+                [(event["number"], event["source"]) for event in events],
+                [(1962, "catch-up"), (1963, "push"), (1966, "catch-up")],
+            )
+            self.assertEqual([gap["missed"] for gap in watching.records("gap")], [2])
+
+    def test_polling_without_arming(self):
+        with EventServer() as server:
+            arguments = (server.url, *JSON, "--no-push", "--interval", "20ms", "--count", 3)
+            with Watching(*arguments) as watching:
+                support.wait_until(lambda: server.asked(support.READ_INPUT, 3213), "it is connected")
+                for count in range(1, 4):
+                    server.event()
+                    support.wait_until(lambda: len(watching.numbers()) == count, "it is polled")
+                self.assertEqual(watching.end(None)[0], 0)
+            self.assertEqual([event["source"] for event in watching.records("event")], ["poll"] * 3)
+            self.assertEqual(server.asked(support.WRITE_SINGLE), [])
+            self.assertEqual(server.full_block_reads(), [])
+
+
+class WireTest(unittest.TestCase):
+    def test_keep_alive_and_arming(self):
+        with EventServer(expires=ARM_EXPIRES) as server:
+            # All of both blocks is polled too: fourteen registers each.
+            names = ("event.*", "status.*", "preset.1.*")
+            with Watching(server.url, *names, *JSON, "--duration", f"{SECONDS}s") as watching:
+                server.run(SECONDS * 20, 20)
+                status, _, _ = watching.end(None)
+            self.assertEqual(status, 0)
+            alive = server.asked(support.REPORT_SERVER_ID)
+            spacing = max(later - earlier for earlier, later in zip(alive, alive[1:]))
+            self.assertGreaterEqual(len(alive), SECONDS)
+            self.assertLessEqual(spacing, KEEP_ALIVE)
+            armed = server.asked(support.WRITE_SINGLE, ARM_REGISTER, 1)
+            between = [later - earlier for earlier, later in zip(armed, armed[1:])]
+            self.assertGreaterEqual(len(armed), 1 + SECONDS // 5)
+            self.assertLess(max(between, default=0), ARM_EXPIRES)
+            self.assertEqual(server.full_block_reads(), [])
+            self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
+            print(f"longest pause between keep-alives {spacing:.3f} s, armings {max(between):.3f} s")
+
+    def test_arming_goes_on_while_events_flood(self):
+        with EventServer(expires=6.0) as server:
+            with Watching(server.url, *JSON) as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                server.run(5500, 1000)
+                self.assertTrue(server.armed)
+                support.wait_until(lambda: len(watching.numbers()) == 5500, "all are told")
+                watching.end()
+            self.assertEqual(watching.records("gap"), [])
+
+
+class EndingTest(unittest.TestCase):
+    def assert_disarmed(self, server):
+        self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
+
+    def test_signals(self):
+        for number, expected in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            with self.subTest(number), EventServer() as server:
+                with Watching(server.url, *JSON) as watching:
+                    support.wait_until(lambda: server.armed, "the watch arms the output")
+                    server.event()
+                    support.wait_until(watching.numbers, "an event is told")
+                    status, seconds, stderr = watching.end(number)
+                self.assertEqual((status, stderr), (expected, ""))
+                self.assertLess(seconds, QUICK)
+                summary = watching.records()[-1]
+                self.assertEqual(
+                    (summary["type"], summary["events"], summary["exit_status"]),
+                    ("summary", 1, expected),
+                )
+                self.assert_disarmed(server)
+
+    def test_signal_while_reconnecting(self):
+        with support.refusing_port() as url, Watching(url, *JSON) as watching:
+            support.wait_until(lambda: len(watching.links()) > 2, "it tries again and again")
+            status, seconds, _ = watching.end()
+            self.assertEqual(status, 143)
+            self.assertLess(seconds, QUICK)
+            self.assertEqual(watching.records()[-1]["type"], "summary")
+
+    def test_table_summary_is_on_stderr(self):
+        with EventServer() as server, support.Running("watch", server.url, *PROFILE) as running:
+            support.wait_until(lambda: server.armed, "the watch arms the output")
+            server.event(2, 335)
+            self.assertTrue(running.line().startswith("TIME"))
+            self.assertIn("connected", running.line())
+            self.assertRegex(running.line(), r"fastening-ng +1962 .* NG +E335 \w+")
+            running.send_signal(signal.SIGINT)
+            finished = running.finish()
+            self.assertEqual(finished.status, 130, finished)
+            self.assertIn("1 events, 0 OK, 1 NG", finished.stderr)
+            self.assertNotIn("\x1b", finished.stdout)
+
+    def test_second_signal_ends_at_once(self):
+        with EventServer() as server, Watching(server.url, *JSON) as watching:
+            support.wait_until(lambda: server.armed, "the watch arms the output")
+            with server._lock:  # the farewell gets no answer
+                began = time.monotonic()
+                watching.process.send_signal(signal.SIGINT)
+                threading.Event().wait(0.1)
+                self.assertIsNone(watching.process.poll())
+                watching.process.send_signal(signal.SIGINT)
+                self.assertEqual(watching.process.wait(support.DEADLINE), 130)
+                self.assertLess(time.monotonic() - began, 0.4)
+
+    def test_closed_pipe(self):
+        for also in ((), ("--output", "csv"), ("--output", "table")):
+            with self.subTest(also), EventServer() as server:
+                reading, writing = os.pipe()
+                arguments = ("watch", server.url, *JSON, *also)
+                with support.Running(*arguments, stdout=writing) as running:
+                    os.close(writing)
+                    with os.fdopen(reading, "rb") as pipe:
+                        self.assertTrue(pipe.readline())
+                        support.wait_until(lambda: server.armed, "the watch arms the output")
+                    # No event comes: the end of the reader is noticed all the same.
+                    finished = running.finish()
+                self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+                self.assert_disarmed(server)
+
+    def test_count_and_duration(self):
+        with EventServer() as server:
+            with Watching(server.url, *JSON, "--count", 2) as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                for _ in range(5):
+                    server.event()
+                self.assertEqual(watching.end(None)[0], 0)
+                self.assertEqual(len(watching.numbers()), 2)
+            self.assert_disarmed(server)
+        with EventServer() as server:
+            finished = support.run("watch", server.url, *JSON, "--duration", "300ms")
+            self.assertEqual(finished.status, 0, finished)
+            self.assertLess(finished.seconds, 0.3 + QUICK)
+            self.assert_disarmed(server)
+
+    def test_idle_timeout(self):
+        with EventServer() as server:
+            finished = support.run("watch", server.url, *JSON, "--idle-timeout", "300ms")
+            self.assertEqual(finished.status, 1, finished)
+            self.assertEqual(finished.records()[-1]["exit_status"], 1)
+            with Watching(server.url, *JSON, "--idle-timeout", "400ms") as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                server.event()
+                self.assertEqual(watching.end(None)[0], 0)
+
+    def test_no_reconnect(self):
+        with EventServer() as server, Watching(server.url, *JSON, "--no-reconnect") as watching:
+            support.wait_until(lambda: server.armed, "the watch arms the output")
+            server.event()
+            server.cut()
+            status, _, stderr = watching.end(None)
+            self.assertEqual(status, 5)
+            self.assertIn("spindle: ", stderr)
+            self.assertEqual(watching.numbers(), [1962])
+            kinds = [record["type"] for record in watching.records()]
+            self.assertEqual(kinds, ["link", "event", "link", "error", "summary"])
+        with support.refusing_port() as url:
+            finished = support.run("watch", url, *JSON, "--no-reconnect")
+            self.assertEqual(finished.status, 4, finished)
+            self.assertEqual(finished.records("link"), [])
+
+
+class ReconnectingTest(unittest.TestCase):
+    def test_killed_simulator(self):
+        with support.Running("simulate", "doga-bm", "--rundown-every", "1500ms") as first:
+            url = first.line()
+            with Watching(url, *JSON) as watching:
+                support.wait_until(watching.numbers, "an event is told")
+                first.process.kill()
+                first.process.wait()
+                support.wait_until(lambda: watching.links()[-2:] == ["reconnecting"] * 2, "it tries")
+                arguments = ("--listen", url, "--rundown-every", "1500ms")
+                with support.Running("simulate", "doga-bm", *arguments) as second:
+                    second.line()
+                    told = len(watching.numbers())
+                    support.wait_until(lambda: watching.links()[-1] == "connected", "it is back")
+                    support.wait_until(lambda: len(watching.numbers()) > told, "events go on")
+                    status, _, _ = watching.end()
+                self.assertEqual(status, 143)
+                self.assertEqual(watching.links()[:2], ["connected", "lost"])
+                attempts = [link["attempt"] for link in watching.records("link")[2:-1]]
+                self.assertEqual(attempts, list(range(1, len(attempts) + 1)))
+
+    def test_another_tool_is_said(self):
+        with EventServer() as server:
+            with Watching(server.url, *JSON) as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                other = EventServer(serial=1021100099, first=7)
+                server.tool, server.number = other.tool, other.number
+                other._listening.close()
+                server.cut()
+                support.wait_until(lambda: watching.links().count("connected") == 2, "it is back")
+                support.wait_until(lambda: server.armed, "the output is armed")
+                server.event()
+                support.wait_until(watching.numbers, "its event is told")
+                watching.end()
+            message = watching.records("link")[-1]["message"]
+            self.assertIn("1021100042", message)
+            self.assertIn("1021100099", message)
+            self.assertEqual([gap["missed"] for gap in watching.records("gap")], [None])
+            self.assertEqual(watching.numbers(), [8])
+
+    def test_connection_that_never_serves_is_not_hammered(self):
+        """A server that hangs up on everybody is asked ever more seldom."""
+        accepted = []
+        listening = socket.create_server(("127.0.0.1", 0))
+
+        def hang_up():
+            with contextlib.suppress(OSError):
+                while True:
+                    client, _ = listening.accept()
+                    accepted.append(time.monotonic())
+                    client.close()
+
+        thread = threading.Thread(target=hang_up, daemon=True)
+        thread.start()
+        url = f"tcp://127.0.0.1:{listening.getsockname()[1]}"
+        finished = support.run("watch", url, *JSON, "--duration", "2s")
+        listening.shutdown(socket.SHUT_RDWR)
+        listening.close()
+        thread.join()
+        self.assertEqual(finished.status, 0, finished)
+        self.assertIn(len(accepted), range(3, 6))  # 0, 0.25, 0.75, 1.75 s and a fifth less
+
+    def test_a_dead_tool_does_not_delay_another(self):
+        for known in (PROFILE, ()):
+            with self.subTest(known), EventServer() as server, support.full_backlog() as (dead, _):
+                with Watching(dead, server.url, *known, "--json") as watching:
+                    support.wait_until(lambda: server.armed, "the other one is watched")
+                    for count in range(1, 21):
+                        sent = time.monotonic()
+                        server.event()
+                        support.wait_until(lambda: len(watching.numbers()) == count, "it is told")
+                        self.assertLess(time.monotonic() - sent, 0.25)
+                    status, seconds, _ = watching.end()
+                self.assertEqual(status, 143)
+                self.assertLess(seconds, QUICK)
+                self.assertEqual({event["target"] for event in watching.records("event")}, {server.url})
+
+    def test_one_of_two_fails(self):
+        with EventServer() as server, EventServer(firmware=4001) as later:
+            finished = support.run("watch", server.url, later.url, *JSON, "--duration", "500ms")
+            self.assertEqual(finished.status, 9, finished)
+            self.assertEqual([error["target"] for error in finished.records("error")], [later.url])
+
+
+class UsageTest(unittest.TestCase):
+    def test_wrong_names_are_refused_without_connecting(self):
+        with EventServer() as server:
+            for arguments in (
+                ("watch", "stationn3"),
+                ("watch", server.url, "stationn3"),
+                ("watch", server.url, *PROFILE, "status.redy"),
+                ("watch", server.url, server.url, "tcp//127.0.0.1"),
+                ("watch", server.url, "--count", "0"),
+                ("watch", server.url, "--duration", "soon"),
+                ("watch", server.url, "--interval", "0ms"),
+                ("watch",),
+            ):
+                with self.subTest(arguments):
+                    finished = support.run(*arguments, "--json")
+                    self.assertEqual(finished.status, 2, finished)
+                    self.assertEqual([r["type"] for r in finished.records()], ["error"])
+            self.assertEqual(server.requests, [])
+
+    def test_simulate_refuses_a_length_that_no_identity_has(self):
+        for length in ("0", "11", "14", "255"):
+            finished = support.run("simulate", "doga-bm", "--identity-bytes", length)
+            self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
+            self.assertIn("12, 13, 17", finished.stderr)
+
+
+class ValuesTest(unittest.TestCase):
+    def test_changes_first_values_and_samples(self):
+        with EventServer() as server:
+            for option, expected in (
+                ((), [(1, 0)]),
+                (("--initial",), [(0, None), (1, 0)]),
+            ):
+                server.tool.inputs[3306] = 0
+                count = len(expected)
+                with Watching(
+                    server.url, "status.ready", *JSON, "--interval", "10ms", "--count", count, *option
+                ) as watching:
+                    polls = len(server.asked(support.READ_INPUT, 3306))
+                    support.wait_until(
+                        lambda: len(server.asked(support.READ_INPUT, 3306)) > polls + 1, "it polls"
+                    )
+                    server.tool.inputs[3306] = 1
+                    self.assertEqual(watching.end(None)[0], 0)
+                changes = watching.records("change")
+                self.assertEqual([(c["value"], c["previous"]) for c in changes], expected)
+            finished = support.run(
+                "watch", server.url, "status.ready", *JSON, "--interval", "10ms", "--count", 5, "--all"
+            )
+            self.assertEqual([c["value"] for c in finished.records("change")], [1] * 5)
+
+    def test_refused_value_ends_with_that_error(self):
+        with EventServer() as server:
+            finished = support.run("watch", server.url, "p564", *JSON)
+            self.assertEqual(finished.status, 6, finished)
+            self.assertEqual(finished.records("error")[0]["name"], "p564")
+            self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
+
+
+if __name__ == "__main__":
+    unittest.main()
