@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -91,6 +92,13 @@ class Workshop {
     return all;
   }
   void lose_line() { ++generation; }
+  /// An event at once; error 116 may happen as often as a test wants.
+  void happen() { tool->raise_alarm(116, clock.now()); }
+  /// The output is switched by others than the watcher.
+  void switch_output(std::uint16_t value) {
+    const sim::ConnectionId connection{static_cast<std::uint32_t>(attempts.size())};
+    tool->answer(connection, {}, modbus::write_request({4002}, value), clock.now());
+  }
 
   Interrupt interrupt;
   test::FakeClock clock{interrupt};
@@ -104,8 +112,9 @@ class Workshop {
   std::vector<TimePoint> attempts;
   std::vector<Asked> asked;
   std::vector<News> news;
-  std::size_t wanted = 1'000'000;  ///< news, then stop
-  unsigned generation = 0;         ///< of connections; older ones are broken
+  std::function<void(const modbus::Pdu&)> on_request = {};  ///< just before the tool gets it
+  std::size_t wanted = 1'000'000;                           ///< news, then stop
+  unsigned generation = 0;  ///< of connections; older ones are broken
 
  private:
   class Line;
@@ -126,9 +135,10 @@ class Workshop::Line final : public link::Transport {
   Result<void> send(ByteView bytes, TimePoint deadline) override {
     if (broken()) return tl::unexpected(Error{.code = Errc::closed});
     const auto frame = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, bytes);
+    const modbus::Pdu request = std::get<modbus::Deframed>(frame).adu.pdu;
+    if (const auto hook = shop_->on_request) hook(request);  // a copy: it may take itself away
     auto sent = inner_->send(bytes, deadline);
-    if (sent)
-      shop_->asked.push_back({shop_->clock.now(), std::get<modbus::Deframed>(frame).adu.pdu});
+    if (sent) shop_->asked.push_back({shop_->clock.now(), request});
     return sent;
   }
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
@@ -203,6 +213,50 @@ TEST_CASE("the old event is not a result") {
   CHECK(shop.numbers().empty());
   REQUIRE(shop.news.size() == 1);
   CHECK(shop.told<LinkNews>().front().message == "connected: serial 1021100042, firmware 2103");
+}
+
+TEST_CASE("what was pushed before the counter was read is old") {
+  Workshop shop;
+  shop.on_request = [&](const modbus::Pdu& request) {
+    if (request.function != read_input || get_u16(request.data, 2) != 1) return;
+    shop.switch_output(1);
+    shop.happen();
+    shop.happen();
+    shop.on_request = {};
+  };
+  REQUIRE(shop.watch(3s));
+  CHECK(shop.numbers().empty());
+  CHECK(shop.told<GapNews>().empty());
+}
+
+TEST_CASE("what is pushed while the last event is fetched keeps its place") {
+  Workshop shop;
+  const auto while_fetching = [&](const std::function<void()>& what) {
+    shop.on_request = [&shop, what](const modbus::Pdu& request) {
+      if (request.function != read_input || get_u16(request.data, 2) != 13) return;
+      shop.on_request = {};
+      what();
+    };
+    REQUIRE(shop.watch(3s));
+    CHECK(shop.told<GapNews>().empty());
+  };
+  SUBCASE("the fetched one was pushed too") {
+    while_fetching([&] {
+      shop.happen();
+      shop.happen();
+    });
+    CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
+    CHECK(shop.told<EventNews>().back().source == EventSource::push);
+  }
+  SUBCASE("the fetched one was not pushed") {
+    while_fetching([&] {
+      shop.happen();
+      shop.switch_output(0);
+      shop.happen();
+    });
+    CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
+    CHECK(shop.told<EventNews>().back().source == EventSource::catch_up);
+  }
 }
 
 TEST_CASE("output is armed again in time, the tool kept alive, and no block is read whole") {
