@@ -15,6 +15,7 @@ using catalogue::Parameter;
 using catalogue::Profile;
 using report::Column;
 
+constexpr std::string_view present_list = "present";
 /// Registers whose meaning is not known: their numbers are shown, not explained.
 constexpr std::string_view data_list = "alarm-data";
 
@@ -37,7 +38,7 @@ Result<AlarmPlan> plan_alarms(const Profile& profile) {
   if (!reset) return tl::unexpected(reset.error());
   auto present = profile.find(reset->confirm);
   if (!present) return tl::unexpected(std::move(present.error()));
-  plan.sources.emplace_back("present", std::move(*present));
+  plan.sources.emplace_back(std::string(present_list), std::move(*present));
   if (auto error = profile.find("event.error")) {
     plan.sources.emplace_back("last-event", std::move(*error));
   }
@@ -63,7 +64,14 @@ report::Record alarm_record(const std::string& list, std::size_t index, std::int
                      {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
 }
 
-Result<void> show(const AlarmPlan& plan, OpenTool& tool, Outcome& outcome, Context& context) {
+/// What was found, and what became of the reset.
+struct Findings {
+  Outcome outcome = {};
+  std::int64_t present = 0;  ///< the present alarm; 0: none
+  enum class Reset : std::uint8_t { none, done, failed } reset = Reset::none;
+};
+
+Result<void> show(const AlarmPlan& plan, OpenTool& tool, Findings& findings, Context& context) {
   const auto texts = context.profiles.load_error_codes(tool.profile->id);
   if (!texts) return tl::unexpected(texts.error());
   std::vector<Parameter> parameters;
@@ -74,16 +82,17 @@ Result<void> show(const AlarmPlan& plan, OpenTool& tool, Outcome& outcome, Conte
   Listing listing(context, columns);
   std::size_t index = 0;
   for (std::size_t at = 0; at < readings->size(); ++at) {
-    const auto& [list, parameter] = plan.sources[at];
+    const std::string& list = plan.sources[at].first;
     index = at > 0 && plan.sources[at - 1].first == list ? index + 1 : 1;
     const device::Reading& reading = (*readings)[at];
     if (!reading.value) {
-      outcome.fail(reading.value.error());
+      findings.outcome.fail(reading.value.error());
       listing.add(reading.value.error());
       continue;
     }
-    outcome.succeed();
+    findings.outcome.succeed();
     const std::int64_t code = reading.value->number.mantissa();
+    if (list == present_list) findings.present = code;
     const auto known = list == data_list ? texts->end() : texts->find(code);
     listing.add(alarm_record(list, index, code, known == texts->end() ? nullptr : &known->second,
                              tool.target, context.clock));
@@ -91,19 +100,33 @@ Result<void> show(const AlarmPlan& plan, OpenTool& tool, Outcome& outcome, Conte
   return listing.end();
 }
 
-Result<void> reset(const Deed& deed, OpenTool& tool, Outcome& outcome, Context& context) {
+Result<void> reset(const Deed& deed, OpenTool& tool, Findings& findings, Context& context) {
   const auto result = tool.device.perform(deed.action, deed.value);
   if (!result) return tl::unexpected(result.error());
   Listing listing(context, deed_columns());
   listing.add(deed_record(deed, *result, tool.target, context.clock));
+  findings.reset = Findings::Reset::done;
   if (result == device::ActionResult::not_confirmed) {
     const Error error = not_confirmed(deed, tool.target);
-    outcome.fail(error);
+    findings.reset = Findings::Reset::failed;
+    findings.outcome = {};  // the reset is what was asked for
+    findings.outcome.fail(error);
     listing.add(error);
-  } else {
-    outcome.succeed();
   }
   return listing.end();
+}
+
+std::string sentence_of(const Findings& findings) {
+  switch (findings.reset) {
+    case Findings::Reset::done:
+      return "no alarm present";
+    case Findings::Reset::failed:
+      return "the alarm was not reset";
+    case Findings::Reset::none:
+      break;
+  }
+  if (findings.present == 0) return "no alarm present";
+  return fmt::format("alarm {} is present", findings.present);
 }
 
 }  // namespace
@@ -123,17 +146,18 @@ Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
             .map([&] { return std::move(*plan); });
       });
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  Outcome outcome;
-  auto done = show(opened->prepared, opened->tool, outcome, context);
+  Findings findings;
+  auto done = show(opened->prepared, opened->tool, findings, context);
   if (done && opened->prepared.reset) {
-    done = reset(*opened->prepared.reset, opened->tool, outcome, context);
+    done = reset(*opened->prepared.reset, opened->tool, findings, context);
   }
   if (!done) return tl::unexpected(std::move(done.error()));
+  const Outcome& outcome = findings.outcome;
   return context.renderer
-      .summary(summary_record({{"codes", number(static_cast<std::int64_t>(outcome.succeeded()))},
+      .summary(summary_record({{"present", number(findings.present == 0 ? 0 : 1)},
                                {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
                               outcome.status(), target->shown, context.clock),
-               {})
+               sentence_of(findings))
       .map([&] { return outcome; });
 }
 

@@ -76,9 +76,18 @@ Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
   if (!still) return tl::unexpected(still.error());
   if (*still == device::Shown::no) {
     return tl::unexpected(
-        not_ready(tool.target, "the tool runs already, so it was not started", ""));
+        not_ready(tool.target, "the tool runs already, so it was not started",
+                  "wait until it stands still, or stop it with 'spindle remote-stop'"));
   }
   return {};
+}
+
+/// A result in the words of the table.
+std::string_view words_of(std::string_view kind) {
+  if (kind == "fastening-ok") return "OK";
+  if (kind == "fastening-ng") return "NG";
+  if (kind == "error") return "error";
+  return kind.empty() ? "no result" : "ended without OK or NG";
 }
 
 /// One remote start: what is told of it, and how it ended.
@@ -86,7 +95,12 @@ class RemoteRun {
  public:
   RemoteRun(const RemoteStartOptions& options, const RunPlan& plan, OpenTool& tool,
             Context& context)
-      : options_(&options), plan_(&plan), tool_(&tool), context_(&context) {}
+      : options_(&options),
+        plan_(&plan),
+        tool_(&tool),
+        context_(&context),
+        calm_options_(context.common),
+        calm_context_(calm_context(context, calm_options_)) {}
 
   Result<Outcome> run() {
     auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
@@ -96,9 +110,10 @@ class RemoteRun {
       return tl::unexpected(std::move(prepared.error()));
     }
     device::RunGuard guard(tool_->device, plan_->start, reopener(), context_->calm.clock);
-    auto followed = guard.start().and_then([&] { return follower.follow(follow_options()); });
-    clear_progress();
+    const device::FollowOptions following = limit_run();
+    auto followed = guard.start().and_then([&] { return follower.follow(following); });
     const device::StopReport stop = guard.stop();
+    show_state("");  // not before the stop: a terminal may keep its writer waiting
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);
@@ -118,31 +133,43 @@ class RemoteRun {
 
   /// A line that signals do not end, for a stop after the first one broke.
   device::RunGuard::Reopen reopener() {
-    return [this]() -> Result<device::Device> {
-      const Context calm = calm_context(*context_);
-      return connect_device(tool_->target, *tool_->profile, calm);
+    return [this](Duration patience) {
+      show_state("the link is lost; trying to stop the tool");
+      const Duration usual =
+          context_->common.connect_timeout.value_or(tool_->profile->link.connect);
+      calm_options_.connect_timeout = std::min(usual, patience);
+      return connect_device(tool_->target, *tool_->profile, calm_context_);
     };
   }
 
-  device::FollowOptions follow_options() {
-    return {.limit = options_->limit, .progress = [this](Duration elapsed) -> Result<void> {
-              if (context_->io.out_is_open && !context_->io.out_is_open()) {
-                return tl::unexpected(Error{.code = Errc::closed_pipe});
-              }
-              show_progress(elapsed);
-              return {};
-            }};
+  /// The time allowed begins before the start is sent, and its echo is not waited for any longer.
+  device::FollowOptions limit_run() {
+    device::FollowOptions following;
+    following.progress = [this](Duration elapsed) { return go_on(elapsed); };
+    if (!options_->limit) return following;
+    link::Session& session = tool_->device.session();
+    session.set_answer_timeout(std::min(session.options().answer_timeout, *options_->limit));
+    following.deadline = context_->clock.now() + *options_->limit;
+    return following;
+  }
+
+  Result<void> go_on(Duration elapsed) {
+    if (context_->io.out_is_open && !context_->io.out_is_open()) {
+      return tl::unexpected(Error{.code = Errc::closed_pipe});
+    }
+    show_progress(elapsed);
+    return {};
   }
 
   void show_progress(Duration elapsed) {
-    if (!context_->io.err_is_terminal) return;
     const auto tenths =
         std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count() / 100;
-    context_->io.err(fmt::format("\r\x1b[Krunning {}.{} s", tenths / 10, tenths % 10));
+    show_state(fmt::format("running {}.{} s", tenths / 10, tenths % 10));
   }
 
-  void clear_progress() {
-    if (context_->io.err_is_terminal) context_->io.err("\r\x1b[K");
+  /// The one line on a terminal that changes while something goes on.
+  void show_state(std::string_view text) {
+    if (context_->io.err_is_terminal) context_->io.err(fmt::format("\r\x1b[K{}", text));
   }
 
   /// The event of the run: the one that ended it, or the one that our stop caused.
@@ -172,18 +199,16 @@ class RemoteRun {
       outcome_ = {};  // nothing else matters as much
       fail(unconfirmed_stop(stop));
     }
-    for (const Error& error : errors_) listing.add(error);
-    auto ended = listing.end().and_then([&] { return summarise(kind, stop); });
-    // A stop that nobody could confirm is told even where nobody reads the results any more.
-    if (!ended && stop.result == device::StopResult::confirmed) {
-      return tl::unexpected(std::move(ended.error()));
-    }
-    return outcome_;
+    const auto listed = listing.end();
+    const auto told = tell_errors();
+    if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
+    if (!listed || !told) return outcome_;
+    return summarise(kind, stop).map([&] { return outcome_; });
   }
 
   void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
     if (!followed) {
-      if (followed.error().code != Errc::closed_pipe) fail(followed.error());
+      if (followed.error().code != Errc::closed_pipe) fail(tool_->target.blamed(followed.error()));
       return;
     }
     if (followed->ending == RunEnding::ignored && kind.empty()) {
@@ -201,6 +226,16 @@ class RemoteRun {
     }
     outcome_.succeed();
     if (kind == "fastening-ng" || kind == "error") outcome_.negate();
+  }
+
+  /// Each on its own: they reach people even where nobody reads the records any more.
+  Result<void> tell_errors() {
+    Result<void> told;
+    for (const Error& error : errors_) {
+      auto written = context_->renderer.error(error, context_->clock.wall());
+      if (told) told = std::move(written);
+    }
+    return told;
   }
 
   void fail(const Error& error) {
@@ -221,11 +256,10 @@ class RemoteRun {
 
   Result<void> summarise(const std::string& kind, const device::StopReport& stop) {
     const bool stopped = stop.result == device::StopResult::confirmed;
-    const std::string result = kind.empty() ? "no result" : kind;
     return context_->renderer.summary(
         summary_record({{"result", text_or_null(kind)}, {"stop_confirmed", stopped}},
                        outcome_.status(), tool_->target.shown, context_->clock),
-        fmt::format("{}; the tool {}", result,
+        fmt::format("{}; the tool {}", words_of(kind),
                     stopped ? "stands still" : "may still run: the stop could not be confirmed"));
   }
 
@@ -233,6 +267,8 @@ class RemoteRun {
   const RunPlan* plan_;
   OpenTool* tool_;
   Context* context_;
+  CommonOptions calm_options_;
+  Context calm_context_;  ///< lines that are opened on it refer to it
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
 };

@@ -12,6 +12,14 @@
 namespace spindle::commands {
 namespace {
 
+constexpr int most_stops = 3;
+
+/// Whether the tool may still run although it can be reached.
+bool leaves_open(const Result<device::StopResult>& stopped) {
+  if (stopped) return *stopped == device::StopResult::unconfirmed;
+  return stopped.error().code == Errc::no_answer;
+}
+
 /// Neither asks nor waits for anything but the proof: somebody wants this tool to stand still.
 Result<device::StopResult> stop_one(const Target& target, const Context& context) {
   auto profile = load_profile(target, context);
@@ -20,7 +28,12 @@ Result<device::StopResult> stop_one(const Target& target, const Context& context
   if (!tool) return tl::unexpected(std::move(tool.error()));
   const auto start = find_start(*tool->profile);
   if (!start) return tl::unexpected(start.error());
-  return device::stop_and_confirm(tool->device, *start, context.clock);
+  // A stop may be repeated without harm, and one lost answer must not leave a motor running.
+  auto stopped = device::stop_and_confirm(tool->device, *start, context.clock);
+  for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {
+    stopped = device::stop_and_confirm(tool->device, *start, context.clock);
+  }
+  return stopped;
 }
 
 }  // namespace
@@ -52,7 +65,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
             summary_record({{"stopped", number(static_cast<std::int64_t>(outcome.succeeded()))},
                             {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
                            outcome.status(), {}, context.clock),
-            fmt::format("{} stopped, {} failed", outcome.succeeded(), outcome.failed()));
+            fmt::format("{} stopped, {} failed{}", outcome.succeeded(), outcome.failed(),
+                        outcome.failed() == 0
+                            ? ""
+                            : "; what could not be stopped may still run: stop it at the tool"));
       })
       .map([&] { return outcome; });
 }

@@ -129,6 +129,18 @@ Error without_knowledge(Error write) {
   return write;
 }
 
+/// What is left of a connection that was ended from this side.
+class HungUp final : public link::Transport {
+ public:
+  Result<void> send(ByteView /*bytes*/, TimePoint /*deadline*/) override {
+    return tl::unexpected(Error{.code = Errc::closed});
+  }
+  Result<std::size_t> receive(std::span<std::uint8_t> /*into*/, TimePoint /*deadline*/) override {
+    return tl::unexpected(Error{.code = Errc::closed});
+  }
+  void shield() override {}
+};
+
 std::string target_of(const link::Endpoint& endpoint, const LinkOptions& options) {
   return options.shown.empty() ? endpoint.text : options.shown;
 }
@@ -186,6 +198,17 @@ Error Device::with_exception_text(Error error) const {
 Result<Bytes> Device::report_server_id() {
   return client_.report_server_id().map_error(
       [this](Error error) { return located(std::move(error)); });
+}
+
+void Device::hang_up() {
+  session_ = std::make_unique<link::Session>(std::make_unique<HungUp>(), session_->clock(),
+                                             session_->options());
+  client_ = link::Client(*session_, read_limits(*profile_), retries_);
+}
+
+void Device::set_retries(unsigned retries) {
+  retries_ = retries;
+  client_ = link::Client(*session_, read_limits(*profile_), retries_);
 }
 
 void Device::use(const catalogue::Profile& profile) {

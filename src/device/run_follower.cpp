@@ -12,11 +12,20 @@ namespace {
 constexpr Duration look_interval = std::chrono::milliseconds(100);
 /// How long the event of a run that ended may still be on its way.
 constexpr Duration event_grace = std::chrono::milliseconds(500);
+/// A motor runs: one lost answer is forgiven, however often the user lets reads be repeated.
+constexpr unsigned retries_while_running = 1;
+
+bool is_result(std::string_view kind) {
+  return kind == "fastening-ok" || kind == "fastening-ng" || kind == "error";
+}
 
 }  // namespace
 
 RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& clock)
-    : device_(&device), start_(&start), clock_(&clock) {
+    : device_(&device),
+      start_(&start),
+      clock_(&clock),
+      answer_timeout_(device.session().options().answer_timeout) {
   const catalogue::Profile& profile = device.profile();
   const auto index_of = [&](const std::string& name) -> std::size_t {
     const auto parameter = profile.find(name);
@@ -36,20 +45,14 @@ Result<void> RunFollower::prepare() {
 
 Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
   const TimePoint began = clock_->now();
-  const TimePoint deadline = options.limit ? began + *options.limit : TimePoint::max();
-  confirm_by_ = began + device_->session().options().answer_timeout;
-  while (clock_->now() < deadline) {
-    auto event = next_event(std::min(deadline, clock_->now() + look_interval));
-    if (!event) return tl::unexpected(std::move(event.error()));
-    if (*event && ends_run(**event)) return FollowedRun{RunEnding::result, std::move(*event)};
-    auto ending = look_at_tool();
-    if (!ending) return tl::unexpected(std::move(ending.error()));
-    if (*ending == RunEnding::ended) {
-      event = late_event();
-      if (!event) return tl::unexpected(std::move(event.error()));
-      return FollowedRun{*event ? RunEnding::result : RunEnding::ended, std::move(*event)};
-    }
-    if (*ending) return FollowedRun{**ending};
+  confirm_by_ = began + answer_timeout_;
+  device_->set_retries(retries_while_running);
+  while (clock_->now() < options.deadline) {
+    auto over = step(options.deadline);
+    const bool cut_short = !over && over.error().code == Errc::no_answer;
+    if (cut_short && clock_->now() >= options.deadline) break;
+    if (!over) return tl::unexpected(std::move(over.error()));
+    if (*over) return std::move(**over);
     if (!options.progress) continue;
     if (auto told = options.progress(clock_->now() - began); !told) {
       return tl::unexpected(std::move(told.error()));
@@ -58,14 +61,33 @@ Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
   return FollowedRun{RunEnding::elapsed};
 }
 
+/// Listens for a while, then looks; empty while the run goes on.
+Result<std::optional<FollowedRun>> RunFollower::step(TimePoint deadline) {
+  auto event = next_result(std::min(deadline, clock_->now() + look_interval));
+  if (!event) return tl::unexpected(std::move(event.error()));
+  if (*event) return FollowedRun{RunEnding::result, std::move(*event)};
+  // Time enough for one repetition before the deadline.
+  const Duration left = std::max(Duration::zero(), deadline - clock_->now());
+  device_->session().set_answer_timeout(std::min(answer_timeout_, left / 2));
+  const auto ending = look_at_tool();
+  device_->session().set_answer_timeout(answer_timeout_);
+  if (!ending) return tl::unexpected(ending.error());
+  if (!*ending) return std::nullopt;
+  if (*ending != RunEnding::ended) return FollowedRun{**ending};
+  event = late_event();
+  if (!event) return tl::unexpected(std::move(event.error()));
+  return FollowedRun{*event ? RunEnding::result : RunEnding::ended, std::move(*event)};
+}
+
+Result<void> RunFollower::keep_armed() {
+  if (clock_->now() < arm_due_) return {};
+  arm_due_ = clock_->now() + device_->profile().events->arm_every;
+  return device_->switch_events(EventOutput::on);
+}
+
 /// Reads whether the tool runs, and keeps its output armed.
 Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
-  if (clock_->now() >= arm_due_) {
-    arm_due_ = clock_->now() + device_->profile().events->arm_every;
-    if (auto armed = device_->switch_events(EventOutput::on); !armed) {
-      return tl::unexpected(std::move(armed.error()));
-    }
-  }
+  if (auto armed = keep_armed(); !armed) return tl::unexpected(std::move(armed.error()));
   const auto running = device_->shows(start_->confirm, *start_->value);
   if (!running) return tl::unexpected(running.error());
   if (*running == Shown::yes) {
@@ -78,40 +100,46 @@ Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
   return RunEnding::ignored;
 }
 
-Result<std::optional<EventNews>> RunFollower::next_event(TimePoint until) {
+Result<std::optional<EventNews>> RunFollower::next_result(TimePoint until) {
   while (true) {
     auto frame = device_->session().next_spontaneous(until);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     if (!*frame) return std::nullopt;
-    Registers block = modbus::registers_of((*frame)->pdu);
-    if (!tracker_.track(block[number_at_], block).is_new()) continue;
-    return EventNews{EventSource::push, std::move(block), (*frame)->wall};
+    auto result = sift({EventSource::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
+    if (result) return result;
   }
 }
 
-Result<std::optional<EventNews>> RunFollower::fetch_event() {
+Result<std::optional<EventNews>> RunFollower::fetch_result() {
   auto block = device_->last_event();
   if (!block) return tl::unexpected(std::move(block.error()));
-  if (!tracker_.track((*block)[number_at_], *block).is_new()) return std::nullopt;
-  return EventNews{EventSource::catch_up, std::move(*block), clock_->wall()};
+  return sift({EventSource::catch_up, std::move(*block), clock_->wall()});
+}
+
+/// Gives back a new event that is a result. Another one may be all that a run leaves behind:
+/// loosening ends neither well nor badly.
+std::optional<EventNews> RunFollower::sift(EventNews event) {
+  const bool is_new = tracker_.track(event.block[number_at_], event.block).is_new();
+  // A tool that was switched off and on has had no event at all.
+  if (!is_new || EventTracker::is_blank(event.block)) return std::nullopt;
+  const std::string& kind = kind_of(event);
+  if (is_result(kind)) return event;
+  if (kind == "other") other_ = std::move(event);
+  return std::nullopt;
 }
 
 Result<std::optional<EventNews>> RunFollower::late_event() {
-  const TimePoint until = clock_->now() + event_grace;
-  while (true) {
-    auto event = next_event(until);
-    if (!event || !*event) break;
-    if (ends_run(**event)) return event;
-  }
-  return fetch_event();
+  auto event = next_result(clock_->now() + event_grace);
+  if (!event || !*event) event = fetch_result();
+  if (event && !*event) return std::exchange(other_, std::nullopt);
+  return event;
 }
 
-bool RunFollower::ends_run(const EventNews& event) const {
+const std::string& RunFollower::kind_of(const EventNews& event) const {
+  static const std::string unknown;
   const auto& kinds = device_->profile().events->kinds;
   const auto kind = kinds.find(event.block[kind_at_]);
-  if (kind == kinds.end()) return false;
-  return kind->second == "fastening-ok" || kind->second == "fastening-ng" ||
-         kind->second == "error";
+  return kind == kinds.end() ? unknown : kind->second;
 }
 
 void RunFollower::leave() {

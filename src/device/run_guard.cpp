@@ -10,8 +10,14 @@ namespace {
 constexpr Duration stop_patience = std::chrono::seconds(10);
 /// Pause before the next try, so that a refusing tool is not flooded.
 constexpr Duration stop_pause = std::chrono::milliseconds(200);
-/// An answer that takes longer than this is not worth waiting for while a motor runs: send again.
-constexpr Duration stop_answer = std::chrono::milliseconds(500);
+/// The first stop is sent again when its answer takes longer than this; a slow tool's answer is
+/// waited for by the later ones.
+constexpr Duration first_answer = std::chrono::milliseconds(500);
+/// However patient the user is with answers: a motor runs.
+constexpr Duration longest_answer = std::chrono::seconds(2);
+/// A connection on which so many stops in a row stayed without an answer is given up.
+constexpr unsigned silences_allowed = 2;
+constexpr Duration confirm_interval = std::chrono::milliseconds(20);
 
 }  // namespace
 
@@ -24,14 +30,18 @@ Result<StopResult> stop_and_confirm(Device& device, const catalogue::Action& sta
     const auto running = device.shows(start.confirm, *start.stop_value);
     if (!running) return tl::unexpected(running.error());
     if (*running == Shown::yes) return StopResult::confirmed;
-    const TimePoint next = clock.now() + stop_pause / 10;
+    const TimePoint next = clock.now() + confirm_interval;
     if (next > deadline) return StopResult::unconfirmed;
     if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
 }
 
 RunGuard::RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm)
-    : device_(&device), action_(&start), reopen_(std::move(reopen)), calm_(&calm) {}
+    : device_(&device),
+      action_(&start),
+      reopen_(std::move(reopen)),
+      calm_(&calm),
+      answer_timeout_(device.session().options().answer_timeout) {}
 
 RunGuard::~RunGuard() {
   if (armed_) stop();
@@ -39,47 +49,70 @@ RunGuard::~RunGuard() {
 
 Result<void> RunGuard::start() {
   armed_ = true;
-  return device_->send(*action_, *action_->value);
-}
-
-Result<StopResult> RunGuard::try_to_stop(Device& device) {
-  link::Session& session = device.session();
-  session.shield();
-  session.set_answer_timeout(std::min(session.options().answer_timeout, stop_answer));
-  return stop_and_confirm(device, *action_, *calm_);
+  auto started = device_->send(*action_, *action_->value);
+  acknowledged_ = started.has_value();
+  return started;
 }
 
 StopReport RunGuard::stop() {
   if (report_) return *report_;
   armed_ = false;
-  StopReport report;
   const TimePoint began = calm_->now();
   const TimePoint limit = began + stop_patience;
-  std::optional<Device> reopened;
-  Device* device = device_;
+  StopReport report;
   while (true) {
-    ++report.attempts;
-    if (device == nullptr) {
-      if (auto opened = reopen_()) {
-        reopened.emplace(std::move(*opened));
-        device = &*reopened;
-      } else {
-        report.trouble = message_of(opened.error());
-      }
-    }
-    if (device != nullptr) {
-      const auto stopped = try_to_stop(*device);
-      report.result = stopped.value_or(StopResult::unconfirmed);
-      if (report.result != StopResult::unconfirmed) break;
-      report.trouble = stopped ? "the tool still says that it runs" : message_of(stopped.error());
-      if (!stopped && stopped.error().code != Errc::exception_response) device = nullptr;
-    }
-    if (calm_->now() + stop_pause > limit) break;
-    if (!calm_->sleep_until(calm_->now() + stop_pause)) break;
+    const auto stopped = try_to_stop(++report.attempts, limit);
+    report.result = stopped.value_or(StopResult::unconfirmed);
+    report.trouble = stopped ? "the tool still says that it runs" : message_of(stopped.error());
+    if (!stopped) judge_line(stopped.error());
+    const TimePoint next = calm_->now() + stop_pause;
+    if (is_proven(report) || next > limit || !calm_->sleep_until(next)) break;
   }
   report.tried = calm_->now() - began;
   report_ = report;
   return report;
+}
+
+/// One stop, on the connection that is there or on a new one.
+Result<StopResult> RunGuard::try_to_stop(unsigned attempt, TimePoint limit) {
+  if (line_ == Line::lost) {
+    if (auto opened = reopen(limit - calm_->now()); !opened) {
+      return tl::unexpected(std::move(opened.error()));
+    }
+  }
+  link::Session& session = device_->session();
+  session.shield();
+  session.set_answer_timeout(patience_of(attempt));
+  device_->set_retries(0);  // it is better to send the stop again
+  return stop_and_confirm(*device_, *action_, *calm_);
+}
+
+Result<void> RunGuard::reopen(Duration patience) {
+  device_->hang_up();
+  auto opened = reopen_(patience);
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  *device_ = std::move(*opened);
+  line_ = Line::open;
+  silences_ = 0;
+  if (!acknowledged_) settled_at_ = calm_->now() + std::min(answer_timeout_, longest_answer);
+  return {};
+}
+
+Duration RunGuard::patience_of(unsigned attempt) const {
+  return std::min(answer_timeout_, attempt == 1 ? first_answer : longest_answer);
+}
+
+/// A refusal says that the line works, and one lost answer does not say that it is gone.
+void RunGuard::judge_line(const Error& error) {
+  if (error.code == Errc::exception_response) return;
+  const bool silent = error.code == Errc::no_answer && ++silences_ < silences_allowed;
+  if (!silent) line_ = Line::lost;
+}
+
+/// On one connection a stop comes after its start. On another one it may come before a start that
+/// nobody acknowledged and that is still under way.
+bool RunGuard::is_proven(const StopReport& report) const {
+  return report.result != StopResult::unconfirmed && calm_->now() >= settled_at_;
 }
 
 }  // namespace spindle::device

@@ -57,8 +57,8 @@ struct Context {
   const CommonOptions& common;
 };
 
-/// The same context with a clock and lines that signals do not end.
-Context calm_context(const Context& context);
+/// The same context with a clock and lines that signals do not end, and with other options.
+Context calm_context(const Context& context, const CommonOptions& common);
 
 /// How a command that handled several things ended.
 class Outcome {

@@ -83,6 +83,13 @@ class Device {
   /// Goes on with a profile that was found by the answer to FC 11h.
   void use(const catalogue::Profile& profile);
 
+  /// Ends the connection; everything that needs it fails with `closed` from now on. A tool that
+  /// serves one client at a time must be let go before it is opened anew.
+  void hang_up();
+
+  /// How often a read without an answer is repeated from now on.
+  void set_retries(unsigned retries);
+
   /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
   /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
   /// 11h is refused): on such a tool only raw registers may be read.

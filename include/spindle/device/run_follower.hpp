@@ -23,7 +23,7 @@ struct FollowedRun {
 };
 
 struct FollowOptions {
-  std::optional<Duration> limit = std::nullopt;  ///< time allowed, from now
+  TimePoint deadline = TimePoint::max();  ///< end of the time allowed
   /// Hears how long the tool has run, several times a second; an error ends the following.
   std::function<Result<void>(Duration elapsed)> progress = {};
 };
@@ -37,20 +37,24 @@ class RunFollower {
   /// Remembers the last event and arms the output. Call before the start.
   Result<void> prepare();
 
-  /// Call after the start. Errors: interrupts and link trouble; what the run did is then unknown.
+  /// Call after the start. Errors: interrupts and link trouble; what the run did is then unknown. A
+  /// tool that falls silent is not waited for beyond the deadline.
   Result<FollowedRun> follow(const FollowOptions& options);
 
-  /// An event that came since, such as that of a stop; waits for it a little.
+  /// The event of a run that is over, such as that of a stop; waits for it a little.
   Result<std::optional<EventNews>> late_event();
 
   /// Switches the output off again.
   void leave();
 
  private:
-  Result<std::optional<EventNews>> next_event(TimePoint until);
-  Result<std::optional<EventNews>> fetch_event();
+  Result<std::optional<FollowedRun>> step(TimePoint deadline);
+  Result<std::optional<EventNews>> next_result(TimePoint until);
+  Result<std::optional<EventNews>> fetch_result();
+  std::optional<EventNews> sift(EventNews event);
   Result<std::optional<RunEnding>> look_at_tool();
-  [[nodiscard]] bool ends_run(const EventNews& event) const;
+  Result<void> keep_armed();
+  [[nodiscard]] const std::string& kind_of(const EventNews& event) const;
 
   Device* device_;
   const catalogue::Action* start_;
@@ -58,9 +62,11 @@ class RunFollower {
   EventTracker tracker_ = {};
   std::size_t number_at_ = 0;
   std::size_t kind_at_ = 0;
+  Duration answer_timeout_ = {};  ///< the user's or the profile's
   TimePoint confirm_by_ = {};
   TimePoint arm_due_ = {};
   bool has_run_ = false;
+  std::optional<EventNews> other_ = std::nullopt;  ///< the last event that is no result
 };
 
 }  // namespace spindle::device

@@ -28,8 +28,8 @@ struct StopReport {
 /// function.
 class RunGuard {
  public:
-  /// Opens the tool anew for a stop, on a line that interrupts do not end.
-  using Reopen = std::function<Result<Device>()>;
+  /// Opens the tool anew for a stop, on a line that interrupts do not end, within `patience`.
+  using Reopen = std::function<Result<Device>(Duration patience)>;
 
   /// `start` is an action with a stop value. `calm` is a clock whose sleeps are not interrupted.
   RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm);
@@ -41,18 +41,29 @@ class RunGuard {
   /// may run all the same.
   Result<void> start();
 
-  /// Sends the stop until it is proven to have worked, for at most ten seconds. Further calls do
-  /// nothing and report the same.
+  /// Sends the stop until it is proven to have worked, for about ten seconds at most. Further calls
+  /// do nothing and report the same. The device goes on with the connection that it ended with.
   StopReport stop();
 
  private:
-  Result<StopResult> try_to_stop(Device& device);
+  enum class Line : std::uint8_t { open, lost };
+
+  Result<StopResult> try_to_stop(unsigned attempt, TimePoint limit);
+  Result<void> reopen(Duration patience);
+  Duration patience_of(unsigned attempt) const;
+  void judge_line(const Error& error);
+  [[nodiscard]] bool is_proven(const StopReport& report) const;
 
   Device* device_;
   const catalogue::Action* action_;
   Reopen reopen_;
   Clock* calm_;
+  Duration answer_timeout_;  ///< the user's or the profile's
   bool armed_ = false;
+  bool acknowledged_ = false;
+  TimePoint settled_at_ = {};  ///< before this, a start of the old connection may still come true
+  Line line_ = Line::open;
+  unsigned silences_ = 0;  ///< stops without an answer on this connection
   std::optional<StopReport> report_ = std::nullopt;
 };
 

@@ -1,0 +1,308 @@
+#include "spindle/device/run_follower.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "support/guarded_tool.hpp"
+
+namespace {
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using device::Device;
+using device::EventSource;
+using device::FollowedRun;
+using device::FollowOptions;
+using device::RunEnding;
+using device::RunFollower;
+using test::Fate;
+using test::GuardedTool;
+
+constexpr std::size_t number_at = 0;
+constexpr std::size_t error_at = 10;
+constexpr std::size_t status_at = 12;
+constexpr std::uint16_t first_number = 1961;
+
+/// A tool that a follower has prepared for a start.
+struct Bench {
+  explicit Bench(GuardedTool& guarded) : tool(guarded), device(guarded.open()) {
+    REQUIRE(follower.prepare());
+  }
+  void start() { REQUIRE(device.send(action, 1)); }
+  Result<FollowedRun> follow(std::optional<Duration> limit = std::nullopt) {
+    FollowOptions options;
+    if (limit) options.deadline = tool.clock.now() + *limit;
+    began = tool.clock.now();
+    return follower.follow(options);
+  }
+  [[nodiscard]] Duration took() const { return tool.clock.now() - began; }
+  /// Something happens to the tool so long after now.
+  void after(Duration duration, std::function<void()> what) {
+    tool.clock.at(tool.clock.now() + duration, std::move(what));
+  }
+
+  GuardedTool& tool;
+  Device device;
+  catalogue::Action action = tool.start_action();
+  RunFollower follower = RunFollower(device, action, tool.clock);
+  TimePoint began = {};
+};
+
+/// A run with this preset takes 19 seconds.
+void slow_down(GuardedTool& tool) {
+  tool.write_past(11, 9000);
+  tool.write_past(13, 9000);
+}
+
+TEST_CASE("the result of a run is its event") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::result);
+  REQUIRE(run->event);
+  CHECK(run->event->source == EventSource::push);
+  CHECK(run->event->block[status_at] == 1);
+  CHECK(run->event->block[number_at] == first_number + 1);
+  CHECK(bench.took() < 1500ms);
+  CHECK(tool.starts() == 1);
+  CHECK(tool.stops() == 0);  // a follower starts and stops nothing
+}
+
+TEST_CASE("a run that somebody else ends too early is NG") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.start();
+  bench.after(600ms, [&] { tool.write_past(4003, 0); });
+  const auto run = bench.follow();
+  REQUIRE(run);
+  REQUIRE(run->event);
+  CHECK(run->ending == RunEnding::result);
+  CHECK(run->event->block[status_at] == 2);
+  CHECK(bench.took() < 800ms);
+}
+
+TEST_CASE("an alarm ends a run as its result") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.start();
+  bench.after(600ms, [&] { tool.bm->raise_alarm(118, tool.clock.now()); });
+  const auto run = bench.follow();
+  REQUIRE(run);
+  REQUIRE(run->event);
+  CHECK(run->ending == RunEnding::result);
+  CHECK(bench.took() < 1200ms);
+}
+
+TEST_CASE("events of before are no results") {
+  GuardedTool tool;
+  tool.write_past(4003, 1);  // a run of somebody else, up to its end
+  tool.clock.advance(3s);
+  Bench bench(tool);
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  REQUIRE(run->event);
+  CHECK(run->event->block[number_at] == first_number + 2);
+  CHECK(bench.took() > 1s);
+}
+
+TEST_CASE("an event that is pushed again is no second result") {
+  GuardedTool tool({}, {{.kind = sim::FaultKind::push_before}});
+  Bench bench(tool);  // now every answer comes behind the old event
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  REQUIRE(run->event);
+  CHECK(run->event->block[number_at] == first_number + 1);
+}
+
+TEST_CASE("a result whose push was lost is fetched") {
+  GuardedTool tool;
+  Bench bench(tool);
+  tool.write_past(4002, 0);
+  REQUIRE(bench.device.switch_events(device::EventOutput::off));
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  REQUIRE(run->event);
+  CHECK(run->ending == RunEnding::result);
+  CHECK(run->event->source == EventSource::catch_up);
+  CHECK(run->event->block[status_at] == 1);
+}
+
+TEST_CASE("loosening ends neither well nor badly, and still has its event") {
+  GuardedTool tool;
+  tool.write_past(4005, 1);
+  Bench bench(tool);
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::result);
+  REQUIRE(run->event);
+  CHECK(run->event->block[status_at] == 0);
+  CHECK(run->event->block[number_at] == first_number + 2);
+}
+
+TEST_CASE("a tool that is switched off and on has ended without a result") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.start();
+  bench.after(600ms, [&] { tool.bm->reboot(tool.clock.now()); });
+  const auto run = bench.follow();
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::ended);
+  CHECK_FALSE(run->event);
+}
+
+TEST_CASE("a start that is only echoed is known after the answer time") {
+  GuardedTool tool;
+  tool.write_past(4001, 1);  // locked
+  Bench bench(tool);
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::ignored);
+  CHECK(bench.took() >= 1s);
+  CHECK(bench.took() < 1300ms);
+}
+
+TEST_CASE("the time allowed is kept") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  SUBCASE("while all is well") {}
+  SUBCASE("when the tool falls silent, however patient the user is") {
+    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_lost; }; });
+  }
+  const auto run = bench.follow(700ms);
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::elapsed);
+  CHECK(bench.took() >= 700ms);
+  CHECK(bench.took() < 750ms);
+  CHECK(tool.runs());
+}
+
+TEST_CASE("a patient user's tool that falls silent does not run on for minutes") {
+  GuardedTool tool;
+  tool.answer_timeout = 60s;
+  tool.retries = 100;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_lost; }; });
+  const auto run = bench.follow(2s);
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::elapsed);
+  CHECK(bench.took() < 2100ms);
+}
+
+TEST_CASE("one lost answer does not end a run, and silence does") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  const auto lose = [&](unsigned times) {
+    bench.after(500ms, [&tool, times] {
+      tool.fate = [left = times](const auto&) mutable {
+        return left > 0 && left-- > 0 ? Fate::is_lost : Fate::passes;
+      };
+    });
+  };
+  SUBCASE("one") {
+    lose(1);
+    const auto run = bench.follow(5s);
+    REQUIRE(run);
+    CHECK(run->ending == RunEnding::elapsed);
+  }
+  SUBCASE("all") {
+    lose(1000);
+    const auto run = bench.follow();
+    REQUIRE_FALSE(run);
+    CHECK(run.error().code == Errc::no_answer);
+    CHECK(bench.took() < 3s);
+  }
+}
+
+TEST_CASE("what ends the following early") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  FollowOptions options;
+  Errc expected = Errc::internal;
+  SUBCASE("an interrupt") {
+    bench.after(500ms, [&] { tool.interrupt.raise(2); });
+    expected = Errc::interrupted;
+  }
+  SUBCASE("a lost link") {
+    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::closes_unheard; }; });
+    expected = Errc::closed;
+  }
+  SUBCASE("nobody who reads") {
+    options.progress = [](Duration elapsed) -> Result<void> {
+      if (elapsed < 500ms) return {};
+      return tl::unexpected(Error{.code = Errc::closed_pipe});
+    };
+    expected = Errc::closed_pipe;
+  }
+  SUBCASE("a refused reading") {
+    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_refused; }; });
+    expected = Errc::exception_response;
+  }
+  const TimePoint began = tool.clock.now();
+  const auto run = bench.follower.follow(options);
+  REQUIRE_FALSE(run);
+  CHECK(run.error().code == expected);
+  CHECK(tool.clock.now() - began < 750ms);
+}
+
+TEST_CASE("a long run: the output stays armed, progress is told, and no read looks like an event") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  unsigned told = 0;
+  FollowOptions options;
+  options.progress = [&told](Duration) -> Result<void> {
+    ++told;
+    return {};
+  };
+  const auto run = bench.follower.follow(options);
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::result);
+  REQUIRE(run->event);
+  CHECK(run->event->source == EventSource::push);
+  CHECK(told > 100);
+  CHECK(tool.writes_of(GuardedTool::arm, 1) >= 4);
+  CHECK(tool.starts() == 1);
+  for (const modbus::Pdu& request : tool.requests) {
+    CHECK_FALSE((request.function == 4 && request.data.back() == 14));
+  }
+  bench.follower.leave();
+  CHECK(tool.writes.back() == GuardedTool::Write(GuardedTool::arm, 0));
+}
+
+TEST_CASE("the event that a stop causes is found") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  REQUIRE(bench.follow(500ms)->ending == RunEnding::elapsed);
+  SUBCASE("by listening") {}
+  SUBCASE("by asking, when it was not pushed") {
+    REQUIRE(bench.device.switch_events(device::EventOutput::off));
+  }
+  REQUIRE(bench.device.send_stop(bench.action));
+  const auto late = bench.follower.late_event();
+  REQUIRE(late);
+  REQUIRE(*late);
+  CHECK((*late)->block[status_at] == 2);
+  CHECK((*late)->block[error_at] == 333);
+}
+
+}  // namespace
