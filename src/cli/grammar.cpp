@@ -701,7 +701,7 @@ std::string indented(std::string_view lines) {
 std::string command_lines(const CLI::App& app) {
   std::string text;
   for (const CLI::App* command : app.get_subcommands({})) {
-    text += fmt::format("  {:<12}{}\n", command->get_name(), command->get_description());
+    text += fmt::format("  {:<12}  {}\n", command->get_name(), command->get_description());
   }
   return text;
 }
