@@ -737,19 +737,28 @@ std::string help_of(const CLI::App& app, const Draft& draft) {
   return command_help(app, draft.chosen, draft.words.at(draft.chosen));
 }
 
+/// What nothing in the grammar takes.
+std::optional<std::string> first_extra(const CLI::App& app) {
+  for (std::string& extra : app.remaining(true)) {
+    if (extra != end_of_options) return std::move(extra);
+  }
+  return std::nullopt;
+}
+
 Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   Invocation invocation;
-  if (draft.typed.help) {
+  const auto extra = first_extra(app);
+  // Where a command is misspelt, the program's help would hide it.
+  const bool misspelt = extra && draft.chosen == nullptr;
+  if (draft.typed.help && !misspelt) {
     invocation.text = help_of(app, draft);
     return invocation;
   }
-  if (draft.typed.version) {
+  if (draft.typed.version && !misspelt) {
     invocation.text = fmt::format("spindle {}\n", version);
     return invocation;
   }
-  for (const std::string& extra : app.remaining(true)) {
-    if (extra != end_of_options) return tl::unexpected(unexpected_argument(app, draft, extra));
-  }
+  if (extra) return tl::unexpected(unexpected_argument(app, draft, *extra));
   if (auto understood = understand_common(draft.typed, invocation); !understood) {
     return tl::unexpected(std::move(understood.error()));
   }

@@ -110,7 +110,8 @@ std::string bad(std::string_view line) {
 
 TEST_CASE("the commands of this version are there") {
   const auto commands = all_commands();
-  for (const char* name : {"identify", "list", "get", "set", "do", "ping", "simulate", "profile"}) {
+  for (const char* name : {"identify", "list", "get", "set", "do", "watch", "remote-start",
+                           "remote-stop", "alarms", "ping", "simulate", "profile"}) {
     CAPTURE(std::string(name));
     CHECK(std::find(commands.begin(), commands.end(), Words{name}) != commands.end());
   }
@@ -272,6 +273,7 @@ TEST_CASE("what is wrong is named, with a suggestion or where to look") {
   const std::vector<Case> cases = {
       {"", "no command is given; 'spindle --help' lists all commands"},
       {"gte t", "unknown command 'gte'; did you mean 'get'?"},
+      {"gte --help", "unknown command 'gte'; did you mean 'get'?"},
       {"profile lsit", "unknown command 'lsit'; did you mean 'list'?"},
       {"get t --limit", "unknown option '--limit'; did you mean '--limits'?"},
       {"get t --limits=yes", "'--limits' takes no value"},
