@@ -10,16 +10,17 @@ int main(int count, char** arguments) {
   SteadyClock clock(signals.interrupt());
   const spindle::Interrupt calm;
   SteadyClock calm_clock(calm);
-  spindle::cli::World world{.io = {write_out, write_err, read_line, is_terminal(Stream::in),
-                                   is_terminal(Stream::out), is_terminal(Stream::err), out_is_open},
-                            .clock = clock,
-                            .interrupt = signals.interrupt(),
-                            .open = line_opener(clock, signals.interrupt()),
-                            .calm = {calm_clock, calm, line_opener(calm_clock, calm)},
-                            .serve = tool_server(clock, signals.interrupt()),
-                            .end_waits = [&signals] { signals.end_waits(); },
-                            .environment = environment,
-                            .file_exists = file_exists,
-                            .program_folder = program_folder()};
+  spindle::cli::World world{
+      .io = {write_out, write_err, read_line, is_terminal(Stream::in), is_terminal(Stream::out),
+             is_terminal(Stream::err), out_is_open, err_is_ready},
+      .clock = clock,
+      .interrupt = signals.interrupt(),
+      .open = line_opener(clock, signals.interrupt()),
+      .calm = {calm_clock, calm, line_opener(calm_clock, calm)},
+      .serve = tool_server(clock, signals.interrupt()),
+      .end_waits = [&signals] { signals.end_waits(); },
+      .environment = environment,
+      .file_exists = file_exists,
+      .program_folder = program_folder()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
 }

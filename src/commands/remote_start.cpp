@@ -169,7 +169,9 @@ class RemoteRun {
 
   /// The one line on a terminal that changes while something goes on.
   void show_state(std::string_view text) {
-    if (context_->io.err_is_terminal) context_->io.err(fmt::format("\r\x1b[K{}", text));
+    const report::Streams& io = context_->io;
+    const bool ready = !io.err_is_ready || io.err_is_ready();
+    if (io.err_is_terminal && ready) io.err(fmt::format("\r\x1b[K{}", text));
   }
 
   /// The event of the run: the one that ended it, or the one that our stop caused.

@@ -36,6 +36,7 @@ std::string_view to_text(link::Decision decision) {
 link::Trace make_trace(const std::string& target, const Context& context) {
   if (context.common.verbosity == Verbosity::normal) return {};
   const auto line = [&context, target](std::string text) {
+    if (context.io.err_is_ready && !context.io.err_is_ready()) return;
     text.erase(text.find_last_not_of(' ') + 1);
     context.io.err(fmt::format("{} {} {}\n", report::to_text(context.clock.wall()), target, text));
   };

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <ctime>
 
 namespace spindle::posix {
 namespace {
@@ -15,12 +16,25 @@ namespace {
 // A shell reads 128 + n as "ended by signal n".
 constexpr int signal_status_base = 128;
 
-constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGPIPE};
+constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE};
+
+// Supervisors, wrappers and terminals send several signals for one wish. Those that follow this
+// soon (a hand is slower) are part of the first, or they would end the process before it has
+// stopped a motor.
+constexpr std::int64_t one_wish_ns = 50'000'000;
 
 // The one mutable global of the program: a signal handler gets nothing but the signal's number, so
 // the way to the Interrupt has to be static.
 std::atomic<Interrupt*> watched{nullptr};
+std::atomic<std::int64_t> first_signal_ns{0};  // its companion, for the same reason
 static_assert(std::atomic<Interrupt*>::is_always_lock_free, "read by a signal handler");
+static_assert(std::atomic<std::int64_t>::is_always_lock_free, "read by a signal handler");
+
+std::int64_t monotonic_ns() {
+  timespec now = {};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
 
 void wake(const Interrupt& interrupt) {
   const std::uint64_t one = 1;
@@ -31,8 +45,15 @@ void wake(const Interrupt& interrupt) {
 extern "C" void on_signal(int number) {
   Interrupt* const interrupt = watched.load();
   if (interrupt == nullptr) return;
-  if (interrupt->signalled()) ::_exit(signal_status_base + number);
   const int interrupted_errno = errno;
+  if (interrupt->signalled()) {
+    if (monotonic_ns() - first_signal_ns.load() >= one_wish_ns) {
+      ::_exit(signal_status_base + number);
+    }
+    errno = interrupted_errno;
+    return;
+  }
+  first_signal_ns.store(monotonic_ns());
   interrupt->raise(number);
   wake(*interrupt);
   errno = interrupted_errno;
@@ -58,7 +79,12 @@ SignalWatch::SignalWatch()
   watched.store(&interrupt_);
   for (std::size_t i = 0; i < watched_signals.size(); ++i) {
     const struct sigaction action = action_for(watched_signals[i]);
-    ::sigaction(watched_signals[i], &action, &previous_->actions[i]);
+    struct sigaction& before = previous_->actions[i];
+    ::sigaction(watched_signals[i], &action, &before);
+    // nohup: the terminal may go.
+    if (watched_signals[i] == SIGHUP && before.sa_handler == SIG_IGN) {
+      ::sigaction(SIGHUP, &before, nullptr);
+    }
   }
 }
 

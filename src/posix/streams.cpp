@@ -69,6 +69,11 @@ bool is_terminal(Stream stream) {
   return false;
 }
 
+bool err_is_ready() {
+  pollfd room = {STDERR_FILENO, POLLOUT, 0};
+  return ::poll(&room, 1, 0) != 0;
+}
+
 bool out_is_open() {
   pollfd reader = {STDOUT_FILENO, 0, 0};
   return ::poll(&reader, 1, 0) <= 0 || (reader.revents & (POLLERR | POLLHUP)) == 0;

@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import socket
+import subprocess
 import threading
 import time
 import unittest
@@ -187,7 +188,8 @@ class ResultTest(RemoteStartTest):
 
 class EndingTest(RemoteStartTest):
     def test_signals(self):
-        for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        endings = ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 143), (signal.SIGQUIT, 143))
+        for number, status in endings:
             for form in ("--json", "--verbose"):
                 with self.subTest(number, form=form), Station(**SLOW) as station:
                     with self.running(station, form) as run:
@@ -206,11 +208,40 @@ class EndingTest(RemoteStartTest):
             self.assertEqual(finished.status, 130, finished)
             self.assert_stopped(station, finished)
 
+    def test_several_signals_at_once(self):
+        for _ in range(5):
+            with Station(**SLOW) as station:
+                with self.running(station) as run:
+                    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                        os.kill(run.pid, number)
+                    finished = run.finish()
+                self.assertIn(finished.status, (130, 143), finished)
+                self.assert_stopped(station, finished)
+
+    def test_nobody_takes_what_is_told(self):
+        """A pager that shows its first page, or a terminal halted with Ctrl-S."""
+        with Station(**SLOW) as station, contextlib.ExitStack() as stack:
+            reading, writing = support.small_pipe()
+            stack.callback(os.close, reading)
+            process = subprocess.Popen(
+                [support.binary(), "remote-start", station.url, *GO, "--verbose", "--for", "3s"],
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=writing,
+                env=support.home().environment(), cwd=support.home().path,
+            )
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            os.close(writing)
+            support.wait_until(lambda: 0 in station.writes(), "the tool is stopped after the time allowed", 8)
+            support.wait_until(lambda: not station.tool.running, "the tool stands still")
+
     def test_a_second_signal_ends_at_once(self):
         with Station(deaf_to=[(START, 0)], **SLOW) as station:
             with self.running(station) as run:
                 run.send_signal(signal.SIGINT)
                 support.wait_until(lambda: 0 in station.writes(), "the stop is sent")
+                # What follows at once is the same wish.
+                run.send_signal(signal.SIGTERM)
+                support.wait_until(lambda: station.writes().count(0) > 1, "the stop is sent again")
                 run.send_signal(signal.SIGINT)
                 finished = run.finish()
             self.assertEqual(finished.status, 130, finished)

@@ -49,7 +49,9 @@ TEST_CASE("signals: the first one raises the interrupt and makes its descriptor 
     ExitStatus status;
   };
   const Row rows[] = {{SIGINT, Errc::interrupted, ExitStatus::interrupted},
-                      {SIGTERM, Errc::terminated, ExitStatus::terminated}};
+                      {SIGTERM, Errc::terminated, ExitStatus::terminated},
+                      {SIGHUP, Errc::terminated, ExitStatus::terminated},
+                      {SIGQUIT, Errc::terminated, ExitStatus::terminated}};
   for (const Row& row : rows) {
     CAPTURE(row.signal);
     const posix::SignalWatch watch;
@@ -92,11 +94,33 @@ TEST_CASE("signals: the second one ends the process with 128 + its number") {
     const int status = status_of_child([&row] {
       const posix::SignalWatch watch;
       ::raise(row.first);
+      const Interrupt calm;
+      posix::SteadyClock clock(calm);
+      static_cast<void>(clock.sleep_until(clock.now() + 310ms));
       ::raise(row.second);
     });
     REQUIRE(WIFEXITED(status));
     CHECK(WEXITSTATUS(status) == row.status);
   }
+}
+
+TEST_CASE("signals: several at once are one wish") {
+  const int status = status_of_child([] {
+    const posix::SignalWatch watch;
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGINT}) ::raise(number);
+    if (watch.interrupt().error().code != Errc::interrupted) ::_exit(1);
+  });
+  CHECK(status == 0);
+}
+
+TEST_CASE("signals: what nohup ignores stays ignored") {
+  const int status = status_of_child([] {
+    ::signal(SIGHUP, SIG_IGN);
+    const posix::SignalWatch watch;
+    ::raise(SIGHUP);
+    if (watch.interrupt().raised()) ::_exit(1);
+  });
+  CHECK(status == 0);
 }
 
 TEST_CASE("signals: writing to a closed pipe is an error, not the end") {

@@ -6,9 +6,11 @@
 
 namespace spindle::posix {
 
-/// Owns the process's Interrupt while it lives: SIGINT and SIGTERM raise it and make its eventfd
-/// readable (it stays readable); a second signal ends the process at once with 128 + its number.
-/// SIGPIPE is ignored. The handlers before it come back at its end. At most one may exist.
+/// Owns the process's Interrupt while it lives: SIGINT, SIGTERM, SIGQUIT and SIGHUP (unless nohup
+/// ignores it) raise it and make its eventfd readable (it stays readable). A second signal ends the
+/// process at once with 128 + its number, unless it comes within 0.05 s: that is one wish said
+/// twice, and a motor is being stopped. SIGPIPE is ignored. The handlers before it come back at its
+/// end. At most one may exist.
 class SignalWatch {
  public:
   SignalWatch();

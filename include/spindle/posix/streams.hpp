@@ -22,6 +22,10 @@ std::optional<std::string> read_line();
 /// are always open.
 bool out_is_open();
 
+/// Whether standard error takes a line (of at most 4096 bytes) without waiting: not when its pipe
+/// is full or its terminal was halted with Ctrl-S.
+bool err_is_ready();
+
 enum class Stream : std::uint8_t { in, out, err };
 bool is_terminal(Stream stream);
 

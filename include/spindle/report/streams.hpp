@@ -24,6 +24,9 @@ struct Streams {
   bool err_is_terminal = false;
   /// Whether somebody still reads what out() writes; may be empty, which means yes.
   std::function<bool()> out_is_open = {};
+  /// Whether err() can write a line without waiting; may be empty, which means yes. A motor must
+  /// not run on because nobody takes what is told meanwhile.
+  std::function<bool()> err_is_ready = {};
   Color color = Color::off;
 };
 
