@@ -42,6 +42,20 @@ class Server {
     return true;
   }
 
+  /// Silence that a server on a serial line wants before a query; it does not hear one that comes
+  /// earlier. Zero on a network.
+  [[nodiscard]] virtual Duration required_gap() const { return {}; }
+
+  /// Time that a server on a serial line lets pass between a query and its answer, the gap not
+  /// counted. Zero on a network.
+  [[nodiscard]] virtual Duration answer_delay(modbus::UnitId unit) const {
+    static_cast<void>(unit);
+    return {};
+  }
+
+  /// Bytes on the serial line that were no frame: a bad checksum, a torn frame, noise.
+  virtual void bad_frame(TimePoint now) { static_cast<void>(now); }
+
   /// Lets time pass: motion, torque, expiring output, operators.
   virtual void advance(TimePoint now) = 0;
 
