@@ -208,6 +208,7 @@ struct TypedSimulate {
   std::string model;
   std::string rundown_every;
   std::string ng_every;
+  std::string burst;
 };
 
 /// Everything that CLI11 writes into; must live as long as the parser.
@@ -359,22 +360,30 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
           .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, options.model); })
           .and_then([&] {
             return fill_number("--ng-every", typed.ng_every, 1'000'000, options.ng_every);
-          });
+          })
+          .and_then([&] { return fill_number("--burst", typed.burst, 10'000, options.burst); });
   if (!filled) return tl::unexpected(std::move(filled.error()));
   const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
   if (!rundown_every) return tl::unexpected(rundown_every.error());
   options.rundown_every = *rundown_every;
-  if (options.ng_every && !options.rundown_every) {
-    return tl::unexpected(usage("--ng-every needs --rundown-every", "such as --rundown-every 5s"));
+  if ((options.ng_every || options.burst) && !options.rundown_every) {
+    return tl::unexpected(
+        usage("--ng-every and --burst need --rundown-every", "such as --rundown-every 5s"));
   }
+  if (options.burst == 0U)
+    return tl::unexpected(usage("--burst 0 would be no result", "at least 1"));
   return commands::simulate(options, context);
 }
 
-std::string fault_words() {
+std::string trouble_words() {
   std::string text =
       "Faults (behind any of them: @3 only the third answer, @every:5 every fifth):\n";
   for (const sim::FaultHelp& fault : sim::fault_help()) {
     text += fmt::format("  {:<26}{}\n", fault.syntax, fault.meaning);
+  }
+  text += "\nOutages (such as sleep=3s@every:20s: after 20 s, 40 s, 60 s, for 3 s each):\n";
+  for (const sim::OutageHelp& outage : sim::outage_help()) {
+    text += fmt::format("  {:<29}{}\n", outage.syntax, outage.meaning);
   }
   return text;
 }
@@ -507,14 +516,16 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
 }
 
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
-  constexpr Words words = {"simulate", "PROFILE [--listen URL]",
-                           "a simulated tool to learn on, script against and test with",
-                           "spindle simulate doga-bm\n"
-                           "spindle simulate doga-bm --listen tcp://127.0.0.1:5000 -v\n"
-                           "spindle simulate doga-bm --rundown-every 3s --ng-every 5\n"
-                           "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3\n"
-                           "spindle simulate doga-bm --firmware 4001",
-                           fault_words};
+  constexpr Words words = {
+      "simulate", "PROFILE [--listen URL]",
+      "a simulated tool to learn on, script against and test with",
+      "spindle simulate doga-bm\n"
+      "spindle simulate doga-bm --listen tcp://127.0.0.1:5000 -v\n"
+      "spindle simulate doga-bm --rundown-every 3s --ng-every 5\n"
+      "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3\n"
+      "spindle simulate doga-bm --rundown-every 2s --outage roam=5s@every:30s\n"
+      "spindle simulate doga-bm --firmware 4001",
+      trouble_words};
   CLI::App* command = add_command(app, draft, words, typed.simulate, run_simulate);
   auto& options = typed.simulate.options;
   command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
@@ -533,6 +544,14 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
          "an operator who drives a screw at this interval (default: nobody)");
   option(command, "--ng-every", typed.simulate.ng_every, "N",
          "every so many of the operator's screws end NG");
+  option(command, "--burst", typed.simulate.burst, "N",
+         "results that each of the operator's screws brings, all at once (default 1)");
+  command
+      ->add_option("--outage", options.outages,
+                   "let the tool be away at times, repeatable; see below")
+      ->type_name("OUTAGE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {

@@ -51,7 +51,8 @@ Result<SimulatedTool> make_simulated_tool(const std::string& profile,
                                    .tool_model = options.model,
                                    .faults = options.faults,
                                    .rundown_every = options.rundown_every,
-                                   .ng_every = options.ng_every});
+                                   .ng_every = options.ng_every,
+                                   .burst = options.burst});
   return SimulatedTool{std::move(*loaded), std::move(server)};
 }
 

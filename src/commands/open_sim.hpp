@@ -13,6 +13,7 @@ struct SimulatedToolOptions {
   sim::FaultPlan faults = {};
   std::optional<Duration> rundown_every = std::nullopt;  ///< an operator's; empty: nobody works
   unsigned ng_every = 0;  ///< every so many run-downs of the operator end NG; 0: none
+  unsigned burst = 1;     ///< results that each of the operator's run-downs brings, all at once
 };
 
 /// Opens sim: endpoints as such tools inside this process, and everything else through the context.

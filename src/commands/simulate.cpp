@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <type_traits>
+#include <utility>
+
 #include "listing.hpp"
 #include "open_sim.hpp"
 #include "records.hpp"
@@ -9,17 +12,20 @@
 namespace spindle::commands {
 namespace {
 
-Result<sim::FaultPlan> parse_faults(const std::vector<std::string>& texts) {
-  sim::FaultPlan plan;
+/// What an option that may be given again and again says, each text read by `parse`.
+template <typename Parse>
+auto parse_each(const std::string& option, const std::vector<std::string>& texts, Parse parse)
+    -> Result<std::vector<typename std::invoke_result_t<Parse, std::string>::value_type>> {
+  std::vector<typename std::invoke_result_t<Parse, std::string>::value_type> all;
   for (const std::string& text : texts) {
-    auto fault = sim::parse_fault(text);
-    if (!fault) {
-      fault.error().name = "--fault";
-      return tl::unexpected(std::move(fault.error()));
+    auto one = parse(text);
+    if (!one) {
+      one.error().name = option;
+      return tl::unexpected(std::move(one.error()));
     }
-    plan.push_back(*fault);
+    all.push_back(*one);
   }
-  return plan;
+  return all;
 }
 
 Result<link::Endpoint> listen_endpoint(const std::string& text) {
@@ -92,8 +98,10 @@ Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& 
 }  // namespace
 
 Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
-  auto faults = parse_faults(options.faults);
+  auto faults = parse_each("--fault", options.faults, sim::parse_fault);
   if (!faults) return tl::unexpected(std::move(faults.error()));
+  auto outages = parse_each("--outage", options.outages, sim::parse_outage);
+  if (!outages) return tl::unexpected(std::move(outages.error()));
   auto listen = listen_endpoint(options.listen);
   if (!listen) return tl::unexpected(std::move(listen.error()));
   auto tool = make_simulated_tool(options.profile,
@@ -103,7 +111,8 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
                                    .model = options.model,
                                    .faults = *faults,
                                    .rundown_every = options.rundown_every,
-                                   .ng_every = options.ng_every.value_or(0)},
+                                   .ng_every = options.ng_every.value_or(0),
+                                   .burst = options.burst.value_or(1)},
                                   context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   if (!listen->port) listen->port = tool->profile.link.port;
@@ -113,7 +122,8 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   sim::ServeOptions serve{.host = listen->host,
                           .port = *listen->port,
                           .framing = tool->profile.link.framing,
-                          .faults = std::move(*faults)};
+                          .faults = std::move(*faults),
+                          .outages = std::move(*outages)};
   serve.listening = [&](std::uint16_t port) {
     listen->port = port;
     return announce(tool->profile.id, link::to_url(*listen), context);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "posix/listener.hpp"
@@ -24,7 +25,11 @@ constexpr Duration accept_pause = std::chrono::milliseconds(100);
 class Serving {
  public:
   Serving(Service service, Descriptor listener, const Clock& clock, const Interrupt& interrupt)
-      : service_(service), listener_(std::move(listener)), clock_(&clock), interrupt_(&interrupt) {}
+      : service_(service),
+        listener_(std::move(listener)),
+        clock_(&clock),
+        interrupt_(&interrupt),
+        outages_(service.options.outages, clock.now()) {}
 
   void run();
 
@@ -35,11 +40,15 @@ class Serving {
   void read_ready(TimePoint now);
   void distribute_pushes(TimePoint now);
   void write_and_reap(TimePoint now);
+  void follow_outages(TimePoint now);
+  [[nodiscard]] bool is_silent() const;
 
   Service service_;
   Descriptor listener_;
   const Clock* clock_;
   const Interrupt* interrupt_;
+  sim::OutageSchedule outages_;
+  std::optional<sim::OutageKind> outage_ = std::nullopt;  // under way
   std::map<std::uint32_t, ServedClient> clients_ = {};
   // The listener, the interrupt, then the clients in the map's order.
   std::vector<pollfd> polled_ = {};
@@ -51,22 +60,36 @@ constexpr std::size_t polled_before_clients = 2;
 
 void Serving::run() {
   while (!interrupt_->raised()) {
+    follow_outages(clock_->now());
     wait();
     const TimePoint now = clock_->now();
     service_.server.advance(now);
     read_ready(now);
     accept_waiting(now);
     distribute_pushes(now);
-    write_and_reap(now);
+    if (!is_silent()) write_and_reap(now);
   }
+}
+
+// While a tool sleeps, or its radio is away, nothing passes.
+bool Serving::is_silent() const { return outage_ && *outage_ != sim::OutageKind::other_client; }
+
+void Serving::follow_outages(TimePoint now) {
+  const auto before = std::exchange(outage_, outages_.at(now));
+  if (outage_ == before) return;
+  const bool rebooted = outage_ == sim::OutageKind::reboot;
+  if (rebooted) service_.server.reboot(now);
+  const bool came_back = before == sim::OutageKind::roam;
+  if (came_back || rebooted || outage_ == sim::OutageKind::other_client) clients_.clear();
 }
 
 void Serving::wait() {
   const TimePoint now = clock_->now();
-  const int listener = now >= accept_after_ ? listener_.number() : -1;
+  const bool accepts = now >= accept_after_ && !is_silent();
+  const int listener = accepts ? listener_.number() : -1;
   polled_.assign({pollfd{listener, POLLIN, 0}, pollfd{interrupt_->descriptor(), POLLIN, 0}});
   for (const auto& [id, client] : clients_) {
-    polled_.push_back({client.descriptor(), client.events(), 0});
+    polled_.push_back({is_silent() ? -1 : client.descriptor(), client.events(), 0});
   }
   if (poll_until(polled_, wake_at(now), *clock_) >= 0) return;
   // After a signal nothing was filled in, and nothing is known to be ready.
@@ -75,6 +98,8 @@ void Serving::wait() {
 
 TimePoint Serving::wake_at(TimePoint now) const {
   TimePoint wake = service_.server.next_change().value_or(TimePoint::max());
+  wake = std::min(wake, outages_.next_change(now).value_or(TimePoint::max()));
+  if (is_silent()) return wake;
   if (accept_after_ > now) wake = std::min(wake, accept_after_);
   for (const auto& [id, client] : clients_) {
     wake = std::min(wake, client.wake_at().value_or(TimePoint::max()));
@@ -95,6 +120,7 @@ void Serving::accept_waiting(TimePoint now) {
   for (;;) {
     Descriptor socket(
         ::accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (socket.valid() && outage_ == sim::OutageKind::other_client) continue;  // and is closed
     if (socket.valid()) {
       const int on = 1;
       ::setsockopt(socket.number(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);

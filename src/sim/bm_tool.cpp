@@ -73,6 +73,7 @@ class SimulatedBm final : public BmTool {
     RunPlan plan;
     TimePoint begin;
     TimePoint end;
+    unsigned results = 1;  // events that its end brings
   };
   // Fields of an event that are not the tool's present state.
   struct EventData {
@@ -121,6 +122,7 @@ class SimulatedBm final : public BmTool {
   FaultPlan faults_;
   std::optional<Duration> rundown_every_;
   unsigned ng_every_;
+  unsigned burst_;
 
   enum class Lock : std::uint8_t { off, on } lock_ = Lock::off;
   std::optional<Run> run_ = std::nullopt;
@@ -142,7 +144,8 @@ SimulatedBm::SimulatedBm(const catalogue::Profile& profile, const catalogue::Sim
       identity_(make_identity(profile.identity, start, options)),
       faults_(options.faults),
       rundown_every_(options.rundown_every),
-      ng_every_(options.ng_every) {
+      ng_every_(options.ng_every),
+      burst_(options.burst) {
   constexpr std::array<std::pair<std::string_view, Handler>, 5> handlers = {{
       {"alarm-reset", &SimulatedBm::reset_alarm},
       {"lock", &SimulatedBm::lock},
@@ -356,7 +359,9 @@ void SimulatedBm::finish_run(TimePoint now) {
                  .speed = run.plan.speed};
   if (fastening && !reached) data.error = stopped_error_;
   const std::string_view result = reached ? "fastening-ok" : "fastening-ng";
-  emit(fastening ? result : "other", data, now);
+  for (unsigned told = 0; told < run.results; ++told) {
+    emit(fastening ? result : "other", data, now);
+  }
 }
 
 // A batch that is complete is followed by the next one.
@@ -399,6 +404,7 @@ void SimulatedBm::pull_trigger(TimePoint now) {
   ++triggers_;
   const bool fails = ng_every_ != 0 && triggers_ % ng_every_ == 0;
   begin_run(fails ? Rundown::ng : Rundown::ok, now);
+  run_->results = burst_;
 }
 
 // ---- events ----

@@ -328,6 +328,29 @@ class ReconnectingTest(unittest.TestCase):
                 attempts = [link["attempt"] for link in watching.records("link")[2:-1]]
                 self.assertEqual(attempts, list(range(1, len(attempts) + 1)))
 
+    def test_outages(self):
+        """A tool that sleeps, roams, restarts or serves somebody else at times, and works on."""
+        first_event = 1962  # of the simulated tool
+        for outage, states, gap in (
+            ("sleep=500ms@every:2s", ["connected"], None),
+            ("roam=700ms@every:2s", ["lost", "connected"], None),
+            ("reboot=700ms@every:2s", ["lost", "connected"], "counts its events anew"),
+            ("other-client=700ms@every:2s", ["lost", "reconnecting"], None),
+        ):
+            work = ("--rundown-every", "1300ms", "--burst", "3", "--outage", outage)
+            with self.subTest(outage), support.Running("simulate", "doga-bm", *work) as tool:
+                with Watching(tool.line(), *JSON) as watching:
+                    support.wait_until(lambda: len(watching.numbers()) >= 8, "events go on")
+                    status, _, stderr = watching.end()
+                self.assertEqual((status, stderr), (143, ""))
+                told = watching.links()
+                self.assertEqual([state for state in states if state not in told], [])
+                if gap:
+                    self.assertIn(gap, watching.records("gap")[0]["reason"])
+                else:
+                    last = watching.numbers()[-1]
+                    self.assertEqual(unaccounted(watching.records(), first_event, last), "")
+
     def test_another_tool_is_said(self):
         with EventServer() as server:
             with Watching(server.url, *JSON) as watching:

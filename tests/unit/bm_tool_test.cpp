@@ -477,6 +477,19 @@ TEST_CASE("an operator at work pulls the trigger regularly") {
   CHECK(results == std::vector<std::uint16_t>{1, 1, 2, 1});
 }
 
+TEST_CASE("a burst brings several results at once, each with its number") {
+  Bench bench({.rundown_every = 5s, .burst = 3});
+  bench.tool->advance(bench.now);
+  bench.write(auto_output, 1);
+  bench.pass(7s);
+  CHECK(bench.event().number == 1961 + 3);
+  const auto pushes = bench.tool->take_pushes();
+  REQUIRE(pushes.size() == 3);
+  for (std::size_t i = 0; i < pushes.size(); ++i) {
+    CHECK(modbus::registers_of(pushes[i].pdu).front() == 1962 + i);
+  }
+}
+
 TEST_CASE("a reboot forgets motion, alarm, lock and output, and keeps parameters") {
   Bench bench;
   bench.write(2, 300);

@@ -73,8 +73,11 @@ class EchoTool final : public sim::Server {
     ++left;
   }
 
+  void reboot(TimePoint /*now*/) override { ++reboots; }
+
   std::atomic<int> came = 0;
   std::atomic<int> left = 0;
+  std::atomic<int> reboots = 0;
 
  private:
   std::vector<std::uint32_t> present_ = {};
@@ -338,6 +341,46 @@ TEST_CASE("serve: clients that leave, politely or not, are forgotten") {
   const TimePoint deadline = clock.now() + patience;
   while (served.tool.left < 2 && clock.now() < deadline) number_of(staying);
   CHECK(served.tool.left == 2);
+}
+
+TEST_CASE("serve: a sleeping tool answers late, and keeps its connections") {
+  Served served({.outages = {{sim::OutageKind::sleep, 100ms, 200ms}}});
+  Client client(served.port);
+  const auto begun = std::chrono::steady_clock::now();
+  auto longest = 0ns;
+  while (std::chrono::steady_clock::now() - begun < 500ms) {
+    const auto asked = std::chrono::steady_clock::now();
+    CHECK(number_of(client) == 1);
+    longest = std::max<std::chrono::nanoseconds>(longest, std::chrono::steady_clock::now() - asked);
+  }
+  CHECK(longest >= 90ms);
+  CHECK(served.tool.left == 0);
+}
+
+TEST_CASE("serve: who roams or is switched off and on loses its connections") {
+  for (const auto kind : {sim::OutageKind::roam, sim::OutageKind::reboot}) {
+    Served served({.outages = {{kind, 50ms, 200ms}}});
+    Client client(served.port);
+    CHECK(number_of(client) == 1);
+    const auto end = client.fill();
+    REQUIRE_FALSE(end.has_value());
+    CHECK(end.error().code == Errc::closed);
+    Client next(served.port);
+    CHECK(number_of(next) == 2);
+    CHECK(served.tool.reboots == (kind == sim::OutageKind::reboot ? 1 : 0));
+  }
+}
+
+TEST_CASE("serve: while another client holds the session, everybody else is shut out") {
+  Served served({.outages = {{sim::OutageKind::other_client, 200ms, 400ms}}});
+  Client client(served.port);
+  CHECK(number_of(client) == 1);
+  const auto end = client.fill();
+  REQUIRE_FALSE(end.has_value());
+  CHECK(end.error().code == Errc::closed);
+  Client shut_out(served.port);
+  CHECK_FALSE(shut_out.fill().has_value());
+  CHECK(served.tool.came == 1);
 }
 
 TEST_CASE("serve: an interrupt ends it with success, and every client sees the end") {

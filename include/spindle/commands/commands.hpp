@@ -99,6 +99,8 @@ struct SimulateOptions {
   std::optional<std::uint16_t> model;
   std::optional<Duration> rundown_every;  ///< an operator's; empty: nobody works with the tool
   std::optional<unsigned> ng_every;       ///< every so many of them end NG
+  std::optional<unsigned> burst;          ///< results that each of them brings, all at once
+  std::vector<std::string> outages;       ///< KIND=TIME@every:TIME
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
 

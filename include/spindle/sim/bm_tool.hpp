@@ -26,6 +26,7 @@ struct BmOptions {
   /// advance(); empty: nobody.
   std::optional<Duration> rundown_every = std::nullopt;
   unsigned ng_every = 0;  ///< every so many of the operator's run-downs end NG; 0: none
+  unsigned burst = 1;     ///< results that each of the operator's run-downs brings, all at once
 };
 
 /// How a run-down by the tool's own trigger ends: at the target, or released before it.
@@ -43,9 +44,8 @@ class BmTool : public Server {
   /// A fault occurs: a run ends, `error` is sent as event, starts are ignored until the reset.
   virtual void raise_alarm(std::uint16_t code, TimePoint now) = 0;
 
-  /// Power off and on: no motion, alarm, lock or armed output; events count from 0 again. Stored
-  /// parameters stay. Connections are the driver's business.
-  virtual void reboot(TimePoint now) = 0;
+  /// No motion, alarm, lock or armed output; events count from 0 again. Stored parameters stay.
+  void reboot(TimePoint now) override = 0;
 };
 
 /// Requires a profile with events.

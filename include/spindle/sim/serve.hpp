@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/modbus/adu.hpp"
 #include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/outage.hpp"
 #include "spindle/sim/server.hpp"
 
 namespace spindle::sim {
@@ -21,6 +23,7 @@ struct ServeOptions {
   std::uint16_t port = 0;  ///< 0: the system chooses
   modbus::Framing framing = modbus::Framing::tcp;
   FaultPlan faults = {};
+  std::vector<Outage> outages = {};  ///< counted from the beginning of serving
   /// Called once with the port that is listened on, before the first connection is accepted.
   std::function<Result<void>(std::uint16_t port)> listening = {};
   /// Hears every connection and all bytes as they come and go (usually a frame at a time).

@@ -75,6 +75,9 @@ class Server {
   /// What the tool would push now: the last event. Empty when it is of a kind that never pushes.
   [[nodiscard]] virtual std::optional<modbus::Pdu> event_frame() const { return std::nullopt; }
 
+  /// Power off and on: what is not stored is forgotten. Connections are the driver's business.
+  virtual void reboot(TimePoint now) { advance(now); }
+
   virtual void connected(ConnectionId connection) = 0;
   virtual void disconnected(ConnectionId connection) = 0;
 };
