@@ -128,6 +128,8 @@ std::string waited_text(Duration waited) {
 
 std::string expand(std::string_view sentence, const Error& error) {
   std::string text(sentence);
+  // A line also breaks while nobody asks anything.
+  if (error.tried.empty()) replace(text, " during '{tried}'", "");
   replace(text, "'{tried}'", error.tried.empty() ? "the request" : "'" + error.tried + "'");
   replace(text, "{waited}", error.waited ? waited_text(*error.waited) : "the time allowed");
   replace(text, "{exception}",

@@ -1,5 +1,7 @@
 #include "spindle/base/text.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <numeric>
@@ -162,6 +164,10 @@ std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t
   const auto [stopped, problem] = std::from_chars(text.data(), end, number, hexadecimal ? 16 : 10);
   if (problem != std::errc{} || stopped != end || number > maximum) return std::nullopt;
   return number;
+}
+
+std::string counted(std::size_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {

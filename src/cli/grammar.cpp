@@ -427,6 +427,11 @@ Result<Outcome> run_watch(TypedWatch typed, Context& context) {
   if (auto understood = understand_watch(typed, typed.options); !understood) {
     return tl::unexpected(std::move(understood.error()));
   }
+  const bool polls = typed.all || typed.initial || !typed.interval.empty();
+  if (polls && typed.options.names.empty() && !typed.no_push) {
+    return tl::unexpected(usage("--all, --initial and --interval are about polled values",
+                                "name some behind the tool, such as 'status.*'"));
+  }
   return commands::watch(typed.options, context);
 }
 

@@ -15,6 +15,7 @@ Result<void> ask_consent(std::string_view what, const Context& context) {
   }
   context.io.err(fmt::format("{}. Go on? [y/N] ", what));
   const auto answer = context.io.read_line();
+  if (!answer && context.interrupt.signalled()) return tl::unexpected(context.interrupt.error());
   if (answer && (*answer == "y" || *answer == "Y" || *answer == "yes")) return {};
   return tl::unexpected(Error{.code = Errc::not_confirmed,
                               .message = fmt::format("{}: not confirmed, nothing was done", what)});

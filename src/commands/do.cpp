@@ -5,6 +5,7 @@
 #include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 
@@ -60,7 +61,7 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
         return context.renderer.summary(
             summary_record({{"actions", number(static_cast<std::int64_t>(outcome.succeeded()))}},
                            outcome.status(), target.shown, context.clock),
-            fmt::format("{} actions", outcome.succeeded()));
+            counted(outcome.succeeded(), "action"));
       })
       .map([&] { return outcome; });
 }

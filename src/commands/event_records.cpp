@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/catalogue/value.hpp"
 
 namespace spindle::commands {
@@ -64,7 +65,7 @@ std::string_view to_text(device::LinkState state) {
 std::string missed_text(std::optional<std::uint32_t> missed) {
   if (!missed) return "perhaps events missed";
   if (*missed == 0) return "no event missed";
-  return fmt::format("{} event{} missed", *missed, *missed == 1 ? "" : "s");
+  return counted(*missed, "event") + " missed";
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 namespace spindle::commands {
 
-Context calm_context(const Context& context, const CommonOptions& common) {
+Context calm_context(const Context& context) {
   return {.io = context.io,
           .clock = context.calm.clock,
           .interrupt = context.calm.interrupt,
@@ -13,7 +13,7 @@ Context calm_context(const Context& context, const CommonOptions& common) {
           .profiles = context.profiles,
           .tools = context.tools,
           .renderer = context.renderer,
-          .common = common};
+          .common = context.common};
 }
 
 void Outcome::fail(const Error& error) {

@@ -99,8 +99,7 @@ class RemoteRun {
         plan_(&plan),
         tool_(&tool),
         context_(&context),
-        calm_options_(context.common),
-        calm_context_(calm_context(context, calm_options_)) {}
+        calm_context_(calm_context(context)) {}
 
   Result<Outcome> run() {
     auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
@@ -109,6 +108,7 @@ class RemoteRun {
     if (auto prepared = follower.prepare(); !prepared) {
       return tl::unexpected(std::move(prepared.error()));
     }
+    if (context_->calm.refuse_suspension) context_->calm.refuse_suspension();
     device::RunGuard guard(tool_->device, plan_->start, reopener(), context_->calm.clock);
     const device::FollowOptions following = limit_run();
     auto followed = guard.start().and_then([&] { return follower.follow(following); });
@@ -137,7 +137,7 @@ class RemoteRun {
       show_state("the link is lost; trying to stop the tool");
       const Duration usual =
           context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-      calm_options_.connect_timeout = std::min(usual, patience);
+      calm_context_.common.connect_timeout = std::min(usual, patience);
       return connect_device(tool_->target, *tool_->profile, calm_context_);
     };
   }
@@ -269,7 +269,6 @@ class RemoteRun {
   const RunPlan* plan_;
   OpenTool* tool_;
   Context* context_;
-  CommonOptions calm_options_;
   Context calm_context_;  ///< lines that are opened on it refer to it
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};

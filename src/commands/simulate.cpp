@@ -6,6 +6,7 @@
 #include "listing.hpp"
 #include "open_sim.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 
@@ -59,8 +60,8 @@ Result<void> announce(const std::string& profile, const std::string& url, Contex
 
 /// What was heard while the tool was served.
 struct Traffic {
-  std::int64_t connections = 0;
-  std::int64_t requests = 0;
+  std::size_t connections = 0;
+  std::size_t requests = 0;
 
   void count(sim::Heard heard) {
     if (heard == sim::Heard::connected) ++connections;
@@ -89,10 +90,11 @@ void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Cont
 
 Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& context) {
   return context.renderer.summary(
-      summary_record(
-          {{"connections", number(traffic.connections)}, {"requests", number(traffic.requests)}},
-          outcome.status(), {}, context.clock),
-      fmt::format("{} connections, {} requests", traffic.connections, traffic.requests));
+      summary_record({{"connections", number(static_cast<std::int64_t>(traffic.connections))},
+                      {"requests", number(static_cast<std::int64_t>(traffic.requests))}},
+                     outcome.status(), {}, context.clock),
+      fmt::format("{}, {}", counted(traffic.connections, "connection"),
+                  counted(traffic.requests, "request")));
 }
 
 }  // namespace

@@ -35,10 +35,10 @@ std::string_view to_text(link::Decision decision) {
 
 link::Trace make_trace(const std::string& target, const Context& context) {
   if (context.common.verbosity == Verbosity::normal) return {};
-  const auto line = [&context, target](std::string text) {
-    if (context.io.err_is_ready && !context.io.err_is_ready()) return;
+  const auto line = [&io = context.io, &clock = context.clock, target](std::string text) {
+    if (io.err_is_ready && !io.err_is_ready()) return;
     text.erase(text.find_last_not_of(' ') + 1);
-    context.io.err(fmt::format("{} {} {}\n", report::to_text(context.clock.wall()), target, text));
+    io.err(fmt::format("{} {} {}\n", report::to_text(clock.wall()), target, text));
   };
   return {.bytes =
               [line](link::Direction direction, ByteView bytes) {

@@ -9,6 +9,7 @@
 #include "event_records.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 #include "watched_tool.hpp"
@@ -116,8 +117,9 @@ class Stage {
                         {"gaps", count(gaps_)},
                         {"reconnects", count(losses_)}},
                        outcome_.status(), {}, context_->clock),
-        fmt::format("{} events, {} OK, {} NG, {} changes, {} gaps, {} reconnects", events_, ok_,
-                    ng_, changes_, gaps_, losses_));
+        fmt::format("{}, {} OK, {} NG, {}, {}, {}", counted(events_, "event"), ok_, ng_,
+                    counted(changes_, "change"), counted(gaps_, "gap"),
+                    counted(losses_, "reconnect")));
   }
 
   const WatchOptions* options_;
@@ -185,7 +187,9 @@ Result<void> watch_one(WatchedTool& tool, Stage& stage, const WatchOptions& opti
   std::optional<NewsRecords> records;
   records.emplace(tool.target(), unknown, catalogue::CodeTexts());
   const auto open = [&] {
-    auto link = tool.open();
+    const TimePoint until = stage.until();
+    const TimePoint now = context.clock.now();
+    auto link = tool.open(until > now ? until - now : Duration::zero());
     if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->errors);
     return link;
   };

@@ -1,5 +1,6 @@
 #include "watched_tool.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace spindle::commands {
@@ -28,19 +29,24 @@ Result<void> WatchedTool::learn(const std::string& profile) {
   return shelf_->take(profile).map([&](const KnownProfile* known) { known_ = known; });
 }
 
-Result<void> WatchedTool::find_profile() {
-  auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, *context_);
+Result<void> WatchedTool::find_profile(const Context& context) {
+  auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   target_ = tool->target;
   target_.profile = tool->profile->id;
   return learn(target_.profile);
 }
 
-Result<device::Watcher::Link> WatchedTool::open() {
+Result<device::Watcher::Link> WatchedTool::open(Duration patience) {
+  Context hurried = *context_;
+  const catalogue::LinkFacts facts =
+      known_ == nullptr ? catalogue::LinkFacts() : known_->profile.link;
+  const Duration usual = hurried.common.connect_timeout.value_or(facts.connect);
+  hurried.common.connect_timeout = std::min(usual, patience);
   if (known_ == nullptr) {
-    if (auto found = find_profile(); !found) return tl::unexpected(std::move(found.error()));
+    if (auto found = find_profile(hurried); !found) return tl::unexpected(std::move(found.error()));
   }
-  auto device = connect_device(target_, known_->profile, *context_, SimulatedOperator::working);
+  auto device = connect_device(target_, known_->profile, hurried, SimulatedOperator::working);
   if (!device) return tl::unexpected(std::move(device.error()));
   if (auto registers = device->require_known_registers(); !registers) {
     return tl::unexpected(std::move(registers.error()));

@@ -43,14 +43,15 @@ class WatchedTool {
   /// Null until the tool has said what it is.
   [[nodiscard]] const KnownProfile* known() const { return known_; }
 
-  /// Opens the tool and makes sure that its registers are those of the profile.
-  Result<device::Watcher::Link> open();
+  /// Opens the tool and makes sure that its registers are those of the profile. Connecting takes no
+  /// longer than `patience`.
+  Result<device::Watcher::Link> open(Duration patience);
 
  private:
   WatchedTool(Target target, ProfileShelf& shelf, const Context& context)
       : target_(std::move(target)), shelf_(&shelf), context_(&context) {}
 
-  Result<void> find_profile();
+  Result<void> find_profile(const Context& context);
   Result<void> learn(const std::string& profile);
 
   Target target_;

@@ -16,7 +16,7 @@ namespace {
 // A shell reads 128 + n as "ended by signal n".
 constexpr int signal_status_base = 128;
 
-constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE};
+constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP};
 
 // Supervisors, wrappers and terminals send several signals for one wish. Those that follow this
 // soon (a hand is slower) are part of the first, or they would end the process before it has
@@ -54,7 +54,7 @@ extern "C" void on_signal(int number) {
     return;
   }
   first_signal_ns.store(monotonic_ns());
-  interrupt->raise(number);
+  interrupt->raise(number == SIGTSTP ? SIGINT : number);
   wake(*interrupt);
   errno = interrupted_errno;
 }
@@ -80,6 +80,10 @@ SignalWatch::SignalWatch()
   for (std::size_t i = 0; i < watched_signals.size(); ++i) {
     const struct sigaction action = action_for(watched_signals[i]);
     struct sigaction& before = previous_->actions[i];
+    if (watched_signals[i] == SIGTSTP) {  // until somebody refuses it
+      ::sigaction(SIGTSTP, nullptr, &before);
+      continue;
+    }
     ::sigaction(watched_signals[i], &action, &before);
     // nohup: the terminal may go.
     if (watched_signals[i] == SIGHUP && before.sa_handler == SIG_IGN) {
@@ -94,6 +98,11 @@ SignalWatch::~SignalWatch() {
   }
   watched.store(nullptr);
   ::close(interrupt_.descriptor());
+}
+
+void SignalWatch::refuse_suspension() {
+  const struct sigaction action = action_for(SIGTSTP);
+  ::sigaction(SIGTSTP, &action, nullptr);
 }
 
 void SignalWatch::end_waits() {

@@ -1,6 +1,8 @@
 """How it ends: signals during every wait, closed pipes, closed streams."""
 
+import contextlib
 import os
+import pty
 import signal
 import subprocess
 import unittest
@@ -17,6 +19,24 @@ TORQUE = "preset.1.target-torque"
 
 def tearDownModule():
     support.remove_home()
+
+
+def ask_on_terminal(arguments, question, answer):
+    """Runs spindle on a terminal of its own and types the answer to its question."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        program = support.binary()
+        os.execve(program, [program, *arguments], support.home().environment())
+    shown = b""
+    with contextlib.suppress(OSError):  # the end of the terminal
+        while question not in shown:
+            shown += os.read(terminal, 4096)
+        os.write(terminal, answer)
+        while True:
+            shown += os.read(terminal, 4096)
+    _, status = os.waitpid(pid, 0)
+    os.close(terminal)
+    return shown.decode(), os.waitstatus_to_exitcode(status)
 
 
 class SignalTest(unittest.TestCase):
@@ -92,6 +112,16 @@ class SignalTest(unittest.TestCase):
                 self.assertLess(finished.seconds, PROMPT, finished)
                 summary = finished.records("summary")
                 self.assertEqual([(s["received"], s["exit_status"]) for s in summary], [(1, status)])
+
+    def test_while_a_question_waits(self):
+        """Ctrl-C at a question on a terminal: nothing is changed, and the status says why."""
+        with support.Running("simulate", "doga-bm") as tool:
+            url = tool.line()
+            arguments = ["do", url, "select-preset=2", "--profile", "doga-bm", "--accept-unverified"]
+            shown, status = ask_on_terminal(arguments, b"Go on? [y/N]", b"\x03")
+            self.assertEqual(status, 130, shown)
+            reading = support.run("get", url, "--profile", "doga-bm", "status.preset", "--json")
+            self.assertEqual(reading.records()[0]["value"], 1)
 
     def test_simulate(self):
         for number, status in SIGNALS:

@@ -188,7 +188,14 @@ class ResultTest(RemoteStartTest):
 
 class EndingTest(RemoteStartTest):
     def test_signals(self):
-        endings = ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 143), (signal.SIGQUIT, 143))
+        # Ctrl-Z too: a suspended program would stop no motor.
+        endings = (
+            (signal.SIGINT, 130),
+            (signal.SIGTERM, 143),
+            (signal.SIGHUP, 143),
+            (signal.SIGQUIT, 143),
+            (signal.SIGTSTP, 130),
+        )
         for number, status in endings:
             for form in ("--json", "--verbose"):
                 with self.subTest(number, form=form), Station(**SLOW) as station:

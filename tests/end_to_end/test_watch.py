@@ -235,7 +235,7 @@ class EndingTest(unittest.TestCase):
             running.send_signal(signal.SIGINT)
             finished = running.finish()
             self.assertEqual(finished.status, 130, finished)
-            self.assertIn("1 events, 0 OK, 1 NG", finished.stderr)
+            self.assertIn("1 event, 0 OK, 1 NG", finished.stderr)
             self.assertNotIn("\x1b", finished.stdout)
 
     def test_second_signal_ends_at_once(self):

@@ -113,6 +113,18 @@ TEST_CASE("signals: several at once are one wish") {
   CHECK(status == 0);
 }
 
+TEST_CASE("signals: Ctrl-Z suspends, until somebody refuses it") {
+  const int status = status_of_child([] {
+    posix::SignalWatch watch;
+    if (handler_of(SIGTSTP) != SIG_DFL) ::_exit(1);
+    watch.refuse_suspension();
+    ::raise(SIGTSTP);
+    if (watch.interrupt().error().code != Errc::interrupted) ::_exit(2);
+  });
+  CHECK(status == 0);
+  CHECK((handler_of(SIGTSTP) == SIG_DFL));
+}
+
 TEST_CASE("signals: what nohup ignores stays ignored") {
   const int status = status_of_child([] {
     ::signal(SIGHUP, SIG_IGN);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -28,6 +29,9 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& ca
 /// Reads decimal digits, or hexadecimal ones behind "0x", completely. Empty when anything else is
 /// there or the number is above `maximum`. A leading zero ("010") is decimal ten, never octal.
 std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t maximum);
+
+/// "1 event", "2 events", "0 events".
+std::string counted(std::size_t count, std::string_view noun);
 
 std::vector<std::string_view> split(std::string_view text, char separator);
 

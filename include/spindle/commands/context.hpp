@@ -40,6 +40,9 @@ struct Calm {
   Clock& clock;
   const Interrupt& interrupt;  ///< never raised
   device::OpenTransport open;
+  /// From now on a request to suspend the program (Ctrl-Z) ends it as Ctrl-C does: a suspended
+  /// program stops no motor. May be empty.
+  std::function<void()> refuse_suspension = {};
 };
 
 /// Everything a command may touch.
@@ -54,11 +57,11 @@ struct Context {
   const files::ProfileStore& profiles;
   const files::Tools& tools;
   report::Renderer& renderer;
-  const CommonOptions& common;
+  CommonOptions common;
 };
 
-/// The same context with a clock and lines that signals do not end, and with other options.
-Context calm_context(const Context& context, const CommonOptions& common);
+/// The same context with a clock and lines that signals do not end.
+Context calm_context(const Context& context);
 
 /// How a command that handled several things ended.
 class Outcome {

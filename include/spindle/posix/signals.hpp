@@ -22,6 +22,9 @@ class SignalWatch {
   /// Ends every wait, as a signal would. May be called from any thread.
   void end_waits();
 
+  /// From now on SIGTSTP (Ctrl-Z) raises the interrupt as SIGINT does, instead of suspending.
+  void refuse_suspension();
+
  private:
   struct Previous;
 
