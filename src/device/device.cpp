@@ -392,7 +392,7 @@ Result<std::uint16_t> Device::event_number() {
   });
 }
 
-Result<Registers> Device::last_event() {
+Result<std::optional<Registers>> Device::last_event() {
   const catalogue::EventFacts& events = *profile_->events;
   const auto table = event_table(events);
   const auto all_but_one = static_cast<std::uint16_t>(events.count - 1);
@@ -402,18 +402,16 @@ Result<Registers> Device::last_event() {
   const std::size_t number_at = number->address.value - events.first;
   for (int attempt = 0; attempt < max_event_reads; ++attempt) {
     auto block = read_raw({table, events.first, all_but_one});
-    if (!block) return block;
+    if (!block) return tl::unexpected(std::move(block.error()));
     const auto tail = read_raw({table, last, 1});
-    if (!tail) return tail;
+    if (!tail) return tl::unexpected(tail.error());
     const auto again = event_number();
     if (!again) return tl::unexpected(again.error());
     if (*again != (*block)[number_at]) continue;
     block->push_back(tail->front());
-    return block;
+    return std::move(*block);
   }
-  return tl::unexpected(Error{.code = Errc::no_answer,
-                              .message = "events come faster than the last one can be read",
-                              .target = target_});
+  return std::nullopt;
 }
 
 Result<Duration> Device::ping() {

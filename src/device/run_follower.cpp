@@ -113,7 +113,8 @@ Result<std::optional<EventNews>> RunFollower::next_result(TimePoint until) {
 Result<std::optional<EventNews>> RunFollower::fetch_result() {
   auto block = device_->last_event();
   if (!block) return tl::unexpected(std::move(block.error()));
-  return sift({EventSource::catch_up, std::move(*block), clock_->wall()});
+  if (!*block) return std::nullopt;
+  return sift({EventSource::catch_up, std::move(**block), clock_->wall()});
 }
 
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:

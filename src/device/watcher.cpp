@@ -205,7 +205,7 @@ Result<void> Watcher::begin() {
     if (!armed) return armed;
     arm_due_ = now + with_margin(profile_->events->arm_every);
   }
-  return fetch_last(EventSource::catch_up);
+  return fetch_last(EventSource::catch_up).map([](Fetched) {});
 }
 
 // ---- serving ----
@@ -235,8 +235,9 @@ Result<void> Watcher::run_due() {
   const TimePoint now = clock_->now();
   if (plan_.events == EventMode::push && now >= arm_due_) {
     arm_due_ = now + with_margin(profile_->events->arm_every);
-    auto armed = ask_twice([&] { return link_->device.switch_events(EventOutput::on); });
-    if (!armed) return armed;
+    if (auto armed = ask([&] { return link_->device.switch_events(EventOutput::on); }); !armed) {
+      return armed;
+    }
   }
   if (profile_->link.keep_alive > Duration::zero() && now >= keep_alive_due_) {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
@@ -248,9 +249,19 @@ Result<void> Watcher::run_due() {
 }
 
 Result<void> Watcher::keep_alive() {
-  return ask_twice([&] { return link_->device.ping().map([](Duration) {}); }).map([&] {
+  return ask([&] { return link_->device.ping().map([](Duration) {}); }).map([&] {
     served_ = true;
   });
+}
+
+/// Asks while events are told as they come: a tool that is slow to answer must not hold them up.
+Result<void> Watcher::ask(const std::function<Result<void>()>& request) {
+  hear_waiting();
+  link::Session& session = link_->device.session();
+  session.set_hearer([this](const link::Spontaneous& frame) { hear(frame); });
+  auto answered = ask_twice(request);
+  session.set_hearer({});
+  return answered;
 }
 
 Result<void> Watcher::poll() {
@@ -258,10 +269,21 @@ Result<void> Watcher::poll() {
     const auto number = link_->device.event_number();
     if (!number) return tl::unexpected(number.error());
     if (*number != tracker_.last()) {
-      if (auto fetched = fetch_last(EventSource::poll); !fetched) return fetched;
+      if (auto fetched = fetch_polled(*number); !fetched) return fetched;
     }
   }
   return plan_.values.empty() ? Result<void>() : poll_values();
+}
+
+/// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
+Result<void> Watcher::fetch_polled(std::uint16_t number) {
+  const auto fetched = fetch_last(EventSource::poll);
+  if (!fetched) return tl::unexpected(fetched.error());
+  if (*fetched == Fetched::yes) return {};
+  const auto missed = static_cast<std::uint16_t>(number - tracker_.last().value_or(number));
+  tracker_.set_baseline(number);
+  tell(GapNews{missed, "events came faster than they could be read"});
+  return {};
 }
 
 Result<void> Watcher::poll_values() {
@@ -290,27 +312,27 @@ void Watcher::tell_reading(std::size_t index, Reading& reading) {
 
 /// Events may have been pushed while the last one was fetched: it is told in its place among them,
 /// and only if it is not one of them.
-Result<void> Watcher::fetch_last(EventSource source) {
+Result<Watcher::Fetched> Watcher::fetch_last(EventSource source) {
   const auto block = link_->device.last_event();
   const WallTime fetched = clock_->wall();
   const auto pushed = take_waiting();
   const auto block_of = [](const link::Spontaneous& frame) {
     return modbus::registers_of(frame.pdu);
   };
+  const bool read = block && *block;
   const bool needed =
-      block && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
-        return number_of(block_of(frame)) == number_of(*block);
+      read && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
+        return number_of(block_of(frame)) == number_of(**block);
       });
   auto next = pushed.begin();
   for (; needed && next != pushed.end(); ++next) {
-    if (!is_before(number_of(block_of(*next)), number_of(*block))) break;
+    if (!is_before(number_of(block_of(*next)), number_of(**block))) break;
     hear(*next);
   }
-  if (needed) judge(source, *block, fetched);
+  if (needed) judge(source, **block, fetched);
   for (; next != pushed.end(); ++next) hear(*next);
-  // A tool whose events come faster than the last one can be fetched has pushed them meanwhile.
-  if (block || (!pushed.empty() && block.error().code == Errc::no_answer)) return {};
-  return tl::unexpected(block.error());
+  if (!block) return tl::unexpected(block.error());
+  return read ? Fetched::yes : Fetched::too_fast;
 }
 
 /// What was pushed and not heard yet, without waiting.

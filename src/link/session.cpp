@@ -251,11 +251,13 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
 
 void Session::keep(const modbus::Pdu& pdu) {
   ++counters_.spontaneous;
+  Spontaneous frame{.pdu = pdu, .arrival = clock_->now(), .wall = clock_->wall()};
+  if (hear_) return hear_(frame);
   if (queue_.size() == max_queued) {
     queue_.pop_front();
     ++counters_.overflowed;
   }
-  queue_.push_back({.pdu = pdu, .arrival = clock_->now(), .wall = clock_->wall()});
+  queue_.push_back(std::move(frame));
 }
 
 /// RTU: returns when the line was silent for the gap. What arrives meanwhile answers nothing.

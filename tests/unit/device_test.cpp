@@ -451,8 +451,9 @@ TEST_CASE("the whole last event is read without a frame that looks like a pushed
   Bench bench;
   const auto event = bench.device().last_event();
   REQUIRE(event.has_value());
-  CHECK(event->size() == 14);
-  CHECK(event->front() == 1961);
-  CHECK(event->back() == 402);
+  REQUIRE(event->has_value());
+  CHECK((*event)->size() == 14);
+  CHECK((*event)->front() == 1961);
+  CHECK((*event)->back() == 402);
   for (const Pdu& request : bench.requests) CHECK(get_u16(request.data, 2) != 14);
 }

@@ -112,6 +112,7 @@ class Workshop {
   std::vector<TimePoint> attempts;
   std::vector<Asked> asked;
   std::vector<News> news;
+  std::vector<TimePoint> event_heard;
   std::function<void(const modbus::Pdu&)> on_request = {};  ///< just before the tool gets it
   std::size_t wanted = 1'000'000;                           ///< news, then stop
   unsigned generation = 0;  ///< of connections; older ones are broken
@@ -122,6 +123,7 @@ class Workshop {
   Result<Watcher::Link> open();
   Heed hear(const News& one) {
     news.push_back(one);
+    if (std::holds_alternative<EventNews>(one)) event_heard.push_back(clock.now());
     return news.size() < wanted ? Heed::go_on : Heed::stop;
   }
 };
@@ -449,6 +451,44 @@ TEST_CASE("without reconnection the first trouble ends it") {
     CHECK(shop.news.empty());
   }
   CHECK(shop.attempts.size() == 1);
+}
+
+TEST_CASE("an event is told at once, however long a keep-alive goes without an answer") {
+  Workshop shop;
+  shop.faults = {sim::parse_fault("lost@every:3").value()};
+  std::vector<TimePoint> happened;
+  shop.on_request = [&](const modbus::Pdu& request) {
+    if (request.function != report_server_id || shop.asked.size() < 6) return;
+    happened.push_back(shop.clock.now());
+    shop.happen();
+  };
+  REQUIRE(shop.watch(20s));
+  const auto told = shop.told<EventNews>();
+  REQUIRE(told.size() > 10);
+  REQUIRE(shop.event_heard.size() <= happened.size());
+  for (std::size_t at = 0; at < shop.event_heard.size(); ++at) {
+    CHECK(shop.event_heard[at] - happened[at] < 10ms);
+  }
+}
+
+TEST_CASE("a counter that runs away from whoever polls it is told as it was seen") {
+  Workshop shop;
+  shop.plan.events = EventMode::poll;
+  std::uint16_t last = 0;
+  shop.on_request = [&](const modbus::Pdu& request) {
+    if (request.function != read_input) return;
+    shop.happen();
+    last = static_cast<std::uint16_t>(last + 1);
+  };
+  REQUIRE(shop.watch(3s));
+  CHECK(shop.told<LinkNews>().size() == 1);
+  std::uint32_t missed = 0;
+  for (const GapNews& gap : shop.told<GapNews>()) {
+    CHECK(gap.reason == "events came faster than they could be read");
+    missed += gap.missed.value_or(0);
+  }
+  CHECK(missed > 10);
+  CHECK(missed <= last);
 }
 
 TEST_CASE("polling the counter finds every event and arms nothing") {

@@ -132,8 +132,8 @@ class Device {
 
   /// The whole last event, never in one read (whose answer would look like an event frame): all but
   /// the last register, the last, and the number once more; read anew when an event came in
-  /// between.
-  Result<Registers> last_event();
+  /// between. Empty when events come faster than that.
+  Result<std::optional<Registers>> last_event();
 
   /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
   /// response counts as an answer.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -96,6 +97,8 @@ class Watcher {
   Result<void> run(const Until& until);
 
  private:
+  enum class Fetched : std::uint8_t { yes, too_fast };
+
   Result<void> watch(const Until& until);
   Result<void> connect(const Until& until);
   Result<void> pause(const Until& until);
@@ -106,10 +109,12 @@ class Watcher {
   Result<void> serve(const Until& until);
   Result<void> run_due();
   Result<void> keep_alive();
+  Result<void> ask(const std::function<Result<void>()>& request);
   Result<void> poll();
   Result<void> poll_values();
   void tell_reading(std::size_t index, Reading& reading);
-  Result<void> fetch_last(EventSource source);
+  Result<Fetched> fetch_last(EventSource source);
+  Result<void> fetch_polled(std::uint16_t number);
   std::vector<link::Spontaneous> take_waiting();
   void hear_waiting();
   void hear(const link::Spontaneous& frame);

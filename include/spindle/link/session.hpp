@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -68,6 +69,11 @@ class Session {
   /// The oldest spontaneous frame, waiting for one until the deadline; empty at the deadline.
   Result<std::optional<Spontaneous>> next_spontaneous(TimePoint deadline);
 
+  /// From now on spontaneous frames are told as they come, also while an answer is awaited, instead
+  /// of being kept; an empty function ends that. What was kept before stays. `hear` must not use
+  /// the session.
+  void set_hearer(std::function<void(const Spontaneous&)> hear) { hear_ = std::move(hear); }
+
   /// After this, interrupts no longer end waits on this connection.
   void shield() { transport_->shield(); }
 
@@ -108,6 +114,7 @@ class Session {
   SessionCounters counters_ = {};
   Bytes buffer_ = {};
   std::deque<Spontaneous> queue_ = {};
+  std::function<void(const Spontaneous&)> hear_ = {};
   std::uint16_t next_transaction_ = 0x8000;
   TimePoint last_activity_ = {};
   /// RTU: when no answer to an abandoned request can come any more.

@@ -1,0 +1,270 @@
+#!/usr/bin/env python3
+"""Measures `spindle watch --json` on tools that push events over loopback.
+
+usage: watch.py SPINDLE latency [EVENTS]      from the event's sending to the line in the pipe
+       watch.py SPINDLE throughput [EVENTS]   events as fast as they can be taken
+       watch.py SPINDLE tools [COUNT...]      so many tools, one event per second each
+
+The tools are one process of their own, so that only spindle is measured. The times of `latency` include
+this program's own part: those of a bare relay from a socket to a pipe, seen in the same run, are printed
+beside them."""
+
+import os
+import selectors
+import socket
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+IDENTITY = bytes.fromhex("00010001000308373CDCAA2A")  # model 3204, firmware 2103, serial 1021100074
+NUMBER_REGISTER, ARM_REGISTER = 3200, 4002
+PROFILE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "profiles")
+
+
+def event_block(number):
+    return struct.pack(">14H", number, 1421, 1, 2100, 2127, 235, 1058, 399, 1457, 3, 0, 0, 1, 0)
+
+
+def event_frame(number):
+    return struct.pack(">HHHBBB", 1, 0, 31, 0, 4, 28) + event_block(number)
+
+
+class Tool:
+    """The registers of one tool whose events are made by whoever measures."""
+
+    def __init__(self):
+        self.number = 0
+        self.armed = False
+        self.client = None
+        self.waiting = b""
+
+    def respond(self, function, first, word):
+        if function == 17:
+            return bytes([17, len(IDENTITY)]) + IDENTITY
+        if function == 6:
+            self.armed = self.armed or (first == ARM_REGISTER and word == 1)
+            return struct.pack(">BHH", 6, first, word)
+        block = event_block(self.number)
+        from_here = 2 * (first - NUMBER_REGISTER)
+        return bytes([function, 2 * word]) + block[from_here : from_here + 2 * word]
+
+    def receive(self, data):
+        self.waiting += data
+        answers = b""
+        while len(self.waiting) >= 8:
+            transaction, _, length, unit, function = struct.unpack_from(">HHHBB", self.waiting)
+            if len(self.waiting) < 6 + length:
+                break
+            words = struct.unpack_from(">HH", self.waiting, 8) if length >= 6 else (0, 0)
+            self.waiting = self.waiting[6 + length :]
+            pdu = self.respond(function, *words)
+            answers += struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+        return answers
+
+    def happen(self):
+        self.number = (self.number + 1) % 0x10000
+        return event_frame(self.number)
+
+
+class Tools:
+    """Listens for each tool on a port of its own and serves them all in one thread."""
+
+    def __init__(self, count):
+        self.tools = [Tool() for _ in range(count)]
+        self.selector = selectors.DefaultSelector()
+        self.ports = []
+        for tool in self.tools:
+            listening = socket.create_server(("127.0.0.1", 0))
+            self.ports.append(listening.getsockname()[1])
+            self.selector.register(listening, selectors.EVENT_READ, (tool, True))
+
+    def serve(self, timeout):
+        for key, _ in self.selector.select(timeout):
+            tool, is_listening = key.data
+            if is_listening:
+                client, _ = key.fileobj.accept()
+                client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                tool.client = client
+                self.selector.register(client, selectors.EVENT_READ, (tool, False))
+                continue
+            data = key.fileobj.recv(4096)
+            if not data:
+                self.selector.unregister(key.fileobj)
+                tool.client = None
+                continue
+            answers = tool.receive(data)
+            if answers:
+                key.fileobj.sendall(answers)
+
+    def serve_until(self, condition, limit=30):
+        end = time.monotonic() + limit
+        while not condition():
+            if time.monotonic() > end:
+                sys.exit("watch.py: the watch did not come so far in time")
+            self.serve(0.05)
+
+    @property
+    def armed(self):
+        return all(tool.armed for tool in self.tools)
+
+    def urls(self):
+        return [f"tcp://127.0.0.1:{port}" for port in self.ports]
+
+
+def start(spindle, urls, *options, stdout):
+    arguments = [spindle, "watch", *urls, "--profile", "doga-bm", "--json", *options]
+    environment = dict(os.environ, SPINDLE_PROFILE_PATH=PROFILE)
+    return subprocess.Popen(arguments, stdout=stdout, stderr=subprocess.DEVNULL, env=environment)
+
+
+def percentile(values, share):
+    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+def show(name, times):
+    in_ms = [value * 1e3 for value in times]
+    print(
+        f"{name:<8} median {statistics.median(in_ms):.3f} ms   "
+        f"99 % {percentile(in_ms, 0.99):.3f} ms   longest {max(in_ms):.3f} ms"
+    )
+
+
+def relay_latency(events):
+    """What a relay costs that does nothing: the same machine, the same measuring."""
+    listening = socket.create_server(("127.0.0.1", 0))
+    port = listening.getsockname()[1]
+    relay = subprocess.Popen(
+        ["socat", "-u", f"TCP:127.0.0.1:{port}", "STDOUT"], stdout=subprocess.PIPE
+    )
+    client, _ = listening.accept()
+    client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    times = []
+    for number in range(events):
+        time.sleep(0.003)
+        frame = event_frame(number % 0x10000)
+        began = time.perf_counter()
+        client.sendall(frame)
+        os.read(relay.stdout.fileno(), 4096)
+        times.append(time.perf_counter() - began)
+    client.close()
+    relay.wait()
+    return times
+
+
+def latency(spindle, events=2000):
+    tools = Tools(1)
+    tool = tools.tools[0]
+    process = start(spindle, tools.urls(), stdout=subprocess.PIPE)
+    tools.serve_until(lambda: tools.armed)
+    output = process.stdout.fileno()
+    os.read(output, 65536)  # the link record
+    settled = time.monotonic() + 0.3
+    tools.serve_until(lambda: time.monotonic() > settled)
+    times = []
+    for _ in range(events):
+        tools.serve(0.003)
+        frame = tool.happen()
+        began = time.perf_counter()
+        tool.client.sendall(frame)
+        line = os.read(output, 65536)
+        times.append(time.perf_counter() - began)
+        if b'"number":%d,' % tool.number not in line:
+            sys.exit(f"watch.py: not the event that was sent: {line!r}")
+    process.terminate()
+    tools.serve_until(lambda: process.poll() is not None)
+    show("relay", relay_latency(events))
+    show("spindle", times)
+
+
+def throughput(spindle, events=200_000):
+    tools = Tools(1)
+    tool = tools.tools[0]
+    with tempfile.TemporaryFile() as output:
+        process = start(spindle, tools.urls(), "--count", str(events), stdout=output)
+        tools.serve_until(lambda: tools.armed)
+        frames = b"".join(tool.happen() for _ in range(events))
+
+        def send():
+            # Whoever has all its events says farewell, which nobody reads here.
+            try:
+                tool.client.sendall(frames)
+            except OSError:
+                pass
+
+        began = time.perf_counter()
+        sender = threading.Thread(target=send)
+        sender.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        seconds = time.perf_counter() - began
+        sender.join()
+        output.seek(0)
+        lines = sum(1 for line in output if b'"type":"event"' in line)
+    cpu = usage.ru_utime + usage.ru_stime
+    print(
+        f"{lines} events in {seconds:.2f} s: {lines / seconds:,.0f} per second; "
+        f"{cpu:.2f} s of processor time: {lines / cpu:,.0f} per second of one core; status {status >> 8}"
+    )
+
+
+def processor_seconds(pid):
+    with open(f"/proc/{pid}/stat", encoding="ascii") as stat:
+        fields = stat.read().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def memory_mib(pid):
+    with open(f"/proc/{pid}/status", encoding="ascii") as status:
+        peak = next(line for line in status if line.startswith("VmHWM"))
+    return int(peak.split()[1]) / 1024
+
+
+def many(spindle, count, seconds=20):
+    tools = Tools(count)
+    with tempfile.TemporaryFile() as output:
+        process = start(spindle, tools.urls(), stdout=output)
+        tools.serve_until(lambda: tools.armed)
+        used, began = processor_seconds(process.pid), time.monotonic()
+        sent = 0
+        while (elapsed := time.monotonic() - began) < seconds:
+            while sent < elapsed * count:  # evenly, one after another
+                tool = tools.tools[sent % count]
+                tool.client.sendall(tool.happen())
+                sent += 1
+            tools.serve(min(0.01, 1 / count))
+        used = processor_seconds(process.pid) - used
+        settled = time.monotonic() + 1
+        tools.serve_until(lambda: time.monotonic() > settled)
+        peak = memory_mib(process.pid)
+        process.terminate()
+        tools.serve_until(lambda: process.poll() is not None)
+        output.seek(0)
+        lines = output.read().splitlines()
+    told = sum(1 for line in lines if b'"type":"event"' in line)
+    gaps = sum(1 for line in lines if b'"type":"gap"' in line)
+    lost = sum(1 for line in lines if b'"lost"' in line)
+    print(
+        f"{count:4} tools: {100 * used / seconds:5.1f} % of a core, {peak:6.1f} MiB; "
+        f"{told} of {sent} events told, {gaps} gaps, {lost} links lost"
+    )
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    spindle, what, numbers = sys.argv[1], sys.argv[2], [int(text) for text in sys.argv[3:]]
+    if what == "latency":
+        latency(spindle, *numbers)
+    elif what == "throughput":
+        throughput(spindle, *numbers)
+    elif what == "tools":
+        for count in numbers or (1, 50, 100, 250, 500):
+            many(spindle, count)
+    else:
+        sys.exit(__doc__)
+
+
+main()
