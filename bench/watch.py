@@ -17,7 +17,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 
 IDENTITY = bytes.fromhex("00010001000308373CDCAA2A")  # model 3204, firmware 2103, serial 1021100074
@@ -107,9 +106,11 @@ class Tools:
                 sys.exit("watch.py: the watch did not come so far in time")
             self.serve(0.05)
 
-    @property
-    def armed(self):
-        return all(tool.armed for tool in self.tools)
+    def settle(self):
+        """Until all are armed, and their last events read."""
+        self.serve_until(lambda: all(tool.armed for tool in self.tools))
+        settled = time.monotonic() + 0.5
+        self.serve_until(lambda: time.monotonic() > settled)
 
     def urls(self):
         return [f"tcp://127.0.0.1:{port}" for port in self.ports]
@@ -159,11 +160,9 @@ def latency(spindle, events=2000):
     tools = Tools(1)
     tool = tools.tools[0]
     process = start(spindle, tools.urls(), stdout=subprocess.PIPE)
-    tools.serve_until(lambda: tools.armed)
+    tools.settle()
     output = process.stdout.fileno()
     os.read(output, 65536)  # the link record
-    settled = time.monotonic() + 0.3
-    tools.serve_until(lambda: time.monotonic() > settled)
     times = []
     for _ in range(events):
         tools.serve(0.003)
@@ -183,24 +182,21 @@ def latency(spindle, events=2000):
 def throughput(spindle, events=200_000):
     tools = Tools(1)
     tool = tools.tools[0]
+    chunk = 64
     with tempfile.TemporaryFile() as output:
-        process = start(spindle, tools.urls(), "--count", str(events), stdout=output)
-        tools.serve_until(lambda: tools.armed)
-        frames = b"".join(tool.happen() for _ in range(events))
-
-        def send():
-            # Whoever has all its events says farewell, which nobody reads here.
-            try:
-                tool.client.sendall(frames)
-            except OSError:
-                pass
-
+        process = start(spindle, tools.urls(), "--count", str(events // chunk * chunk), stdout=output)
+        tools.settle()
+        chunks = []
+        for _ in range(events // chunk):
+            chunks.append((b"".join(tool.happen() for _ in range(chunk)), tool.number))
+        tool.number = 0  # what its registers hold is the last event that was sent
         began = time.perf_counter()
-        sender = threading.Thread(target=send)
-        sender.start()
+        for frames, tool.number in chunks:
+            tools.serve(0)
+            tool.client.sendall(frames)
+        tools.serve_until(lambda: tool.client is None)
         _, status, usage = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - began
-        sender.join()
         output.seek(0)
         lines = sum(1 for line in output if b'"type":"event"' in line)
     cpu = usage.ru_utime + usage.ru_stime
@@ -226,7 +222,7 @@ def many(spindle, count, seconds=20):
     tools = Tools(count)
     with tempfile.TemporaryFile() as output:
         process = start(spindle, tools.urls(), stdout=output)
-        tools.serve_until(lambda: tools.armed)
+        tools.settle()
         used, began = processor_seconds(process.pid), time.monotonic()
         sent = 0
         while (elapsed := time.monotonic() - began) < seconds:
