@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "help.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/target.hpp"
@@ -612,6 +613,14 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_profile(app, draft, typed);
 }
 
+void build(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  app.set_help_flag();
+  app.allow_extras();
+  app.require_subcommand(0, 1);
+  add_common_options(app, draft.typed);
+  add_commands(app, draft, typed);
+}
+
 std::vector<std::string> command_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
@@ -698,67 +707,49 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   return {};
 }
 
-/// "-o, --output FORMAT", "    --json", "TARGET".
-std::string names_of(const CLI::Option& known) {
-  if (!known.nonpositional()) return known.get_name(true);
-  const auto& short_names = known.get_snames();
-  std::string names = short_names.empty() ? "    " : fmt::format("-{}, ", short_names.front());
-  names += "--" + known.get_lnames().front();
-  if (known.get_expected_max() > 0) names += " " + known.get_type_name();
-  return names;
-}
-
-std::string option_lines(const CLI::App& app) {
-  std::string text;
-  for (const CLI::Option* known : app.get_options()) {
-    text += fmt::format("  {:<32}{}\n", names_of(*known), known->get_description());
+OptionDescription description_of(const CLI::Option& known) {
+  OptionDescription option{.meaning = known.get_description()};
+  for (const std::string& name : known.get_snames()) option.names.push_back("-" + name);
+  for (const std::string& name : known.get_lnames()) option.names.push_back("--" + name);
+  if (option.names.empty()) {
+    option.names.push_back(known.get_name(true));
+  } else if (known.get_expected_max() > 0) {
+    option.placeholder = known.get_type_name();
   }
-  return text;
+  return option;
 }
 
-std::string indented(std::string_view lines) {
-  std::string text;
-  for (const std::string_view line : split(lines, '\n')) text += fmt::format("  {}\n", line);
-  return text;
+std::vector<OptionDescription> options_of(const CLI::App& app) {
+  std::vector<OptionDescription> options;
+  for (const CLI::Option* known : app.get_options()) options.push_back(description_of(*known));
+  return options;
 }
 
-std::string command_lines(const CLI::App& app) {
-  std::string text;
+std::vector<CommandDescription> commands_of(const CLI::App& app, const Draft& draft) {
+  std::vector<CommandDescription> commands;
   for (const CLI::App* command : app.get_subcommands({})) {
-    text += fmt::format("  {:<12}  {}\n", command->get_name(), command->get_description());
+    const Words& words = draft.words.at(command);
+    CommandDescription described{.name = path_of(command),
+                                 .synopsis = std::string(words.synopsis),
+                                 .meaning = std::string(words.meaning),
+                                 .options = options_of(*command),
+                                 .commands = commands_of(*command, draft)};
+    for (const auto example : split(words.examples, '\n')) described.examples.emplace_back(example);
+    if (words.appendix != nullptr) described.appendix = words.appendix();
+    commands.push_back(std::move(described));
   }
-  return text;
+  return commands;
 }
 
-std::string program_help(const CLI::App& app) {
-  return fmt::format(
-      "spindle: the operator tool for screwdrivers and motor drivers that speak Modbus\n\n"
-      "Examples:\n{}\nUsage: spindle [OPTIONS] COMMAND [OPTIONS] [TARGET...] [ARGUMENTS]\n\n"
-      "Commands:\n{}\nOptions of every command:\n{}\n"
-      "A target is tcp://HOST[:PORT], sim:PROFILE (a simulated tool), or a name of the tools "
-      "file.\n"
-      "'spindle COMMAND --help' shows examples of a command.\n",
-      indented("spindle identify sim:doga-bm\nspindle get sim:doga-bm 'preset.1.*torque*'\n"
-               "spindle set tcp://192.168.10.23:5000 preset.1.target-torque=2.80"),
-      command_lines(app), option_lines(app));
-}
-
-std::string command_help(const CLI::App& app, const CLI::App* command, const Words& words) {
-  std::string usage_line = fmt::format("spindle {} {}", path_of(command), words.synopsis);
-  if (words.synopsis.empty()) usage_line.pop_back();
-  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: {}\n", words.meaning,
-                                 indented(words.examples), usage_line);
-  const std::string commands = command_lines(*command);
-  const std::string options = option_lines(*command);
-  if (!commands.empty()) text += fmt::format("\nCommands:\n{}", commands);
-  if (!options.empty()) text += fmt::format("\nArguments and options:\n{}", options);
-  if (words.appendix != nullptr) text += "\n" + words.appendix();
-  return text + fmt::format("\nOptions of every command:\n{}", option_lines(app));
+Description description_of(const CLI::App& app, const Draft& draft) {
+  return {.common = options_of(app), .commands = commands_of(app, draft)};
 }
 
 std::string help_of(const CLI::App& app, const Draft& draft) {
-  if (draft.chosen == nullptr) return program_help(app);
-  return command_help(app, draft.chosen, draft.words.at(draft.chosen));
+  const Description description = description_of(app, draft);
+  if (draft.chosen == nullptr) return program_help(description);
+  const CommandDescription* command = find_command(description, path_of(draft.chosen));
+  return command_help(description, *command);
 }
 
 /// What nothing in the grammar takes.
@@ -802,15 +793,19 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
 
 }  // namespace
 
-Result<Invocation> parse(const std::vector<std::string>& arguments) {
+Description describe_grammar() {
   CLI::App app;
-  app.set_help_flag();
-  app.allow_extras();
-  app.require_subcommand(0, 1);
   Draft draft;
   TypedCommands typed;
-  add_common_options(app, draft.typed);
-  add_commands(app, draft, typed);
+  build(app, draft, typed);
+  return description_of(app, draft);
+}
+
+Result<Invocation> parse(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  Draft draft;
+  TypedCommands typed;
+  build(app, draft, typed);
   try {
     auto words = with_one_output_option(arguments);
     std::reverse(words.begin(), words.end());  // as CLI11 wants them

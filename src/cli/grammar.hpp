@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "description.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/report/renderer.hpp"
@@ -27,6 +28,9 @@ struct Invocation {
 
 /// Understands the arguments. Errors are `usage` with a suggestion where there is one.
 Result<Invocation> parse(const std::vector<std::string>& arguments);
+
+/// Everything that can be typed.
+Description describe_grammar();
 
 /// The format that the arguments ask for, as far as that can be seen although they are wrong: so
 /// that even a usage error is told as JSON where JSON was wanted.

@@ -1,0 +1,69 @@
+#include "help.hpp"
+
+#include <fmt/format.h>
+
+namespace spindle::cli {
+namespace {
+
+std::string option_lines(const std::vector<OptionDescription>& options) {
+  std::string text;
+  for (const OptionDescription& option : options) {
+    text += fmt::format("  {:<32}{}\n", names_of(option), option.meaning);
+  }
+  return text;
+}
+
+std::string indented(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += fmt::format("  {}\n", line);
+  return text;
+}
+
+/// By its last word, because the ones before it are in the usage line.
+std::string command_lines(const std::vector<CommandDescription>& commands) {
+  std::string text;
+  for (const CommandDescription& command : commands) {
+    const std::string name = command.name.substr(command.name.rfind(' ') + 1);
+    text += fmt::format("  {:<12}  {}\n", name, command.meaning);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string names_of(const OptionDescription& option) {
+  if (option.is_argument()) return option.names.front();
+  const bool has_short = option.names.size() > 1;
+  std::string names = has_short ? option.names.front() + ", " : "    ";
+  names += option.names.back();
+  return option.is_flag() ? names : names + " " + option.placeholder;
+}
+
+std::string program_help(const Description& description) {
+  return fmt::format(
+      "spindle: the operator tool for screwdrivers and motor drivers that speak Modbus\n\n"
+      "Examples:\n{}\nUsage: spindle [OPTIONS] COMMAND [OPTIONS] [TARGET...] [ARGUMENTS]\n\n"
+      "Commands:\n{}\nOptions of every command:\n{}\n"
+      "A target is tcp://HOST[:PORT], sim:PROFILE (a simulated tool), or a name of the tools "
+      "file.\n"
+      "'spindle COMMAND --help' shows examples of a command.\n",
+      indented({"spindle identify sim:doga-bm", "spindle get sim:doga-bm 'preset.1.*torque*'",
+                "spindle set tcp://192.168.10.23:5000 preset.1.target-torque=2.80"}),
+      command_lines(description.commands), option_lines(description.common));
+}
+
+std::string command_help(const Description& description, const CommandDescription& command) {
+  const std::string space = command.synopsis.empty() ? "" : " ";
+  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: spindle {}{}{}\n", command.meaning,
+                                 indented(command.examples), command.name, space, command.synopsis);
+  if (!command.commands.empty()) {
+    text += fmt::format("\nCommands:\n{}", command_lines(command.commands));
+  }
+  if (!command.options.empty()) {
+    text += fmt::format("\nArguments and options:\n{}", option_lines(command.options));
+  }
+  if (!command.appendix.empty()) text += "\n" + command.appendix;
+  return text + fmt::format("\nOptions of every command:\n{}", option_lines(description.common));
+}
+
+}  // namespace spindle::cli
