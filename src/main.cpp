@@ -16,10 +16,9 @@ int main(int count, char** arguments) {
       .clock = clock,
       .interrupt = signals.interrupt(),
       .open = line_opener(clock, signals.interrupt()),
-      .calm = {calm_clock, calm, line_opener(calm_clock, calm),
-               [&signals] { signals.refuse_suspension(); }},
+      .calm = {calm_clock, calm, line_opener(calm_clock, calm), [&] { signals.stay_awake(); }},
       .serve = tool_server(clock, signals.interrupt()),
-      .end_waits = [&signals] { signals.end_waits(); },
+      .end_waits = [&] { signals.end_waits(); },
       .environment = environment,
       .file_exists = file_exists,
       .program_folder = program_folder()};

@@ -4,11 +4,15 @@
 #include <filesystem>
 #include <utility>
 
+#include "complete.hpp"
 #include "grammar.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::cli {
 namespace {
+
+/// Not a command for people: the completion scripts of the shells use it.
+constexpr std::string_view completion_command = "__complete";
 
 int exit_status(ExitStatus status) { return static_cast<int>(status); }
 
@@ -93,7 +97,22 @@ int tell(const Error& error, World& world, report::Renderer& renderer) {
   return exit_status(error.status());
 }
 
+/// What the shells' completion scripts ask. A broken file must not make a shell noisy.
+int run_completion(const std::vector<std::string>& words, World& world) {
+  const auto typed = parse(words);
+  const auto tools = find_tools(world, typed.value_or(Invocation()));
+  const files::Tools none;
+  const files::ProfileStore profiles(profile_folders(world));
+  const Completion completion =
+      complete(words, describe_grammar(), {tools ? *tools : none, profiles});
+  const auto written = world.io.out(to_text(completion));
+  return exit_status(written ? ExitStatus::ok : written.error().status());
+}
+
 int run_guarded(const std::vector<std::string>& arguments, World& world) {
+  if (!arguments.empty() && arguments.front() == completion_command) {
+    return run_completion({arguments.begin() + 1, arguments.end()}, world);
+  }
   auto invocation = parse(arguments);
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
   const report::Talk talk = invocation ? invocation->talk : report::Talk::normal;

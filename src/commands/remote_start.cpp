@@ -108,7 +108,7 @@ class RemoteRun {
     if (auto prepared = follower.prepare(); !prepared) {
       return tl::unexpected(std::move(prepared.error()));
     }
-    if (context_->calm.refuse_suspension) context_->calm.refuse_suspension();
+    if (context_->calm.stay_awake) context_->calm.stay_awake();
     device::RunGuard guard(tool_->device, plan_->start, reopener(), context_->calm.clock);
     const device::FollowOptions following = limit_run();
     auto followed = guard.start().and_then([&] { return follower.follow(following); });

@@ -100,7 +100,7 @@ SignalWatch::~SignalWatch() {
   ::close(interrupt_.descriptor());
 }
 
-void SignalWatch::refuse_suspension() {
+void SignalWatch::stay_awake() {
   const struct sigaction action = action_for(SIGTSTP);
   ::sigaction(SIGTSTP, &action, nullptr);
 }

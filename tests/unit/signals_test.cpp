@@ -117,7 +117,7 @@ TEST_CASE("signals: Ctrl-Z suspends, until somebody refuses it") {
   const int status = status_of_child([] {
     posix::SignalWatch watch;
     if (handler_of(SIGTSTP) != SIG_DFL) ::_exit(1);
-    watch.refuse_suspension();
+    watch.stay_awake();
     ::raise(SIGTSTP);
     if (watch.interrupt().error().code != Errc::interrupted) ::_exit(2);
   });

@@ -42,7 +42,7 @@ struct Calm {
   device::OpenTransport open;
   /// From now on a request to suspend the program (Ctrl-Z) ends it as Ctrl-C does: a suspended
   /// program stops no motor. May be empty.
-  std::function<void()> refuse_suspension = {};
+  std::function<void()> stay_awake = {};
 };
 
 /// Everything a command may touch.

@@ -23,7 +23,7 @@ class SignalWatch {
   void end_waits();
 
   /// From now on SIGTSTP (Ctrl-Z) raises the interrupt as SIGINT does, instead of suspending.
-  void refuse_suspension();
+  void stay_awake();
 
  private:
   struct Previous;

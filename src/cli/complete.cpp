@@ -1,0 +1,356 @@
+#include "complete.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "spindle/link/endpoint.hpp"
+#include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/outage.hpp"
+
+namespace spindle::cli {
+namespace {
+
+/// More names than this are offered head by head, as folders are.
+constexpr std::size_t many_names = 40;
+
+using catalogue::Parameter;
+using catalogue::Profile;
+
+/// An argument in a command's synopsis.
+struct Slot {
+  std::string name;  ///< "TARGET", "NAME=VALUE"
+  bool is_optional = false;
+  bool repeats = false;
+};
+
+/// "TARGET... [NAME|PATTERN...] [--count N]" has two; bracketed options are none.
+std::vector<Slot> slots_of(std::string_view synopsis) {
+  std::vector<Slot> slots;
+  while (!synopsis.empty()) {
+    const bool is_optional = synopsis.front() == '[';
+    std::size_t depth = 0;
+    std::size_t end = 0;
+    for (; end < synopsis.size() && (depth > 0 || synopsis[end] != ' '); ++end) {
+      if (synopsis[end] == '[') ++depth;
+      if (synopsis[end] == ']') --depth;
+    }
+    std::string_view word = synopsis.substr(0, end);
+    synopsis.remove_prefix(std::min(end + 1, synopsis.size()));
+    if (is_optional) word = word.substr(1, word.size() - 2);
+    const bool repeats = word.ends_with("...");
+    if (repeats) word.remove_suffix(3);
+    if (!word.starts_with('-')) slots.push_back({std::string(word), is_optional, repeats});
+  }
+  return slots;
+}
+
+/// Slots in which the argument behind `given` others may stand.
+std::vector<Slot> possible_slots(const std::vector<Slot>& slots, std::size_t given) {
+  std::set<std::size_t> places = {0};
+  const auto pass_optional = [&] {
+    for (std::size_t at = 0; at < slots.size(); ++at) {
+      if (places.contains(at) && slots[at].is_optional) places.insert(at + 1);
+    }
+  };
+  pass_optional();
+  for (std::size_t argument = 0; argument < given; ++argument) {
+    std::set<std::size_t> next;
+    for (const std::size_t at : places) {
+      if (at < slots.size() && slots[at].repeats) next.insert(at);
+      if (at < slots.size()) next.insert(at + 1);
+    }
+    places = std::move(next);
+    pass_optional();
+  }
+  std::vector<Slot> possible;
+  for (const std::size_t at : places) {
+    if (at < slots.size()) possible.push_back(slots[at]);
+  }
+  return possible;
+}
+
+/// What the words before the last one say.
+struct Typed {
+  const CommandDescription* command = nullptr;
+  std::vector<std::string> arguments = {};
+  const OptionDescription* awaits_value = nullptr;
+  std::string profile = {};  ///< of --profile
+  bool options_ended = false;
+};
+
+class Completer {
+ public:
+  Completer(const Description& description, const Nameable& nameable)
+      : description_(&description), nameable_(&nameable) {}
+
+  Completion run(const std::vector<std::string>& words) {
+    for (std::size_t at = 0; at + 1 < words.size(); ++at) read(words[at]);
+    const std::string word = words.empty() ? std::string() : words.back();
+    offer(word);
+    std::erase_if(found_.candidates,
+                  [&](const Candidate& candidate) { return !candidate.text.starts_with(word); });
+    return std::move(found_);
+  }
+
+ private:
+  // ---- the words before ----
+
+  void read(const std::string& word) {
+    if (typed_.awaits_value != nullptr) {
+      note_value(*std::exchange(typed_.awaits_value, nullptr), word);
+    } else if (word == "--" && !typed_.options_ended) {
+      typed_.options_ended = true;
+    } else if (word.size() > 1 && word.front() == '-' && !typed_.options_ended) {
+      read_option(word);
+    } else if (const CommandDescription* command = find_command_below(word)) {
+      typed_.command = command;
+    } else {
+      typed_.arguments.push_back(word);
+    }
+  }
+
+  void read_option(const std::string& word) {
+    const std::size_t equals = word.find('=');
+    const OptionDescription* option = find_option(word.substr(0, equals));
+    if (option == nullptr || option->is_flag()) return;
+    if (equals == std::string::npos) {
+      typed_.awaits_value = option;
+    } else {
+      note_value(*option, word.substr(equals + 1));
+    }
+  }
+
+  void note_value(const OptionDescription& option, const std::string& value) {
+    if (option.names.back() == "--profile") typed_.profile = value;
+  }
+
+  [[nodiscard]] const CommandDescription* find_command_below(const std::string& word) const {
+    if (!typed_.arguments.empty()) return nullptr;
+    if (typed_.command == nullptr) return find_command(*description_, word);
+    if (typed_.command->commands.empty()) return nullptr;
+    return find_command(*description_, typed_.command->name + " " + word);
+  }
+
+  [[nodiscard]] const OptionDescription* find_option(std::string_view name) const {
+    for (const auto* options : option_lists()) {
+      for (const OptionDescription& option : *options) {
+        const auto& names = option.names;
+        if (std::find(names.begin(), names.end(), name) != names.end()) return &option;
+      }
+    }
+    return nullptr;
+  }
+
+  [[nodiscard]] std::vector<const std::vector<OptionDescription>*> option_lists() const {
+    std::vector<const std::vector<OptionDescription>*> lists = {&description_->common};
+    if (typed_.command != nullptr) lists.insert(lists.begin(), &typed_.command->options);
+    return lists;
+  }
+
+  // ---- the last word ----
+
+  void offer(const std::string& word) {
+    const std::size_t equals = word.find('=');
+    if (typed_.awaits_value != nullptr) return offer_value(*typed_.awaits_value, "");
+    if (word.starts_with('-') && !typed_.options_ended) {
+      if (equals == std::string::npos) return offer_options();
+      const OptionDescription* option = find_option(word.substr(0, equals));
+      if (option != nullptr) offer_value(*option, word.substr(0, equals + 1));
+      return;
+    }
+    if (typed_.command == nullptr) return offer_commands(description_->commands);
+    if (!typed_.command->commands.empty()) return offer_commands(typed_.command->commands);
+    for (const Slot& slot :
+         possible_slots(slots_of(typed_.command->synopsis), typed_.arguments.size())) {
+      offer_argument(slot, word);
+    }
+  }
+
+  void offer_options() {
+    for (const auto* options : option_lists()) {
+      for (const OptionDescription& option : *options) {
+        if (!option.is_argument()) add(option.names.back(), option.meaning);
+      }
+    }
+  }
+
+  void offer_commands(const std::vector<CommandDescription>& commands) {
+    for (const CommandDescription& command : commands) {
+      add(command.name.substr(command.name.rfind(' ') + 1), command.meaning);
+    }
+  }
+
+  void offer_value(const OptionDescription& option, const std::string& before) {
+    const std::string& kind = option.placeholder;
+    std::vector<Candidate> values;
+    if (kind == "FORMAT") values = {{"table", ""}, {"json", ""}, {"csv", ""}};
+    if (kind == "WHEN") values = {{"auto", ""}, {"always", ""}, {"never", ""}};
+    if (kind == "NAME|FILE") values = profiles();
+    if (kind == "FAULT") values = faults();
+    if (kind == "OUTAGE") values = outages();
+    if (kind.find("FILE") != std::string::npos) found_.paths = Paths::files;
+    if (kind == "FOLDER" || kind == "DIR") found_.paths = Paths::folders;
+    for (const Candidate& value : values) add(before + value.text, value.meaning);
+  }
+
+  void offer_argument(const Slot& slot, const std::string& word) {
+    const bool is_side = slot.name == "A" || slot.name == "B";  // of a comparison
+    if (slot.name == "TARGET" || slot.name == "BUS" || is_side) offer_targets(word);
+    if (is_side) add("defaults", "what the profile says");
+    if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
+    if (slot.name == "PROFILE") {
+      for (const Candidate& profile : profiles()) add(profile.text, profile.meaning);
+      if (typed_.command->name.starts_with("profile")) found_.paths = Paths::files;
+    }
+    const bool is_name = slot.name == "PATTERN" || slot.name.starts_with("NAME");
+    const bool is_action = slot.name.starts_with("ACTION");
+    if (!is_name && !is_action) return;
+    const auto profile = profile_of_target();
+    if (!profile) return;
+    if (is_action) return offer_actions(*profile, word);
+    if (slot.name == "NAME=VALUE") return offer_assignments(*profile, word);
+    offer_names(names_of(*profile), word);
+  }
+
+  void offer_targets(const std::string& word) {
+    for (const files::Tool& tool : nameable_->tools.tools) add(tool.name, tool.url);
+    for (const auto& [group, members] : nameable_->tools.groups) {
+      add("@" + group, fmt::format("{} tools", members.size()));
+    }
+    if (!word.starts_with("sim:")) return add("sim:", "a simulated tool");
+    for (const Candidate& profile : profiles()) add("sim:" + profile.text, "a simulated tool");
+  }
+
+  /// Labels behind "NAME=", else the names that can be set.
+  void offer_assignments(const Profile& profile, const std::string& word) {
+    const std::size_t equals = word.find('=');
+    if (equals == std::string::npos) {
+      std::vector<Candidate> names;
+      for (const Parameter& parameter : profile.parameters) {
+        if (parameter.access == catalogue::Access::read_only) continue;
+        names.push_back({parameter.name + "=", parameter.title});
+      }
+      return offer_names(std::move(names), word);
+    }
+    const auto parameter = profile.find(word.substr(0, equals));
+    if (parameter) offer_labels(parameter->labels, word.substr(0, equals + 1));
+  }
+
+  void offer_actions(const Profile& profile, const std::string& word) {
+    const std::size_t equals = word.find('=');
+    for (const catalogue::Action& action : profile.actions) {
+      const bool takes_value = !action.value;
+      if (equals == std::string::npos) {
+        add(action.name + (takes_value ? "=" : ""), action.title);
+      } else if (action.name == word.substr(0, equals)) {
+        offer_labels(action.labels, word.substr(0, equals + 1));
+      }
+    }
+  }
+
+  void offer_labels(const std::vector<catalogue::Label>& labels, const std::string& before) {
+    for (const catalogue::Label& label : labels) {
+      add(before + label.text, std::to_string(label.number));
+    }
+  }
+
+  static std::vector<Candidate> names_of(const Profile& profile) {
+    std::vector<Candidate> names;
+    names.reserve(profile.parameters.size());
+    for (const Parameter& parameter : profile.parameters) {
+      names.push_back({parameter.name, parameter.title});
+    }
+    return names;
+  }
+
+  /// "preset." rather than hundreds of names that begin with it.
+  void offer_names(std::vector<Candidate> names, const std::string& word) {
+    std::erase_if(names, [&](const Candidate& name) { return !name.text.starts_with(word); });
+    if (names.size() > many_names) {
+      std::vector<Candidate> heads;
+      for (Candidate& name : names) {
+        const std::size_t dot = name.text.find('.', word.size());
+        if (dot != std::string::npos) name = {name.text.substr(0, dot + 1), ""};
+        const bool is_known = !heads.empty() && heads.back().text == name.text;
+        if (!is_known) heads.push_back(std::move(name));
+      }
+      names = std::move(heads);
+    }
+    for (Candidate& name : names) add(std::move(name.text), std::move(name.meaning));
+  }
+
+  [[nodiscard]] std::vector<Candidate> profiles() const {
+    std::vector<Candidate> names;
+    for (const files::ProfileEntry& entry : nameable_->profiles.list()) {
+      names.push_back({entry.id, entry.path});
+    }
+    return names;
+  }
+
+  static std::vector<Candidate> faults() {
+    std::vector<Candidate> kinds;
+    for (const sim::FaultHelp& fault : sim::fault_help()) {
+      kinds.push_back({std::string(sim::to_text(fault.kind)), std::string(fault.meaning)});
+    }
+    return kinds;
+  }
+
+  static std::vector<Candidate> outages() {
+    std::vector<Candidate> kinds;
+    for (const sim::OutageHelp& outage : sim::outage_help()) {
+      const std::string kind = outage.syntax.substr(0, outage.syntax.find('=') + 1);
+      kinds.push_back({kind, std::string(outage.meaning)});
+    }
+    return kinds;
+  }
+
+  /// By --profile, by the tools file, or because the target is simulated.
+  [[nodiscard]] std::optional<Profile> profile_of_target() const {
+    std::string name = typed_.profile;
+    for (const std::string& argument : typed_.arguments) {
+      if (!name.empty()) break;
+      const auto& tools = nameable_->tools.tools;
+      const auto tool = std::find_if(tools.begin(), tools.end(),
+                                     [&](const files::Tool& one) { return one.name == argument; });
+      if (tool != tools.end()) name = tool->profile;
+      const auto endpoint = link::parse_endpoint(tool == tools.end() ? argument : tool->url);
+      if (name.empty() && endpoint) name = endpoint->profile;
+    }
+    if (name.empty()) return std::nullopt;
+    auto profile = nameable_->profiles.load(name);
+    return profile ? std::optional(std::move(*profile)) : std::nullopt;
+  }
+
+  void add(std::string text, std::string meaning) {
+    found_.candidates.push_back({std::move(text), std::move(meaning)});
+  }
+
+  const Description* description_;
+  const Nameable* nameable_;
+  Typed typed_ = {};
+  Completion found_ = {};
+};
+
+}  // namespace
+
+Completion complete(const std::vector<std::string>& words, const Description& description,
+                    const Nameable& nameable) {
+  return Completer(description, nameable).run(words);
+}
+
+std::string to_text(const Completion& completion) {
+  constexpr std::array<std::string_view, 3> paths = {"none", "files", "folders"};
+  std::string text = fmt::format("{}\n", paths[static_cast<std::size_t>(completion.paths)]);
+  for (const Candidate& candidate : completion.candidates) {
+    text += fmt::format("{}\t{}\n", candidate.text, candidate.meaning);
+  }
+  return text;
+}
+
+}  // namespace spindle::cli

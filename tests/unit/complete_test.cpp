@@ -1,0 +1,108 @@
+#include "cli/complete.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "cli/grammar.hpp"
+
+using namespace spindle;
+using cli::Completion;
+using cli::Paths;
+using Words = std::vector<std::string>;
+
+namespace {
+
+const files::ProfileStore& shipped() {
+  static const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
+  return store;
+}
+
+Completion offered(const Words& words) {
+  const files::Tools tools{
+      .path = "spindle.yaml",
+      .tools = {{.name = "station3", .url = "tcp://10.0.0.3", .profile = "doga-bm"},
+                {.name = "bare", .url = "tcp://10.0.0.4", .profile = ""}},
+      .groups = {{"line1", {"station3", "bare"}}}};
+  return cli::complete(words, cli::describe_grammar(), {tools, shipped()});
+}
+
+Words texts(const Words& words) {
+  Words all;
+  for (const cli::Candidate& candidate : offered(words).candidates) all.push_back(candidate.text);
+  return all;
+}
+
+bool has(const Words& words, const std::string& text) {
+  const Words all = texts(words);
+  return std::find(all.begin(), all.end(), text) != all.end();
+}
+
+}  // namespace
+
+TEST_CASE("complete: commands, options and their choices come from the grammar") {
+  const cli::Description description = cli::describe_grammar();
+  CHECK(texts({""}).size() == description.commands.size());
+  for (const cli::CommandDescription& command : description.commands) {
+    CAPTURE(command.name);
+    CHECK(texts({command.name.substr(0, command.name.size())}) == Words{command.name});
+    for (const cli::OptionDescription& option : command.options) {
+      if (!option.is_argument()) CHECK(has({command.name, "--"}, option.names.back()));
+    }
+    for (const cli::OptionDescription& option : description.common) {
+      CHECK(has({command.name, "--"}, option.names.back()));
+    }
+  }
+}
+
+TEST_CASE("complete: what a word stands for depends on those before it") {
+  struct Row {
+    Words words;
+    Words expected;
+  };
+  const std::vector<Row> rows = {
+      {{"get", "sta"}, {"station3"}},
+      {{"get", "station3", "event.num"}, {"event.number"}},
+      {{"get", "--limits", "station3", "event.num"}, {"event.number"}},
+      {{"--output", "csv", "get", "station3", "event.num"}, {"event.number"}},
+      {{"--output", "get"}, {}},
+      {{"get", "--timeout", "station3", "event.num"}, {}},
+      {{"get", "bare", "event.num"}, {}},
+      {{"get", "bare", "--profile", "doga-bm", "event.num"}, {"event.number"}},
+      {{"get", "--profile=doga-bm", "tcp://10.0.0.9", "event.num"}, {"event.number"}},
+      {{"get", "sim:doga-bm", "event.num"}, {"event.number"}},
+      {{"list", "event.num"}, {}},
+      {{"list", "--profile", "doga-bm", "event.num"}, {"event.number"}},
+      {{"watch", "station3", "bare", "event.num"}, {"event.number"}},
+      {{"watch", "station3", "ba"}, {"bare"}},
+      {{"set", "station3", "preset.1.mode="}, {"preset.1.mode=TC/AM", "preset.1.mode=AC/TM"}},
+      {{"set", "station3", "event.num"}, {}},
+      {{"do", "station3", "select-preset=1", "dir"}, {"direction="}},
+      {{"get", "--", "--"}, {}},
+      {{"ping", "station3", "sta"}, {}},
+      {{"profile", "show", "doga-bmt"}, {"doga-bmt"}},
+      {{"get", "nowhere", "p"}, {}},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.words.back());
+    CHECK(texts(row.words) == row.expected);
+  }
+  CHECK(offered({}).candidates.size() == offered({""}).candidates.size());
+}
+
+TEST_CASE("complete: many names are offered head by head") {
+  CHECK(texts({"get", "station3", "preset.1"}).size() == 7);  // preset.1., preset.10. to preset.15.
+  CHECK(texts({"get", "station3", "preset.1."}).size() == 15);
+  CHECK(has({"get", "station3", ""}, "preset."));
+}
+
+TEST_CASE("complete: files where files are meant") {
+  CHECK(offered({"get", "--tools", ""}).paths == Paths::files);
+  CHECK(offered({"get", "--profile", ""}).paths == Paths::files);
+  CHECK(offered({"profile", "check", ""}).paths == Paths::files);
+  CHECK(offered({"get", ""}).paths == Paths::none);
+  CHECK(cli::to_text(offered({"get", "--tools", ""})) == "files\n");
+  CHECK(cli::to_text(offered({"get", "sta"})) == "none\nstation3\ttcp://10.0.0.3\n");
+}
