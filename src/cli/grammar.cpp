@@ -55,6 +55,7 @@ struct Draft {
   Typed typed;
   std::map<const CLI::App*, Words> words;
   const CLI::App* chosen = nullptr;
+  Invocation::ToolsFile tools_use = Invocation::ToolsFile::loaded;
   Run run;
 };
 
@@ -201,6 +202,9 @@ struct TypedWatch {
   bool no_push = false;
   bool no_reconnect = false;
 };
+struct TypedTools {
+  bool check = false;
+};
 struct TypedSimulate {
   commands::SimulateOptions options;
   std::string identity_bytes;
@@ -225,6 +229,7 @@ struct TypedCommands {
   commands::RemoteStopOptions remote_stop;
   TypedAlarms alarms;
   TypedSimulate simulate;
+  TypedTools tools;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
   commands::ProfileNameOptions profile_show;
@@ -598,6 +603,25 @@ void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
       ->add_option("PROFILE", typed.profile_check.profile, "name or file");
 }
 
+void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"tools", "[--check]",
+                           "the named tools of the tools file, with endpoints and profiles",
+                           "spindle tools\n"
+                           "spindle tools --json\n"
+                           "spindle tools --check --tools ./spindle.yaml"};
+  const auto run = [](const TypedTools& tools, Context& context) {
+    return tools.check ? commands::check_tools(context) : commands::tools(context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.tools, run);
+  command->add_flag_callback(
+      "--check",
+      [&] {
+        typed.tools.check = true;
+        draft.tools_use = Invocation::ToolsFile::only_found;
+      },
+      "every fault of the file, with its place");
+}
+
 void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_identify(app, draft, typed);
   add_list(app, draft, typed);
@@ -611,6 +635,7 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_ping(app, draft, typed);
   add_simulate(app, draft, typed);
   add_profile(app, draft, typed);
+  add_tools(app, draft, typed);
 }
 
 void build(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -780,6 +805,7 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
+  invocation.tools_use = draft.tools_use;
   invocation.run = std::move(draft.run);
   return invocation;
 }

@@ -45,19 +45,25 @@ std::vector<std::string> profile_folders(const World& world) {
   return folders;
 }
 
-Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
-  if (!invocation.tools_file.empty()) return files::load_tools(invocation.tools_file);
-  if (const std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) {
-    return files::load_tools(named);
-  }
+/// The tools file that counts; empty when there is none.
+std::string find_tools_file(const World& world, const Invocation& invocation) {
+  if (!invocation.tools_file.empty()) return invocation.tools_file;
+  if (std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) return named;
   std::vector<std::string> places = {"./spindle.yaml"};
   const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
   if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
   places.emplace_back("/etc/spindle/tools.yaml");
-  for (const std::string& place : places) {
-    if (world.file_exists(place)) return files::load_tools(place);
+  for (std::string& place : places) {
+    if (world.file_exists(place)) return std::move(place);
   }
-  return files::Tools();
+  return {};
+}
+
+Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
+  const std::string path = find_tools_file(world, invocation);
+  const bool is_loaded = invocation.tools_use == Invocation::ToolsFile::loaded;
+  if (path.empty() || !is_loaded) return files::Tools{.path = path};
+  return files::load_tools(path);
 }
 
 report::Color color_of(const World& world, ColorChoice choice) {

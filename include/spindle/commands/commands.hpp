@@ -104,6 +104,11 @@ struct SimulateOptions {
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
 
+/// The named tools of the tools file.
+Result<Outcome> tools(Context& context);
+/// Every fault of the tools file; context.tools needs no more than its path.
+Result<Outcome> check_tools(Context& context);
+
 struct ProfileNameOptions {
   std::string profile;  ///< id or file
 };
