@@ -13,10 +13,7 @@ namespace {
 constexpr std::size_t max_queued = 4096;
 constexpr std::uint16_t first_transaction = 0x8000;
 
-std::string describe_frame(const modbus::Adu& adu) {
-  return fmt::format("id {:04X}, unit {}, function {:02X}, data {}", adu.transaction.value,
-                     adu.unit.value, adu.pdu.function, to_hex(adu.pdu.data));
-}
+using modbus::FunctionCode;
 
 /// Whether the answer is a copy of the request, so that only an echo can be mistaken for it.
 bool is_repeated_by_answer(const modbus::Pdu& request) {
@@ -54,6 +51,10 @@ struct Session::Outstanding {
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
   std::size_t echoes = 0;   ///< copies of the request that came back
+  /// RTU: a copy of the request of which only waiting tells whether it is the answer.
+  std::optional<modbus::Pdu> doubtful = std::nullopt;
+  TimePoint answered = {};  ///< when the answer, or what may be it, was complete
+  enum class Line : std::uint8_t { silent, heard } line = Line::silent;
 };
 
 Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -61,7 +62,10 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
     : transport_(std::move(transport)),
       clock_(&clock),
       options_(std::move(options)),
-      trace_(std::move(trace)) {}
+      trace_(std::move(trace)),
+      created_(clock.now()),
+      last_activity_(options_.in_use_until),
+      echo_(options_.echo) {}
 
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
@@ -79,7 +83,7 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
   auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {
-    last_round_trip_ = clock_->now() - outstanding.sent;
+    last_round_trip_ = outstanding.answered - outstanding.sent;
     return answer;
   }
   Error error = std::move(answer.error());
@@ -97,10 +101,23 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     buffer_.clear();
-  } else if (!is_repeated_by_answer(outstanding.request.pdu)) {
-    echoing_ = outstanding.echoes > 0;
   }
+  learn_echo(outstanding);
   return answer;
+}
+
+/// An exchange whose echo can not be taken for its answer shows whether there is one.
+void Session::learn_echo(const Outstanding& outstanding) {
+  if (options_.echo != LocalEcho::automatic) return;
+  const bool waited = clock_->now() >= outstanding.deadline;
+  const bool nothing = waited && outstanding.line == Outstanding::Line::silent;
+  const bool once = outstanding.answer && outstanding.doubtful;
+  const bool other = outstanding.answer && !is_repeated_by_answer(outstanding.request.pdu);
+  if (outstanding.echoes > 0) {
+    echo_ = LocalEcho::present;
+  } else if (nothing || once || other) {
+    echo_ = LocalEcho::absent;
+  }
 }
 
 Result<void> Session::broadcast(const modbus::Pdu& request) {
@@ -151,19 +168,24 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
     strip_echo(outstanding);
     auto sorted = sort_buffered(&outstanding);
     if (!sorted) return tl::unexpected(std::move(sorted.error()));
-    if (outstanding.answer) return std::move(*outstanding.answer);
+    if (expired && !outstanding.answer) outstanding.answer = outstanding.doubtful;
+    if (outstanding.answer) return *outstanding.answer;
     if (expired) return tl::unexpected(timeout_error(outstanding));
     auto more = fill(outstanding.deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
+    if (*more) outstanding.line = Outstanding::Line::heard;
     expired = !*more || clock_->now() >= outstanding.deadline;
   }
 }
 
-/// Takes away the copy of the request that some adapters receive of all that they send.
+/// Takes away the copy of the request that some adapters receive of all that they send. Where the
+/// copy looks like an answer, accept() tells them apart.
 void Session::strip_echo(Outstanding& outstanding) {
   const Bytes& sent = outstanding.bytes;
-  const bool ambiguous = is_repeated_by_answer(outstanding.request.pdu) && !echoing_;
-  if (!is_rtu() || ambiguous || outstanding.echoes > 0 || buffer_.size() < sent.size()) return;
+  const bool strippable = is_rtu() && options_.echo != LocalEcho::absent &&
+                          outstanding.echoes == 0 &&
+                          !is_repeated_by_answer(outstanding.request.pdu);
+  if (!strippable || buffer_.size() < sent.size()) return;
   const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(sent.size());
   if (!std::equal(sent.begin(), sent.end(), buffer_.begin(), end)) return;
   buffer_.erase(buffer_.begin(), end);
@@ -227,11 +249,11 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
   switch (judge(request, received, options_.rules)) {
     case Verdict::answer:
       decide(Decision::answer, received);
-      outstanding->answer = received.pdu;
+      accept(received, *outstanding);
       return;
     case Verdict::exception_response:
       decide(Decision::exception_response, received);
-      outstanding->answer = received.pdu;
+      accept(received, *outstanding);
       return;
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
@@ -247,6 +269,21 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       ++counters_.strays;
       return;
   }
+}
+
+/// The answer, unless it may be the adapter's copy of a request that its answer repeats.
+void Session::accept(const modbus::Adu& received, Outstanding& outstanding) const {
+  const bool copy = is_rtu() && received.pdu == outstanding.request.pdu;
+  if (copy && echo_ == LocalEcho::present && outstanding.echoes == 0) {
+    ++outstanding.echoes;
+    return;
+  }
+  if (outstanding.doubtful) ++outstanding.echoes;
+  // A write is not kept waiting for the sake of its echo: what it did is proved by reading.
+  const bool waits = received.pdu.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
+  const bool doubtful = copy && waits && echo_ == LocalEcho::automatic && !outstanding.doubtful;
+  (doubtful ? outstanding.doubtful : outstanding.answer) = received.pdu;
+  outstanding.answered = clock_->now();
 }
 
 void Session::keep(const modbus::Pdu& pdu) {
@@ -289,12 +326,18 @@ Result<void> Session::leave_quarantine() {
     trace_.decision(Decision::quarantine, "waiting until no late answer can come");
   if (auto silent = wait_for_silence(*quarantined_until_); !silent) return silent;
   if (options_.proof == SessionOptions::Proof::loopback) {
-    // The word changes with every request, so an old answer can not pass for this one.
-    auto proved = exchange(modbus::loopback_request(next_transaction_));
+    auto proved = exchange(modbus::loopback_request(fresh_word()));
     if (!proved) return tl::unexpected(std::move(proved.error()));
   }
   quarantined_until_.reset();
   return {};
+}
+
+std::uint16_t Session::fresh_word() const {
+  // Consecutive numbers from a start that two processes hardly share.
+  using std::chrono::milliseconds;
+  const auto age = std::chrono::floor<milliseconds>(created_.time_since_epoch()).count();
+  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(age) + next_transaction_);
 }
 
 /// Whether the frame has an id that only our own requests have had.
@@ -323,6 +366,13 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
         fmt::format("no answer to '{}' with a right checksum ({})", tried, to_hex(buffer_));
   }
   return error;
+}
+
+/// A serial line has no ids.
+std::string Session::describe_frame(const modbus::Adu& adu) const {
+  const std::string id = is_rtu() ? "" : fmt::format("id {:04X}, ", adu.transaction.value);
+  return fmt::format("{}unit {}, function {:02X}, data {}", id, adu.unit.value, adu.pdu.function,
+                     to_hex(adu.pdu.data));
 }
 
 void Session::decide(Decision decision, const modbus::Adu& adu) const {

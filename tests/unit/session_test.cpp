@@ -115,7 +115,8 @@ SessionOptions rtu(SessionOptions::Proof proof = SessionOptions::Proof::none) {
           .answer_timeout = timeout,
           .gap = gap,
           .broadcast_gap = 10ms,
-          .proof = proof};
+          .proof = proof,
+          .echo = proof == SessionOptions::Proof::none ? LocalEcho::automatic : LocalEcho::absent};
 }
 
 Reaction tcp_answer(Duration after, Pdu pdu) { return answer(Framing::tcp, after, std::move(pdu)); }
@@ -821,6 +822,111 @@ TEST_CASE("rtu: the adapter's echo of the request is told from the answer") {
   present = false;
   CHECK(line.session.transact(arm).error().code == Errc::local_echo);
   CHECK(line.session.transact(read_two).error().code == Errc::local_echo);
+}
+
+TEST_CASE("rtu: the first loop-back tells an echo from an answer, whatever the adapter does") {
+  const Pdu loopback = modbus::loopback_request(0x1234);
+  struct Row {
+    std::string_view what;
+    LocalEcho echo;
+    std::vector<Duration> copies;
+    std::optional<Errc> code;
+    Duration round_trip;
+    Duration ended;
+  };
+  const std::vector<Row> rows = {
+      {"an answer, no echo", LocalEcho::automatic, {15ms}, {}, 15ms, timeout},
+      {"echo and answer", LocalEcho::automatic, {1ms, 15ms}, {}, 15ms, 15ms},
+      {"nothing", LocalEcho::automatic, {}, Errc::no_answer, 0ms, timeout},
+      {"an answer, surely no echo", LocalEcho::absent, {15ms}, {}, 15ms, 15ms},
+      {"echo and answer, as said", LocalEcho::present, {1ms, 15ms}, {}, 15ms, 15ms},
+      {"the echo alone, as said", LocalEcho::present, {1ms}, Errc::local_echo, 0ms, timeout},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    SessionOptions options = rtu();
+    options.echo = row.echo;
+    Line line(options);
+    line.script.on_request([&](ByteView request) {
+      std::vector<Arrival> arrivals;
+      for (const Duration copy : row.copies)
+        arrivals.push_back({copy, Bytes(request.begin(), request.end())});
+      return arrivals;
+    });
+    const auto response = line.session.transact(loopback);
+    REQUIRE(response.has_value() == !row.code);
+    if (row.code) CHECK(response.error().code == *row.code);
+    if (response) CHECK(line.session.last_round_trip() == row.round_trip);
+    CHECK(line.elapsed() == row.ended);
+    // What was learned holds: the next one is not waited for.
+    const bool echoes = row.copies.size() == 2 || row.code == Errc::local_echo;
+    line.script.on_request([&](ByteView request) {
+      std::vector<Arrival> arrivals;
+      if (echoes) arrivals.push_back({1ms, Bytes(request.begin(), request.end())});
+      arrivals.push_back({15ms, Bytes(request.begin(), request.end())});
+      return arrivals;
+    });
+    CHECK(line.session.transact(loopback) == loopback);
+    CHECK(line.session.last_round_trip() == 15ms);
+    CHECK(line.elapsed() == line.sent_at(1) + 15ms);
+  }
+}
+
+TEST_CASE("rtu: an exception behind the echo of a loop-back is its answer") {
+  Line line(rtu());
+  line.script.on_request([](ByteView request) {
+    const Bytes exception = rtu_frame(1, modbus::exception_response(0x08, 1));
+    return std::vector<Arrival>{{1ms, Bytes(request.begin(), request.end())}, {15ms, exception}};
+  });
+  const auto response = line.session.transact(modbus::loopback_request(7));
+  CHECK(response == modbus::exception_response(0x08, 1));
+  CHECK(line.elapsed() == 15ms);
+}
+
+TEST_CASE("rtu: noise before the echo does not make it the answer") {
+  SessionOptions options = rtu();
+  options.echo = LocalEcho::present;
+  Line line(options);
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{1ms, hex("FF") + Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(arm).error().code == Errc::local_echo);
+}
+
+TEST_CASE("rtu: a line that others have just left is given its gap") {
+  SessionOptions options = rtu();
+  options.in_use_until = FakeClock::start;
+  Line line(options);
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(0) == gap);
+}
+
+TEST_CASE("rtu: one session asks one unit after the other, and a late answer is nobody's") {
+  Line line(rtu());
+  const Pdu loopback = modbus::loopback_request(0x1234);
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{timeout + 8ms, Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(loopback).error().code == Errc::no_answer);
+  line.session.set_unit({2});
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{20ms, Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(loopback) == loopback);
+  CHECK(line.sent_at(1) == timeout);  // no quarantine before a request that its answer repeats
+  CHECK(line.script.sent[1].bytes[0] == 2);
+  CHECK(line.session.counters().strays == 1);
+}
+
+TEST_CASE("rtu: words for loop-backs differ from request to request and start to start") {
+  Line line(rtu());
+  const std::uint16_t first = line.session.fresh_word();
+  line.script.on_request(silence());
+  CHECK_FALSE(line.session.transact(modbus::loopback_request(first)));
+  CHECK(line.session.fresh_word() != first);
+  Session later(transport_to(line.script), line.clock, rtu());
+  CHECK(later.fresh_word() != first);
 }
 
 TEST_CASE("rtu: without an echo a write's only answer is its answer") {

@@ -63,6 +63,14 @@ enum class ActionResult : std::uint8_t {
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
 
+/// What came back for a loop-back that any unit may answer.
+enum class Answered : std::uint8_t { data, exception };
+
+struct Probe {
+  Answered answered;
+  Duration round_trip;
+};
+
 enum class EventOutput : std::uint8_t { on, off };
 
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
@@ -138,6 +146,10 @@ class Device {
   /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
   /// response counts as an answer.
   Result<Duration> ping();
+
+  /// FC 08 to this unit of a serial line, once; all later requests go to it too. An exception
+  /// response counts as an answer.
+  Result<Probe> probe(modbus::UnitId unit);
 
  private:
   Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "spindle/link/demux.hpp"
+#include "spindle/link/local_echo.hpp"
 #include "spindle/link/trace.hpp"
 #include "spindle/link/transport.hpp"
 
@@ -26,6 +27,11 @@ struct SessionOptions {
   Duration character_time = Duration::zero();
   /// RTU: whether the line is proved with FC 08 after a quarantine.
   enum class Proof : std::uint8_t { none, loopback } proof = Proof::none;
+  /// RTU: whether the request itself comes back first. Where that is not known, the first FC 08 is
+  /// waited for until the answer timeout, because its answer and its echo look the same.
+  LocalEcho echo = LocalEcho::automatic;
+  /// RTU: until when others may have used the line; the first gap counts from then.
+  TimePoint in_use_until = {};
 };
 
 /// A frame that nobody asked for, with the time when its last byte arrived.
@@ -72,6 +78,10 @@ class Session {
   void shield() { transport_->shield(); }
 
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
+  /// Whom the requests from now on are for.
+  void set_unit(modbus::UnitId unit) { options_.unit = unit; }
+  /// For FC 08: another word for every request, and hardly that of an earlier process.
+  [[nodiscard]] std::uint16_t fresh_word() const;
   /// For a profile that is only known after the first answer.
   void set_rules(DemuxRules rules) { options_.rules = std::move(rules); }
   [[nodiscard]] const SessionOptions& options() const { return options_; }
@@ -90,6 +100,8 @@ class Session {
   Result<bool> fill(TimePoint deadline);
   Result<std::optional<modbus::Adu>> take_frame();
   void strip_echo(Outstanding& outstanding);
+  void accept(const modbus::Adu& received, Outstanding& outstanding) const;
+  void learn_echo(const Outstanding& outstanding);
   Result<void> sort_buffered(Outstanding* outstanding);
   void sort(const modbus::Adu& received, Outstanding* outstanding);
   void keep(const modbus::Pdu& pdu);
@@ -100,6 +112,7 @@ class Session {
   [[nodiscard]] bool is_late(const modbus::Adu& stray) const;
   Error timeout_error(const Outstanding& outstanding) const;
   void decide(Decision decision, const modbus::Adu& adu) const;
+  [[nodiscard]] std::string describe_frame(const modbus::Adu& adu) const;
 
   std::unique_ptr<Transport> transport_;
   Clock* clock_;
@@ -109,10 +122,11 @@ class Session {
   Bytes buffer_ = {};
   std::deque<Spontaneous> queue_ = {};
   std::uint16_t next_transaction_ = 0x8000;
-  TimePoint last_activity_ = {};
+  TimePoint created_;
+  TimePoint last_activity_;
   /// RTU: when no answer to an abandoned request can come any more.
   std::optional<TimePoint> quarantined_until_ = std::nullopt;
-  bool echoing_ = false;  ///< the adapter returns what it sends
+  LocalEcho echo_;  ///< as far as it is known
   Duration last_round_trip_ = {};
 };
 
