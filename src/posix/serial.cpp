@@ -10,13 +10,12 @@
 #include <sys/sysmacros.h>
 #include <termios.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <optional>
 #include <system_error>
 #include <utility>
 
+#include "posix/baud.hpp"
 #include "posix/descriptor.hpp"
 #include "posix/port_holder.hpp"
 #include "posix/wait.hpp"
@@ -67,27 +66,6 @@ Error lacks(std::string setting) {
           .hint = "check baud, parity and stop in the target, and what the adapter can do"};
 }
 
-/// The rates that termios has names for.
-struct Rate {
-  unsigned baud;
-  speed_t speed;
-};
-constexpr std::array rates = {
-    Rate{300, B300},         Rate{600, B600},         Rate{1200, B1200},
-    Rate{2400, B2400},       Rate{4800, B4800},       Rate{9600, B9600},
-    Rate{19200, B19200},     Rate{38400, B38400},     Rate{57600, B57600},
-    Rate{115200, B115200},   Rate{230400, B230400},   Rate{460800, B460800},
-    Rate{500000, B500000},   Rate{576000, B576000},   Rate{921600, B921600},
-    Rate{1000000, B1000000}, Rate{1152000, B1152000}, Rate{1500000, B1500000},
-    Rate{2000000, B2000000}, Rate{2500000, B2500000}, Rate{3000000, B3000000},
-    Rate{3500000, B3500000}, Rate{4000000, B4000000}};
-
-const Rate* find_rate(unsigned baud) {
-  const auto* const rate = std::find_if(rates.begin(), rates.end(),
-                                        [baud](const Rate& row) { return row.baud == baud; });
-  return rate == rates.end() ? nullptr : rate;
-}
-
 /// A pseudo terminal has no parity; the kernel drops it without an error.
 bool is_pseudo_terminal(int descriptor) {
   constexpr unsigned first_major = 136;  // Linux: Documentation/admin-guide/devices.txt
@@ -120,9 +98,9 @@ enum class Terminal : std::uint8_t { real, pseudo };
 /// Whether the port does what it was told.
 Result<void> check_settings(const termios& found, const link::SerialSettings& wanted,
                             Terminal terminal) {
-  const Rate* rate = find_rate(wanted.baud);
-  const bool rate_taken = rate != nullptr && ::cfgetospeed(&found) == rate->speed &&
-                          ::cfgetispeed(&found) == rate->speed;
+  const auto speed = speed_of(wanted.baud);
+  const bool rate_taken =
+      speed && ::cfgetospeed(&found) == *speed && ::cfgetispeed(&found) == *speed;
   if (!rate_taken) return tl::unexpected(lacks(fmt::format("{} baud", wanted.baud)));
   if ((found.c_cflag & CSIZE) != CS8) return tl::unexpected(lacks("eight data bits"));
   const bool two_stop_bits = (found.c_cflag & CSTOPB) != 0;
@@ -193,7 +171,7 @@ Result<Port> Port::open(const std::string& path) {
 }
 
 Result<void> Port::set(const std::string& path, const link::SerialSettings& settings) {
-  if (find_rate(settings.baud) == nullptr) {
+  if (!speed_of(settings.baud)) {
     return tl::unexpected(lacks(fmt::format("{} baud", settings.baud)));
   }
   const Terminal terminal = is_pseudo_terminal(lock_.number()) ? Terminal::pseudo : Terminal::real;
