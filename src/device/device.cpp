@@ -204,6 +204,10 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
 
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
+  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
+  if (serial && error.code == Errc::no_answer && error.hint.empty()) {
+    error.hint = "check unit, rate, parity and wiring; 'spindle scan' shows which units answer";
+  }
   error.target = target_;
   error.endpoint = endpoint_;
   return error;

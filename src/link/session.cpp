@@ -22,6 +22,12 @@ bool is_repeated_by_answer(const modbus::Pdu& request) {
          function == modbus::FunctionCode::diagnostics;
 }
 
+Error everybody_error() {
+  return {.code = Errc::usage,
+          .message = "unit 0 means every unit of the line at once, and none of them answers",
+          .hint = "name one, such as unit=1; 'spindle scan' shows which are there"};
+}
+
 /// How long an RTU frame is that answers the request, judged by what has come of it.
 std::size_t whole_answer_size(const modbus::Pdu& request, ByteView begun) {
   constexpr std::size_t around_count = 5;  // unit, function, byte count, CRC; an exception likewise
@@ -80,6 +86,7 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   next_transaction_ = next_transaction_ == 0xFFFF
                           ? first_transaction
                           : static_cast<std::uint16_t>(next_transaction_ + 1);
+  if (is_rtu() && options_.unit == modbus::UnitId{}) return tl::unexpected(everybody_error());
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
   auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {

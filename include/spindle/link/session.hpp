@@ -65,7 +65,7 @@ class Session {
   ///
   /// RTU: after a failure the line is in quarantine. A read then waits until no late answer can
   /// come any more and the line is proved; only FC 06 and FC 08, whose answers repeat them, go out
-  /// at once.
+  /// at once. Unit 0 is `usage`: broadcast() is for that.
   Result<modbus::Pdu> transact(const modbus::Pdu& request);
 
   /// RTU: sends to unit 0. Nobody answers, so success means "sent", never "done".
