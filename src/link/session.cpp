@@ -57,10 +57,6 @@ struct Session::Outstanding {
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
   std::size_t echoes = 0;   ///< copies of the request that came back
-  /// RTU: a copy of the request of which only waiting tells whether it is the answer.
-  std::optional<modbus::Pdu> doubtful = std::nullopt;
-  TimePoint answered = {};  ///< when the answer, or what may be it, was complete
-  enum class Line : std::uint8_t { silent, heard } line = Line::silent;
 };
 
 Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -78,6 +74,7 @@ Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
   if (quarantined_until_ && !is_repeated_by_answer(request)) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
+  if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
   return exchange(request);
 }
 
@@ -90,7 +87,7 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
   auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {
-    last_round_trip_ = outstanding.answered - outstanding.sent;
+    last_round_trip_ = clock_->now() - outstanding.sent;
     return answer;
   }
   Error error = std::move(answer.error());
@@ -115,16 +112,23 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
 
 /// An exchange whose echo can not be taken for its answer shows whether there is one.
 void Session::learn_echo(const Outstanding& outstanding) {
-  if (options_.echo != LocalEcho::automatic) return;
-  const bool waited = clock_->now() >= outstanding.deadline;
-  const bool nothing = waited && outstanding.line == Outstanding::Line::silent;
-  const bool once = outstanding.answer && outstanding.doubtful;
-  const bool other = outstanding.answer && !is_repeated_by_answer(outstanding.request.pdu);
+  const bool telling = !is_repeated_by_answer(outstanding.request.pdu);
+  if (options_.echo != LocalEcho::automatic || !telling) return;
+  const bool complete = outstanding.answer || clock_->now() >= outstanding.deadline;
   if (outstanding.echoes > 0) {
     echo_ = LocalEcho::present;
-  } else if (nothing || once || other) {
+  } else if (complete) {
     echo_ = LocalEcho::absent;
   }
+}
+
+/// The answer to a loop-back is its own echo. Before the first one a read, whose answer is not,
+/// shows whether the adapter hears itself; a unit that does not answer it is not there.
+Result<void> Session::find_echo(const modbus::Pdu& request) {
+  const bool loopback = request.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
+  if (!is_rtu() || !loopback || echo_ != LocalEcho::automatic) return {};
+  return transact(modbus::read_request(modbus::RegisterTable::holding, {}, 1))
+      .map([](const modbus::Pdu&) {});
 }
 
 Result<void> Session::broadcast(const modbus::Pdu& request) {
@@ -175,12 +179,10 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
     strip_echo(outstanding);
     auto sorted = sort_buffered(&outstanding);
     if (!sorted) return tl::unexpected(std::move(sorted.error()));
-    if (expired && !outstanding.answer) outstanding.answer = outstanding.doubtful;
     if (outstanding.answer) return *outstanding.answer;
     if (expired) return tl::unexpected(timeout_error(outstanding));
     auto more = fill(outstanding.deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
-    if (*more) outstanding.line = Outstanding::Line::heard;
     expired = !*more || clock_->now() >= outstanding.deadline;
   }
 }
@@ -196,6 +198,7 @@ void Session::strip_echo(Outstanding& outstanding) {
   const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(sent.size());
   if (!std::equal(sent.begin(), sent.end(), buffer_.begin(), end)) return;
   buffer_.erase(buffer_.begin(), end);
+  decide(Decision::echo, outstanding.request);
   ++outstanding.echoes;
 }
 
@@ -255,12 +258,11 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
   const modbus::Adu* request = outstanding == nullptr ? nullptr : &outstanding->request;
   switch (judge(request, received, options_.rules)) {
     case Verdict::answer:
-      decide(Decision::answer, received);
       accept(received, *outstanding);
       return;
     case Verdict::exception_response:
       decide(Decision::exception_response, received);
-      accept(received, *outstanding);
+      outstanding->answer = received.pdu;
       return;
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
@@ -278,19 +280,16 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
   }
 }
 
-/// The answer, unless it may be the adapter's copy of a request that its answer repeats.
+/// The answer, unless it is the adapter's copy of a request that its answer repeats.
 void Session::accept(const modbus::Adu& received, Outstanding& outstanding) const {
   const bool copy = is_rtu() && received.pdu == outstanding.request.pdu;
   if (copy && echo_ == LocalEcho::present && outstanding.echoes == 0) {
+    decide(Decision::echo, received);
     ++outstanding.echoes;
-    return;
+  } else {
+    decide(Decision::answer, received);
+    outstanding.answer = received.pdu;
   }
-  if (outstanding.doubtful) ++outstanding.echoes;
-  // A write is not kept waiting for the sake of its echo: what it did is proved by reading.
-  const bool waits = received.pdu.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
-  const bool doubtful = copy && waits && echo_ == LocalEcho::automatic && !outstanding.doubtful;
-  (doubtful ? outstanding.doubtful : outstanding.answer) = received.pdu;
-  outstanding.answered = clock_->now();
 }
 
 void Session::keep(const modbus::Pdu& pdu) {

@@ -27,8 +27,8 @@ struct SessionOptions {
   Duration character_time = Duration::zero();
   /// RTU: whether the line is proved with FC 08 after a quarantine.
   enum class Proof : std::uint8_t { none, loopback } proof = Proof::none;
-  /// RTU: whether the request itself comes back first. Where that is not known, the first FC 08 is
-  /// waited for until the answer timeout, because its answer and its echo look the same.
+  /// RTU: whether the request itself comes back first. Where that is not known, a read of one
+  /// register goes before the first FC 08, because its own answer and echo look the same.
   LocalEcho echo = LocalEcho::automatic;
   /// RTU: until when others may have used the line; the first gap counts from then.
   TimePoint in_use_until = {};
@@ -102,6 +102,7 @@ class Session {
   void strip_echo(Outstanding& outstanding);
   void accept(const modbus::Adu& received, Outstanding& outstanding) const;
   void learn_echo(const Outstanding& outstanding);
+  Result<void> find_echo(const modbus::Pdu& request);
   Result<void> sort_buffered(Outstanding* outstanding);
   void sort(const modbus::Adu& received, Outstanding* outstanding);
   void keep(const modbus::Pdu& pdu);
