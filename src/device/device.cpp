@@ -185,6 +185,10 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       retries_(options.retries.value_or(profile.link.retries)),
       client_(*session_, read_limits(*profile_), retries_) {}
 
+Device::~Device() {
+  if (session_) session_->settle();
+}
+
 Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                             const LinkOptions& options, const OpenTransport& open_transport,
                             Clock& clock) {

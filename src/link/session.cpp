@@ -11,6 +11,10 @@ namespace {
 
 // Somebody who watches takes events at once; this bounds memory when nobody does.
 constexpr std::size_t max_queued = 4096;
+
+// A tool that answers at all has long done so; whoever pressed Ctrl-C hardly notices.
+constexpr Duration longest_settling = std::chrono::milliseconds(250);
+
 constexpr std::uint16_t first_transaction = 0x8000;
 
 using modbus::FunctionCode;
@@ -105,6 +109,8 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     buffer_.clear();
+    const bool mistakable = !is_repeated_by_answer(outstanding.request.pdu);
+    if (mistakable) abandoned_ = outstanding.request;
   }
   learn_echo(outstanding);
   return answer;
@@ -336,7 +342,25 @@ Result<void> Session::leave_quarantine() {
     if (!proved) return tl::unexpected(std::move(proved.error()));
   }
   quarantined_until_.reset();
+  abandoned_.reset();
   return {};
+}
+
+void Session::settle() {
+  if (!abandoned_) return;
+  transport_->shield();
+  const TimePoint until = clock_->now() + longest_settling;
+  while (abandoned_) {
+    const auto frame = take_frame();
+    if (frame && *frame) {
+      const Verdict verdict = judge(&*abandoned_, **frame, options_.rules);
+      decide(Decision::stray, **frame);
+      if (verdict == Verdict::answer || verdict == Verdict::exception_response) abandoned_.reset();
+      continue;
+    }
+    const auto more = fill(std::min(until, *quarantined_until_));
+    if (!more || !*more || clock_->now() >= until) return;
+  }
 }
 
 std::uint16_t Session::fresh_word() const {

@@ -917,6 +917,50 @@ TEST_CASE("rtu: one session asks one unit after the other, and a late answer is 
   CHECK(line.session.counters().strays == 1);
 }
 
+TEST_CASE(
+    "rtu: a line is left when the answer to an abandoned read has come, or is not waited for") {
+  struct Row {
+    std::string_view what;
+    std::vector<Arrival> late;
+    Duration settled;  // after the interrupt at 10 ms
+  };
+  const Bytes answer_bytes = rtu_frame(1, two_values);
+  for (const Row& row :
+       {Row{"an answer", {{25ms, answer_bytes}}, 15ms},
+        Row{"an answer in pieces",
+            {{25ms, part(answer_bytes, 0, 3)}, {27ms, part(answer_bytes, 3, answer_bytes.size())}},
+            17ms},
+        Row{"an exception", {{25ms, rtu_frame(1, modbus::exception_response(0x03, 2))}}, 15ms},
+        Row{"another unit's", {{25ms, rtu_frame(2, two_values)}}, 250ms},
+        Row{"nothing", {}, 250ms}}) {
+    CAPTURE(row.what);
+    Line line(rtu());
+    line.clock.at(FakeClock::start + 10ms, [&] { line.interrupt.raise(2); });
+    line.script.on_request([&](ByteView) { return row.late; });
+    CHECK(line.session.transact(read_two).error().code == Errc::interrupted);
+    line.session.settle();
+    CHECK(line.elapsed() == 10ms + row.settled);
+    CHECK(line.script.sent.size() == 1);
+  }
+  Line done(rtu());
+  done.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(done.session.transact(read_two));
+  done.session.settle();
+  CHECK(done.elapsed() == 15ms);
+
+  Line told(rtu());  // an answer that repeats its request is nobody else's
+  told.script.on_request(silence());
+  CHECK_FALSE(told.session.transact(arm));
+  told.session.settle();
+  CHECK(told.elapsed() == timeout);
+
+  Line gone(rtu());
+  gone.script.on_request([](ByteView) { return std::vector<Arrival>{{10ms, Errc::reset}}; });
+  CHECK_FALSE(gone.session.transact(read_two));
+  gone.session.settle();
+  CHECK(gone.elapsed() == 10ms);
+}
+
 TEST_CASE("rtu: words for loop-backs differ from request to request and start to start") {
   Line line(rtu());
   const std::uint16_t first = line.session.fresh_word();

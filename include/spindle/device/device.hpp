@@ -81,6 +81,12 @@ class Device {
   static Result<Device> open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                              const LinkOptions& options, const OpenTransport& open_transport,
                              Clock& clock);
+  /// On a serial line: leaves nothing behind that the next one would take for its answer.
+  ~Device();
+  Device(Device&&) noexcept = default;
+  Device& operator=(Device&&) noexcept = default;
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
 
   [[nodiscard]] const catalogue::Profile& profile() const { return *profile_; }
   [[nodiscard]] link::Session& session() { return *session_; }

@@ -74,6 +74,10 @@ class Session {
   /// The oldest spontaneous frame, waiting for one until the deadline; empty at the deadline.
   Result<std::optional<Spontaneous>> next_spontaneous(TimePoint deadline);
 
+  /// RTU: before the line is left to others, waits for the answer to a request that was abandoned,
+  /// though not for long: they would take it for theirs. Interrupts do not end this wait.
+  void settle();
+
   /// After this, interrupts no longer end waits on this connection.
   void shield() { transport_->shield(); }
 
@@ -127,6 +131,8 @@ class Session {
   TimePoint last_activity_;
   /// RTU: when no answer to an abandoned request can come any more.
   std::optional<TimePoint> quarantined_until_ = std::nullopt;
+  /// RTU: the last request whose answer may still come and be mistaken.
+  std::optional<modbus::Adu> abandoned_ = std::nullopt;
   LocalEcho echo_;  ///< as far as it is known
   Duration last_round_trip_ = {};
 };
