@@ -205,8 +205,15 @@ struct TypedWatch {
 struct TypedTools {
   bool check = false;
 };
+struct TypedScan {
+  commands::ScanOptions options;
+  std::string units;
+};
 struct TypedSimulate {
   commands::SimulateOptions options;
+  std::string units;
+  std::string baud;
+  bool no_gap = false;
   std::string identity_bytes;
   std::string firmware;
   std::string serial;
@@ -224,6 +231,7 @@ struct TypedCommands {
   TypedSet set;
   TypedDo perform;
   TypedPing ping;
+  TypedScan scan;
   TypedWatch watch;
   TypedRemoteStart remote_start;
   commands::RemoteStopOptions remote_stop;
@@ -345,6 +353,53 @@ void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
   option(command, "--interval", typed.ping.interval, "DURATION", "time between them (default 1s)");
 }
 
+/// "1-3,7": units of a serial line, each once, in the order given.
+Result<std::vector<modbus::UnitId>> to_units(const std::string& text) {
+  constexpr std::uint64_t last_unit = 247;  // Modbus over Serial Line 1.02, 2.2
+  std::vector<modbus::UnitId> units;
+  for (const std::string_view range : split(text, ',')) {
+    const auto dash = range.find('-');
+    const auto first = parse_unsigned(range.substr(0, dash), last_unit);
+    const auto last =
+        dash == std::string_view::npos ? first : parse_unsigned(range.substr(dash + 1), last_unit);
+    if (!first || !last || *first == 0 || *last < *first) {
+      return tl::unexpected(
+          bad_option("--units", text, "units from 1 to 247, such as 1-31 or 1,5"));
+    }
+    for (std::uint64_t unit = *first; unit <= *last; ++unit) {
+      const modbus::UnitId id{static_cast<std::uint8_t>(unit)};
+      if (std::find(units.begin(), units.end(), id) == units.end()) units.push_back(id);
+    }
+  }
+  return units;
+}
+
+std::string scan_words() {
+  return "The line is asked at the rate and parity of the target or profile, and at no others: a\n"
+         "driver that hears three bad frames in a row stops its motor, and every frame at a wrong\n"
+         "rate is bad. A wrong unit costs one --timeout; nothing is asked twice.\n";
+}
+
+Result<Outcome> run_scan(TypedScan scan, Context& context) {
+  if (scan.options.bus.empty()) return tl::unexpected(missing("scan", "BUS"));
+  auto units = to_units(scan.units.empty() ? "1-31" : scan.units);
+  if (!units) return tl::unexpected(std::move(units.error()));
+  scan.options.units = std::move(*units);
+  return commands::scan(scan.options, context);
+}
+
+void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"scan", "BUS [--units 1-31]",
+                           "which units answer on a serial line, at the given settings",
+                           "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
+                           "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
+                           "spindle scan rtu+tcp://192.168.10.30:4001 --json",
+                           scan_words};
+  CLI::App* command = add_command(app, draft, words, typed.scan, run_scan);
+  command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");
+  option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
+}
+
 template <typename Number>
 Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
                          std::optional<Number>& into) {
@@ -369,6 +424,17 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
           })
           .and_then([&] { return fill_number("--burst", typed.burst, 10'000, options.burst); });
   if (!filled) return tl::unexpected(std::move(filled.error()));
+  if (!typed.units.empty()) {
+    auto units = to_units(typed.units);
+    if (!units) return tl::unexpected(std::move(units.error()));
+    options.units = std::move(*units);
+  }
+  if (!typed.baud.empty()) {
+    const auto baud = to_number("--baud", typed.baud, 1, 4'000'000);
+    if (!baud) return tl::unexpected(baud.error());
+    options.baud = static_cast<unsigned>(*baud);
+  }
+  if (typed.no_gap) options.gaps = sim::LineModel::Gaps::ignored;
   const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
   if (!rundown_every) return tl::unexpected(rundown_every.error());
   options.rundown_every = *rundown_every;
@@ -541,7 +607,14 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   auto& options = typed.simulate.options;
   command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
   option(command, "--listen", options.listen, "URL",
-         "where to listen (default tcp://127.0.0.1:0: a free port)");
+         "where to listen (default a free port of 127.0.0.1)");
+  option(command, "--pty", options.pty, "PATH",
+         "serial tools: make a pseudo terminal that this path leads to");
+  option(command, "--units", typed.simulate.units, "LIST",
+         "serial tools: which units, such as 1-3");
+  option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
+  flag(command, "--no-gap", typed.simulate.no_gap,
+       "serial tools: also hear clients that keep too short a silence");
   command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
       ->type_name("FAULT")
       ->expected(1)
@@ -633,6 +706,7 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_remote_stop(app, draft, typed);
   add_alarms(app, draft, typed);
   add_ping(app, draft, typed);
+  add_scan(app, draft, typed);
   add_simulate(app, draft, typed);
   add_profile(app, draft, typed);
   add_tools(app, draft, typed);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "open_sim.hpp"
@@ -200,6 +201,16 @@ Error Target::blamed(Error error) const {
   error.target = shown;
   if (endpoint.text != shown) error.endpoint = endpoint.text;
   return error;
+}
+
+std::string shared_line(const link::Endpoint& endpoint) {
+  if (endpoint.medium == link::Medium::rtu_over_tcp) {
+    return fmt::format("{}:{}", endpoint.host, endpoint.port.value_or(0));
+  }
+  if (endpoint.medium != link::Medium::serial) return {};
+  std::error_code unreadable;  // then the path as it is
+  const auto port = std::filesystem::weakly_canonical(endpoint.device, unreadable);
+  return unreadable ? endpoint.device : port.string();
 }
 
 bool is_target(std::string_view text, const Context& context) {

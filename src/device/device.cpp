@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "spindle/link/serial_settings.hpp"
+
 namespace spindle::device {
 namespace {
 
@@ -71,15 +73,31 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
   return limits;
 }
 
+/// A profile without rules gives more than the standard asks for, because there are devices that do
+/// not hear what the standard allows.
 Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
   for (const catalogue::GapRule& rule : serial.gaps) {
     if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
   }
-  return Duration::zero();
+  constexpr int caution = 3;
+  return caution * link::standard_silence(baud);
 }
 
-link::DemuxRules demux_rules(const catalogue::Profile& profile) {
-  link::DemuxRules rules{.framing = profile.link.framing, .spontaneous = {}};
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
+  switch (endpoint.medium) {
+    case link::Medium::tcp:
+      return modbus::Framing::tcp;
+    case link::Medium::serial:
+    case link::Medium::rtu_over_tcp:
+      return modbus::Framing::rtu;
+    case link::Medium::simulated:
+      break;
+  }
+  return facts.framing;
+}
+
+link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
+  link::DemuxRules rules{.framing = framing, .spontaneous = {}};
   if (profile.events) {
     rules.spontaneous.push_back(
         {profile.events->function, static_cast<std::uint8_t>(2 * profile.events->count)});
@@ -88,15 +106,21 @@ link::DemuxRules demux_rules(const catalogue::Profile& profile) {
 }
 
 link::SessionOptions session_options(const catalogue::Profile& profile,
-                                     const link::Endpoint& endpoint, const LinkOptions& options) {
+                                     const link::Endpoint& endpoint, const LinkOptions& options,
+                                     TimePoint now) {
   link::SessionOptions session;
-  session.rules = demux_rules(profile);
+  session.rules = demux_rules(profile, framing_of(endpoint, profile.link));
   session.unit = endpoint.unit.value_or(modbus::UnitId{profile.link.unit});
   session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
-  if (profile.link.framing == modbus::Framing::rtu) {
-    const unsigned baud = endpoint.baud.value_or(profile.link.serial.baud);
-    session.gap = gap_of(profile.link.serial, baud);
-    session.broadcast_gap = profile.link.serial.broadcast_pause;
+  if (session.rules.framing == modbus::Framing::rtu) {
+    const catalogue::SerialFacts& serial = profile.link.serial;
+    const auto line = link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits);
+    session.gap = endpoint.gap.value_or(gap_of(serial, line.baud));
+    session.broadcast_gap = session.gap + serial.broadcast_pause;
+    session.character_time = character_time(line);
+    session.echo =
+        endpoint.medium == link::Medium::simulated ? link::LocalEcho::absent : endpoint.echo;
+    session.in_use_until = now;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;
@@ -161,6 +185,10 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       retries_(options.retries.value_or(profile.link.retries)),
       client_(*session_, read_limits(*profile_), retries_) {}
 
+Device::~Device() {
+  if (session_) session_->settle();
+}
+
 Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                             const LinkOptions& options, const OpenTransport& open_transport,
                             Clock& clock) {
@@ -173,12 +201,17 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
     return tl::unexpected(std::move(error));
   }
   auto session = std::make_unique<link::Session>(
-      std::move(*transport), clock, session_options(profile, endpoint, options), options.trace);
+      std::move(*transport), clock, session_options(profile, endpoint, options, clock.now()),
+      options.trace);
   return Device(endpoint, profile, options, std::move(session));
 }
 
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
+  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
+  if (serial && error.code == Errc::no_answer && error.hint.empty()) {
+    error.hint = "check unit, rate, parity and wiring; 'spindle scan' shows which units answer";
+  }
   error.target = target_;
   error.endpoint = endpoint_;
   return error;
@@ -213,7 +246,7 @@ void Device::set_retries(unsigned retries) {
 
 void Device::use(const catalogue::Profile& profile) {
   profile_ = &profile;
-  session_->set_rules(demux_rules(*profile_));
+  session_->set_rules(demux_rules(*profile_, session_->options().rules.framing));
   client_ = link::Client(*session_, read_limits(*profile_), retries_);
   registers_known_ = true;
 }
@@ -415,14 +448,21 @@ Result<std::optional<Registers>> Device::last_event() {
 }
 
 Result<Duration> Device::ping() {
-  const Clock& clock = session_->clock();
-  const auto word = static_cast<std::uint16_t>(session_->counters().requests);
-  const auto request =
-      profile_->link.loopback ? modbus::loopback_request(word) : modbus::report_server_id_request();
-  const TimePoint start = clock.now();
-  auto response = session_->transact(request);
+  // FC 08 belongs to serial lines, so without a profile it is the best guess there.
+  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
+  const bool loopback = profile_->link.loopback || (serial && profile_->id.empty());
+  auto response = session_->transact(loopback ? modbus::loopback_request(session_->fresh_word())
+                                              : modbus::report_server_id_request());
   if (!response) return tl::unexpected(located(std::move(response.error())));
-  return clock.now() - start;
+  return session_->last_round_trip();
+}
+
+Result<Probe> Device::probe(modbus::UnitId unit) {
+  session_->set_unit(unit);
+  auto response = session_->transact(modbus::loopback_request(session_->fresh_word()));
+  if (!response) return tl::unexpected(located(std::move(response.error())));
+  const bool refused = (response->function & modbus::exception_bit) != 0;
+  return Probe{refused ? Answered::exception : Answered::data, session_->last_round_trip()};
 }
 
 }  // namespace spindle::device

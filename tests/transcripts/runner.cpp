@@ -4,6 +4,9 @@
 //   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [RUNDOWNS=DURATION] [NG=N] [FAULT=SPEC]...
 //                         a tool that lives as long as the transcript; with an operator who drives
 //                         a screw now and then, every Nth of them NG
+//   %bus URL [UNITS=N] [FAULT=SPEC]...
+//                         a serial line (rtu:// or rtu+tcp://) with units 1 to N that have nothing
+//                         but registers, and are strict about their gaps
 //   %file NAME … %end     a file in the transcript's own folder
 //   %answer TEXT          what the user types at the next question
 //   $ spindle ARGUMENTS   followed by what it prints
@@ -31,11 +34,14 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/cli/run.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/link/serial_settings.hpp"
 #include "spindle/posix/world.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "support/fake_clock.hpp"
+#include "support/serial_bank.hpp"
 
 namespace {
 
@@ -127,6 +133,25 @@ class Stage {
         std::move(tool);
   }
 
+  void add_bus(const std::vector<std::string>& words) {
+    auto tool = std::make_unique<Tool>();
+    test::SerialBank::Options options;
+    for (std::size_t index = 1; index < words.size(); ++index) {
+      const auto equals = words[index].find('=');
+      const std::string key = words[index].substr(0, equals);
+      const std::string value = words[index].substr(equals + 1);
+      if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
+      if (key != "UNITS") continue;
+      options.units.clear();
+      for (unsigned unit = 1; unit <= std::stoul(value); ++unit)
+        options.units.push_back({static_cast<std::uint8_t>(unit)});
+    }
+    tool->server = std::make_unique<test::SerialBank>(options);
+    tool->profile.link.framing = modbus::Framing::rtu;
+    const auto endpoint = link::parse_endpoint(words.at(0)).value();
+    tools_[commands::shared_line(endpoint)] = std::move(tool);
+  }
+
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
   /// Runs one command line (without "spindle") and returns what a terminal would show.
@@ -193,14 +218,20 @@ class Stage {
 
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkFacts& facts) {
-    if (endpoint.medium != link::Medium::tcp) {
+    const bool serial = endpoint.medium == link::Medium::serial;
+    const auto found =
+        tools_.find(serial ? commands::shared_line(endpoint)
+                           : address(endpoint.host, endpoint.port.value_or(facts.port)));
+    if (found == tools_.end() && serial) {
       return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
-    const auto found = tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)));
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
+    const catalogue::SerialFacts& line = facts.serial;
+    const sim::LineModel model{.character_time = link::character_time(link::serial_settings(
+                                   endpoint, line.baud, line.parity, line.stop_bits))};
     Tool& tool = *found->second;
     return sim::make_sim_transport(*tool.server, {++tool.connections}, tool.profile.link.framing,
-                                   tool.faults, tool.answers, clock_, *interrupt_);
+                                   tool.faults, tool.answers, clock_, *interrupt_, model);
   }
 
   files::ProfileStore profiles_;
@@ -243,6 +274,7 @@ class Player {
   void directive(const std::string& line) {
     const auto words = shell_words(line.substr(1));
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
+    if (words.at(0) == "bus") stage_.add_bus({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));
   }
 

@@ -53,6 +53,13 @@ struct PingOptions {
 };
 Result<Outcome> ping(const PingOptions& options, Context& context);
 
+struct ScanOptions {
+  std::string bus;
+  std::vector<modbus::UnitId> units;
+};
+/// Which units of a serial line answer a loop-back, at the line's settings and no others.
+Result<Outcome> scan(const ScanOptions& options, Context& context);
+
 struct WatchOptions {
   std::vector<std::string> targets;
   std::vector<std::string> names;  ///< values to poll; none: events only
@@ -91,7 +98,11 @@ Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
 
 struct SimulateOptions {
   std::string profile;
-  std::string listen = "tcp://127.0.0.1:0";
+  std::string listen;                 ///< URL; empty: a free port of this computer
+  std::string pty;                    ///< path of the pseudo terminal to make instead
+  std::vector<modbus::UnitId> units;  ///< of a serial tool; none: as many as usual
+  std::optional<unsigned> baud;       ///< of its line
+  sim::LineModel::Gaps gaps = sim::LineModel::Gaps::enforced;
   std::vector<std::string> faults;
   std::optional<unsigned> identity_bytes;
   std::optional<std::uint16_t> firmware;

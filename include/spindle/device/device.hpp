@@ -63,6 +63,14 @@ enum class ActionResult : std::uint8_t {
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
 
+/// What came back for a loop-back that any unit may answer.
+enum class Answered : std::uint8_t { data, exception };
+
+struct Probe {
+  Answered answered;
+  Duration round_trip;
+};
+
 enum class EventOutput : std::uint8_t { on, off };
 
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
@@ -73,6 +81,12 @@ class Device {
   static Result<Device> open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                              const LinkOptions& options, const OpenTransport& open_transport,
                              Clock& clock);
+  /// On a serial line: leaves nothing behind that the next one would take for its answer.
+  ~Device();
+  Device(Device&&) noexcept = default;
+  Device& operator=(Device&&) noexcept = default;
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
 
   [[nodiscard]] const catalogue::Profile& profile() const { return *profile_; }
   [[nodiscard]] link::Session& session() { return *session_; }
@@ -138,6 +152,10 @@ class Device {
   /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
   /// response counts as an answer.
   Result<Duration> ping();
+
+  /// FC 08 to this unit of a serial line, once; all later requests go to it too. An exception
+  /// response counts as an answer.
+  Result<Probe> probe(modbus::UnitId unit);
 
  private:
   Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,

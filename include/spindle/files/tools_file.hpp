@@ -19,8 +19,8 @@ struct Place {
 struct Tool {
   std::string name;
   std::string url;
-  std::string profile;                     ///< empty: not given
-  std::string torque_unit;                 ///< empty: unknown
+  std::string profile = {};                ///< empty: not given
+  std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
   Place url_at = {};
   Place profile_at = {};

@@ -14,8 +14,7 @@
 
 namespace spindle::posix {
 
-/// Opens real lines. A port that the endpoint leaves out is the profile's. Serial lines are refused
-/// with `port_unusable` by this version.
+/// Opens real lines. What the endpoint leaves out (port, rate, parity, stop bits) is the profile's.
 std::function<Result<std::unique_ptr<link::Transport>>(
     const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>
 line_opener(Clock& clock, const Interrupt& interrupt);
