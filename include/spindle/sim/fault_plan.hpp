@@ -40,6 +40,7 @@ enum class FaultKind : std::uint8_t {
   close_after,   ///< connection closed after the answer
   ignore_write,  ///< a write is echoed, but nothing is stored
   store_other,   ///< a write is echoed, but value + N (default 1) is stored
+  reset_neighbour,  ///< a write is stored, and the register N (default 1) behind it becomes 0
 };
 
 /// One fault: kind, argument, and when. Counts answers of the whole server from 1; with neither
