@@ -29,48 +29,63 @@ std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes) {
 
 /// Every sign of life gives the tool its time anew; what comes after the time is up is tried once.
 PutBackReport Rollback::put_back(const TriedWrite& write, TimePoint& deadline) {
+  std::optional<catalogue::Value> found;
   while (true) {
-    auto report = connect(deadline).and_then([&] { return try_once(write); });
-    if (report) {
+    auto tried = connect(deadline).and_then([&] { return try_once(write, found); });
+    if (tried) {
       silences_ = 0;
       deadline = calm_->now() + patience;
-      return *std::move(report);
+      return *std::move(tried);
     }
-    const Error& error = report.error();
+    const Error& error = tried.error();
     lost_ = lost_ || error.code != Errc::no_answer || ++silences_ >= silences_allowed;
     const TimePoint next = calm_->now() + pause;
     if (next > deadline || !calm_->sleep_until(next)) {
-      return {.write = write, .result = PutBack::unknown, .trouble = message_of(error)};
+      return {.write = write, .found = found, .trouble = message_of(error)};
     }
   }
 }
 
-/// A refusal is an answer; errors are those of the line.
-Result<PutBackReport> Rollback::try_once(const TriedWrite& write) {
+/// A refusal is an answer; errors are those of the line. `found` is what was there at first: a try
+/// whose answer was lost may have worked.
+Result<PutBackReport> Rollback::try_once(const TriedWrite& write,
+                                         std::optional<catalogue::Value>& found) {
   PutBackReport report{.write = write};
   const auto readings = device_->read_each({write.parameter}, Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
-  const Reading& reading = readings->front();
-  if (!reading.value) {
+  const auto& value = readings->front().value;
+  if (!value) {
     report.result = PutBack::refused;
-    report.trouble = message_of(reading.value.error());
+    report.trouble = message_of(value.error());
     return report;
   }
-  report.found = *reading.value;
-  report.now = report.found;
-  if (*report.now == write.before) {
-    report.result = PutBack::kept;
+  if (!found) found = *value;
+  report.found = found;
+  report.now = *value;
+  if (*value == write.before) {
+    report.result = *found == write.before ? PutBack::kept : PutBack::done;
     return report;
   }
+  return write_back(std::move(report));
+}
+
+Result<PutBackReport> Rollback::write_back(PutBackReport report) {
+  const TriedWrite& write = report.write;
   const auto written = device_->write(write.parameter, *report.now, write.before);
-  const bool is_refused = !written && written.error().code == Errc::exception_response;
-  if (!written && !is_refused) return tl::unexpected(written.error());
-  if (written) report.now = written->now;
-  const bool done = written && written->result == WriteResult::written;
-  report.result = done ? PutBack::done : PutBack::refused;
-  if (is_refused) report.trouble = message_of(written.error());
-  if (!done && !is_refused)
+  if (!written && written.error().code != Errc::exception_response) {
+    return tl::unexpected(written.error());
+  }
+  report.result = PutBack::refused;
+  if (!written) {
+    report.trouble = message_of(written.error());
+    return report;
+  }
+  report.now = written->now;
+  if (written->result == WriteResult::written) {
+    report.result = PutBack::done;
+  } else {
     report.trouble = "the tool acknowledged its old value, but does not hold it";
+  }
   return report;
 }
 

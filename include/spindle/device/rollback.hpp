@@ -55,7 +55,8 @@ class Rollback {
 
  private:
   PutBackReport put_back(const TriedWrite& write, TimePoint& deadline);
-  Result<PutBackReport> try_once(const TriedWrite& write);
+  Result<PutBackReport> try_once(const TriedWrite& write, std::optional<catalogue::Value>& found);
+  Result<PutBackReport> write_back(PutBackReport report);
   Result<void> connect(TimePoint deadline);
 
   Device* device_;
