@@ -170,7 +170,12 @@ Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& op
         progress.show(fmt::format("{}: reading, {} of {}", tool.target.shown, done, total));
       });
   if (!present) return tl::unexpected(std::move(present.error()));
-  if (!present->unreadable.empty()) return tl::unexpected(present->unreadable.front());
+  for (const Error& error : present->unreadable) {
+    const auto* needed = wanted.backup.find(error.name);
+    if (needed != nullptr && wanted.selection.contains(needed->parameter)) {
+      return tl::unexpected(error);
+    }
+  }
   RestoreTask task;
   task.backup = std::move(wanted.backup);
   task.present = std::move(present->snapshot);

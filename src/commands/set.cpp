@@ -260,7 +260,7 @@ class Writer {
     if (!written) {
       const bool refused = written.error().code == Errc::exception_response;
       if (refused) note(step, Ending::refused, step.before);
-      log(step, refused ? to_text(Ending::refused) : "unknown", wanted);
+      log(step, refused ? to_text(Ending::refused) : "unknown", refused ? step.before : wanted);
       fail(written.error());
       return;
     }

@@ -9,9 +9,10 @@
 //                         backups are kept on
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
 //   %disk full|empty      whether it takes any more
+//   %hide progress        from here on the line that a terminal shows for a moment is left out
 //   %answer TEXT          what the user types at the next question
 //   $ spindle ARGUMENTS   followed by what it prints
-//   $ cat FILE, $ head -n N FILE, $ grep TEXT FILE, $ ls    what is on that disk
+//   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
 // Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
 // fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status; a
@@ -26,7 +27,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -135,6 +135,8 @@ class Stage {
         std::move(tool);
   }
 
+  void hide_progress() { hides_progress_ = true; }
+
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
   /// Runs one command line (without "spindle") and returns what a terminal would show.
@@ -157,8 +159,8 @@ class Stage {
                    },
                .err =
                    [&](std::string_view text) {
-                     // Progress on a terminal is wiped away by what follows it.
-                     if (!text.starts_with("\r\x1b[K")) show(text, true);
+                     const bool is_progress = text.starts_with("\r\x1b[K");
+                     if (!is_progress || !hides_progress_) show(text, true);
                    },
                .read_line = [&] { return next_answer(show); },
                .in_is_terminal = !answers_.empty(),
@@ -226,20 +228,19 @@ class Stage {
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
   test::MemoryDisk disk_;
+  bool hides_progress_ = false;
   int status_ = 0;
 };
 
-/// The lines that cat, head, grep and ls print of a disk.
+/// The lines that cat, grep and ls print of a disk.
 Lines look_at(const std::vector<std::string>& words, const test::MemoryDisk& disk) {
   Lines shown;
   if (words.at(0) == "ls") {
     for (const auto& [path, text] : disk.files()) shown.push_back(path);
     return shown;
   }
-  const std::size_t limit =
-      words.at(0) == "head" ? std::stoul(words.at(2)) : std::numeric_limits<std::size_t>::max();
   std::istringstream stream(disk.text(words.back()));
-  for (std::string line; shown.size() < limit && std::getline(stream, line);) {
+  for (std::string line; std::getline(stream, line);) {
     const bool wanted = words.at(0) != "grep" || line.find(words.at(1)) != std::string::npos;
     if (wanted) shown.push_back(line);
   }
@@ -285,6 +286,7 @@ class Player {
     if (words.at(0) == "answer") stage_.answer(words.at(1));
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
+    if (words.at(0) == "hide") stage_.hide_progress();
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
   }
 
