@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
-#include <map>
-#include <set>
 #include <utility>
 
 #include "spindle/base/text.hpp"
@@ -20,19 +17,29 @@ auto find_named(const Entries& entries, std::string_view name) -> decltype(entri
   return found == entries.end() ? nullptr : &*found;
 }
 
-using RegisterKey = std::pair<modbus::RegisterTable, unsigned>;
-
-/// Takes the registers of a parameter, unless another one has some of them.
-bool claim(const Parameter& parameter, std::set<RegisterKey>& taken) {
-  std::vector<RegisterKey> keys;
-  for (unsigned i = 0; i < register_count(parameter.encoding.kind); ++i) {
-    keys.emplace_back(parameter.table, parameter.address.value + i);
+/// Which registers of both tables have a parameter already.
+class Claims {
+ public:
+  /// Takes the registers of a parameter, unless another one has some of them.
+  bool take(const Parameter& parameter) {
+    const std::size_t first = key_of(parameter);
+    const std::size_t end = first + register_count(parameter.encoding.kind);
+    for (std::size_t key = first; key < end; ++key) {
+      if (taken_[key]) return false;
+    }
+    for (std::size_t key = first; key < end; ++key) taken_[key] = true;
+    return true;
   }
-  const bool is_free = std::none_of(keys.begin(), keys.end(),
-                                    [&](const RegisterKey& key) { return taken.contains(key); });
-  if (is_free) taken.insert(keys.begin(), keys.end());
-  return is_free;
-}
+
+ private:
+  static constexpr std::size_t table_size = 0x10000;
+  static std::size_t key_of(const Parameter& parameter) {
+    const bool input = parameter.table == modbus::RegisterTable::input;
+    return (input ? table_size : 0) + parameter.address.value;
+  }
+
+  std::vector<bool> taken_ = std::vector<bool>(2 * table_size + 1);
+};
 
 bool is_numbered(const Parameter& parameter, const NumberedFacts& facts) {
   return parameter.table == facts.table && parameter.address.value >= facts.from &&
@@ -42,15 +49,15 @@ bool is_numbered(const Parameter& parameter, const NumberedFacts& facts) {
 /// What is set is stored; what is only shown changes by itself.
 std::vector<Parameter> numbered_space(const Profile& profile) {
   const NumberedFacts& facts = *profile.numbered;
-  std::set<RegisterKey> taken;
+  Claims claims;
   std::vector<Parameter> space;
   for (const Parameter& parameter : profile.parameters) {
     const bool stored = is_numbered(parameter, facts) || parameter.access == Access::read_write;
-    if (stored && claim(parameter, taken)) space.push_back(parameter);
+    if (stored && claims.take(parameter)) space.push_back(parameter);
   }
   for (unsigned number = facts.from; number <= facts.to; ++number) {
-    auto parameter = profile.find(fmt::format("{}{}", facts.prefix, number));
-    if (parameter && claim(*parameter, taken)) space.push_back(std::move(*parameter));
+    Parameter parameter = profile.numbered_parameter(static_cast<std::uint16_t>(number));
+    if (claims.take(parameter)) space.push_back(std::move(parameter));
   }
   std::stable_sort(space.begin(), space.end(), [](const Parameter& a, const Parameter& b) {
     return std::pair(a.table, a.address.value) < std::pair(b.table, b.address.value);
@@ -188,18 +195,18 @@ const MissingEntry* Snapshot::find_missing(std::string_view name) const {
 
 std::vector<Parameter> stored_parameters(const Profile& profile) {
   if (profile.numbered) return numbered_space(profile);
-  std::set<RegisterKey> taken;
+  Claims claims;
   std::vector<Parameter> stored;
   for (const Parameter& parameter : profile.parameters) {
     const bool stored_there = parameter.table == modbus::RegisterTable::holding;
-    if (stored_there && claim(parameter, taken)) stored.push_back(parameter);
+    if (stored_there && claims.take(parameter)) stored.push_back(parameter);
   }
   return stored;
 }
 
-std::string fingerprint(const Profile& profile) {
+std::string fingerprint(const std::vector<Parameter>& stored) {
   Digest digest;
-  for (const Parameter& parameter : stored_parameters(profile)) add(digest, parameter);
+  for (const Parameter& parameter : stored) add(digest, parameter);
   return digest.to_string();
 }
 

@@ -67,7 +67,7 @@ Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Contex
                                   .version = std::string(context.version),
                                   .target = tool.target.shown,
                                   .profile = profile.id,
-                                  .fingerprint = catalogue::fingerprint(profile),
+                                  .fingerprint = catalogue::fingerprint(stored),
                                   .identity = identity_of(tool.device)}};
   taken.snapshot.entries.reserve(readings->size());
   for (const device::Reading& reading : *readings) add(reading, tool.target, secrets, taken);

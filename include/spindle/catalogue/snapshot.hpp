@@ -65,8 +65,8 @@ struct Snapshot {
 std::vector<Parameter> stored_parameters(const Profile& profile);
 
 /// Tells two versions of a profile apart, as far as backups are concerned: 16 hexadecimal digits of
-/// what it says of its stored parameters. Does not depend on where the file is.
-std::string fingerprint(const Profile& profile);
+/// what it says of its stored_parameters(). Does not depend on where the file is.
+std::string fingerprint(const std::vector<Parameter>& stored);
 
 /// The profile's defaults as a snapshot; entries without a default are left out.
 Snapshot snapshot_of_defaults(const Profile& profile);
