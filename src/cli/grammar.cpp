@@ -209,6 +209,17 @@ struct TypedScan {
   commands::ScanOptions options;
   std::string units;
 };
+struct TypedBackup {
+  commands::BackupOptions options;
+  bool force = false;
+  bool include_secrets = false;
+};
+struct TypedRestore {
+  commands::RestoreOptions options;
+  bool dry_run = false;
+  bool force = false;
+  bool no_rollback = false;
+};
 struct TypedSimulate {
   commands::SimulateOptions options;
   std::string units;
@@ -236,6 +247,9 @@ struct TypedCommands {
   TypedRemoteStart remote_start;
   commands::RemoteStopOptions remote_stop;
   TypedAlarms alarms;
+  TypedBackup backup;
+  commands::DiffOptions diff;
+  TypedRestore restore;
   TypedSimulate simulate;
   TypedTools tools;
   commands::ProfileNameOptions profile;
@@ -592,6 +606,79 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
                     std::string(accept_unverified_words));
 }
 
+Result<Outcome> run_backup(TypedBackup typed, Context& context) {
+  if (typed.options.targets.empty()) return tl::unexpected(missing("backup", "TARGET"));
+  if (typed.force) typed.options.overwrite = Overwrite::allow;
+  if (typed.include_secrets) typed.options.secrets = commands::Secrets::include;
+  return commands::backup(typed.options, context);
+}
+
+void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
+                           "every stored parameter into a file that people can read and git can "
+                           "compare",
+                           "spindle backup station3\n"
+                           "spindle backup station3 -f before-the-change.yaml\n"
+                           "spindle backup @line1 --dir backups --force"};
+  CLI::App* command = add_command(app, draft, words, typed.backup, run_backup);
+  auto& options = typed.backup.options;
+  command->add_option("TARGET", options.targets, "tool name, @group or URL");
+  option(command, "-f,--file", options.file, "FILE",
+         "where to (default TARGET.yaml in the present folder); - is standard output");
+  option(command, "--dir", options.folder, "FOLDER", "one file TARGET.yaml a tool in this folder");
+  command->add_flag("--force", typed.backup.force, "replace files that are there");
+  command->add_flag("--include-secrets", typed.backup.include_secrets,
+                    "also what the profile marks as secret");
+}
+
+void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"diff", "A B [NAME|PATTERN...] [--ignore PATTERN]",
+                           "compare tools, backup files and defaults by parameter name",
+                           "spindle diff station3 station3.yaml\n"
+                           "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
+                           "spindle diff station3 station4 --ignore 'p*'"};
+  const auto run = [](const commands::DiffOptions& options, Context& context) {
+    if (options.a.empty() || options.b.empty()) {
+      return Result<Outcome>(tl::unexpected(missing("diff", options.a.empty() ? "A" : "B")));
+    }
+    return commands::diff(options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.diff, run);
+  command->add_option("A", typed.diff.a, "tool, backup file, or 'defaults'");
+  command->add_option("B", typed.diff.b, "the same");
+  command->add_option("NAME", typed.diff.patterns, "compare only these");
+  command->add_option("--ignore", typed.diff.ignored, "leave these out, repeatable")
+      ->type_name("PATTERN")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+Result<Outcome> run_restore(TypedRestore typed, Context& context) {
+  if (typed.options.target.empty()) return tl::unexpected(missing("restore", "TARGET"));
+  if (typed.options.file.empty()) return tl::unexpected(missing("restore", "FILE"));
+  if (typed.dry_run) typed.options.execution = commands::Execution::dry_run;
+  if (typed.force) typed.options.model = commands::ModelCheck::off;
+  if (typed.no_rollback) typed.options.on_failure = commands::OnFailure::leave;
+  return commands::restore(typed.options, context);
+}
+
+void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"restore", "TARGET FILE [NAME|PATTERN...]",
+                           "plan, confirm, write what differs, verify; put back if it fails",
+                           "spindle restore station3 station3.yaml --dry-run\n"
+                           "spindle restore station3 station3.yaml 'preset.1.*'\n"
+                           "spindle restore station3 old-tool.yaml --yes --json"};
+  CLI::App* command = add_command(app, draft, words, typed.restore, run_restore);
+  auto& options = typed.restore.options;
+  command->add_option("TARGET", options.target, "tool name or URL");
+  command->add_option("FILE", options.file, "backup file");
+  command->add_option("NAME", options.patterns, "restore only these");
+  command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
+  command->add_flag("--force", typed.restore.force, "also to a tool of another model");
+  command->add_flag("--no-rollback", typed.restore.no_rollback,
+                    "leave what was written when something fails");
+}
+
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {
       "simulate", "PROFILE [--listen URL]",
@@ -705,6 +792,9 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_remote_start(app, draft, typed);
   add_remote_stop(app, draft, typed);
   add_alarms(app, draft, typed);
+  add_backup(app, draft, typed);
+  add_diff(app, draft, typed);
+  add_restore(app, draft, typed);
   add_ping(app, draft, typed);
   add_scan(app, draft, typed);
   add_simulate(app, draft, typed);

@@ -7,6 +7,7 @@
 #include "complete.hpp"
 #include "grammar.hpp"
 #include "spindle/base/text.hpp"
+#include "version.hpp"
 
 namespace spindle::cli {
 namespace {
@@ -26,6 +27,12 @@ std::string xdg_folder(const World& world, std::string_view name, std::string_vi
   if (const std::string folder = variable(world, name); folder.starts_with('/')) return folder;
   const std::string home = variable(world, "HOME");
   return home.empty() ? std::string() : home + "/" + std::string(below_home);
+}
+
+/// Where spindle keeps what it remembers between runs; empty when nobody says.
+std::string state_folder(const World& world) {
+  const std::string folder = xdg_folder(world, "XDG_STATE_HOME", ".local/state");
+  return folder.empty() ? folder : folder + "/spindle";
 }
 
 /// The user's own profiles first, then the installed ones, then those of the build tree.
@@ -54,7 +61,7 @@ std::string find_tools_file(const World& world, const Invocation& invocation) {
   if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
   places.emplace_back("/etc/spindle/tools.yaml");
   for (std::string& place : places) {
-    if (world.file_exists(place)) return std::move(place);
+    if (world.disk.exists(place)) return std::move(place);
   }
   return {};
 }
@@ -81,6 +88,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   const auto tools = find_tools(world, invocation);
   if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles(profile_folders(world));
+  const std::string state = state_folder(world);
   commands::Context context{.io = world.io,
                             .clock = world.clock,
                             .interrupt = world.interrupt,
@@ -88,6 +96,9 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                             .calm = world.calm,
                             .serve = world.serve,
                             .end_waits = world.end_waits,
+                            .disk = world.disk,
+                            .state_folder = state,
+                            .version = version,
                             .profiles = profiles,
                             .tools = *tools,
                             .renderer = renderer,

@@ -119,7 +119,7 @@ Result<void> find_profile(OpenTool& tool, const Context& context) {
   }
   // Products that their answer does not tell apart share the register map of their common base.
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
-  tool.device.use(*tool.profile);
+  tool.device.use(*tool.profile, std::move(identification->identity));
   return {};
 }
 

@@ -48,6 +48,14 @@ void append_without_absent(const Area& area, const std::vector<Area>& absent,
   append(std::uint32_t{area.to} + 1);
 }
 
+bool is_said_absent(const Parameter& parameter, const catalogue::Profile& profile) {
+  const auto& absent = profile.link.absent;
+  return std::any_of(absent.begin(), absent.end(), [&](const Area& area) {
+    return area.table == parameter.table && area.from <= parameter.address.value &&
+           parameter.address.value <= area.to;
+  });
+}
+
 modbus::RegisterTable event_table(const catalogue::EventFacts& events) {
   const bool input =
       events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
@@ -62,6 +70,10 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
             [](const Area& a, const Area& b) { return a.from < b.from; });
   for (const Area& area : profile.link.contiguous) {
     append_without_absent(area, absent, limits.contiguous);
+  }
+  for (const Area& area : absent) {
+    limits.absent.push_back(
+        {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
   }
   if (profile.events) {
     const bool input = profile.events->function ==
@@ -244,8 +256,9 @@ void Device::set_retries(unsigned retries) {
   client_ = link::Client(*session_, read_limits(*profile_), retries_);
 }
 
-void Device::use(const catalogue::Profile& profile) {
+void Device::use(const catalogue::Profile& profile, catalogue::Identity identity) {
   profile_ = &profile;
+  identity_ = std::move(identity);
   session_->set_rules(demux_rules(*profile_, session_->options().rules.framing));
   client_ = link::Client(*session_, read_limits(*profile_), retries_);
   registers_known_ = true;
@@ -258,12 +271,15 @@ Result<void> Device::require_known_registers() {
     return tl::unexpected(std::move(answer.error()));
   }
   const auto& facts = *profile_->identity;
-  const auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
+  auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
   const auto generation = catalogue::generation_of(facts, identity);
   registers_known_ = generation == catalogue::Generation::known;
   identity_text_ =
       fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
-  if (registers_known_) return {};
+  if (registers_known_) {
+    identity_ = std::move(identity);
+    return {};
+  }
   Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
   error.message =
       generation == catalogue::Generation::later
@@ -280,42 +296,70 @@ Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& par
                                                Limits limits, const link::Progress& progress) {
   std::vector<RegisterRange> wanted;
   wanted.reserve(parameters.size());
-  for (const Parameter& parameter : parameters) {
-    wanted.push_back(range_of(parameter));
-    const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
-    if (!own) continue;
-    wanted.push_back(range_at(parameter, own->minimum));
-    wanted.push_back(range_at(parameter, own->maximum));
-  }
-  auto image = client_.read_each(wanted, progress);
-  if (!image) return tl::unexpected(located(std::move(image.error())));
+  for (const Parameter& parameter : parameters) wanted.push_back(range_of(parameter));
+  std::vector<RegisterRange> wanted_limits;
+  if (limits == Limits::read) wanted_limits = limit_ranges(parameters, nullptr);
+  const std::size_t first_part = progress ? client_.count_requests(wanted) : 0;
+  const std::size_t second_part =
+      progress && !wanted_limits.empty() ? client_.count_requests(wanted_limits) : 0;
+  auto values = client_.read_each(wanted, [&](std::size_t done, std::size_t total) {
+    if (progress) progress(done, total + second_part);
+  });
+  if (!values) return tl::unexpected(located(std::move(values.error())));
+  // What does not exist has no limits worth asking for.
+  if (limits == Limits::read) wanted_limits = limit_ranges(parameters, &*values);
+  auto limit_values = client_.read_each(wanted_limits, [&](std::size_t done, std::size_t total) {
+    if (progress) progress(first_part + done, first_part + total);
+  });
+  if (!limit_values) return tl::unexpected(located(std::move(limit_values.error())));
   std::vector<Reading> readings;
   readings.reserve(parameters.size());
   for (const Parameter& parameter : parameters) {
-    readings.push_back(reading_of(parameter, limits, *image));
+    readings.push_back(reading_of(parameter, limits, *values, *limit_values));
   }
   return readings;
 }
 
+/// The registers of the tool's own limits; of those parameters that exist, as far as is known.
+std::vector<RegisterRange> Device::limit_ranges(const std::vector<Parameter>& parameters,
+                                                const link::RegisterImage* values) {
+  std::vector<RegisterRange> ranges;
+  for (const Parameter& parameter : parameters) {
+    const auto own = profile_->limit_registers(parameter);
+    if (!own || (values == nullptr && is_said_absent(parameter, *profile_))) continue;
+    const RegisterRange minimum = range_at(parameter, own->minimum);
+    const RegisterRange maximum = range_at(parameter, own->maximum);
+    if (values != nullptr && !values->get(range_of(parameter))) {
+      client_.avoid(minimum);
+      client_.avoid(maximum);
+      continue;
+    }
+    ranges.push_back(minimum);
+    ranges.push_back(maximum);
+  }
+  return ranges;
+}
+
 Reading Device::reading_of(const Parameter& parameter, Limits limits,
-                           const link::RegisterImage& image) const {
+                           const link::RegisterImage& values,
+                           const link::RegisterImage& limit_values) const {
   const auto with_name = [&](Error error) {
     error = located(std::move(error));
     error.name = parameter.name;
     return error;
   };
-  const auto value_at = [&](const RegisterRange& range) {
+  const auto value_at = [&](const RegisterRange& range, const link::RegisterImage& image) {
     return image.get(range)
         .and_then([&](const Registers& registers) { return decode(parameter, registers); })
         .map_error(with_name);
   };
   Reading reading{.parameter = parameter,
-                  .registers = image.get(range_of(parameter)).map_error(with_name),
-                  .value = value_at(range_of(parameter))};
+                  .registers = values.get(range_of(parameter)).map_error(with_name),
+                  .value = value_at(range_of(parameter), values)};
   const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
-  if (!own) return reading;
-  auto minimum = value_at(range_at(parameter, own->minimum));
-  auto maximum = value_at(range_at(parameter, own->maximum));
+  if (!own || !reading.registers) return reading;
+  auto minimum = value_at(range_at(parameter, own->minimum), limit_values);
+  auto maximum = value_at(range_at(parameter, own->maximum), limit_values);
   if (minimum) reading.minimum = *minimum;
   if (maximum) reading.maximum = *maximum;
   if (!minimum) reading.limits_error = minimum.error();

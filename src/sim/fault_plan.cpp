@@ -94,6 +94,9 @@ constexpr std::array kinds = {
              "a write is echoed, but nothing is stored or done"},
     KindInfo{FaultKind::store_other, "store-other", Argument::number, 1, 1, word_limit,
              "store-other[=N]", "a write is echoed, but its value plus N (1) is stored"},
+    KindInfo{FaultKind::reset_neighbour, "reset-neighbour", Argument::number, 1, 1, word_limit,
+             "reset-neighbour[=N]",
+             "a write is stored, and the register N (1) behind it becomes 0"},
 };
 
 const KindInfo& info_of(FaultKind kind) {

@@ -96,6 +96,38 @@ struct AlarmsOptions {
 };
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
 
+enum class Secrets : std::uint8_t { leave_out, include };
+
+struct BackupOptions {
+  std::vector<std::string> targets;
+  std::string file;    ///< of the one target; "-": standard output; empty: named after the target
+  std::string folder;  ///< where files named after their targets go; empty: the present one
+  Overwrite overwrite = Overwrite::refuse;
+  Secrets secrets = Secrets::leave_out;
+};
+Result<Outcome> backup(const BackupOptions& options, Context& context);
+
+struct DiffOptions {
+  std::string a;  ///< target, group of one, backup file, or "defaults"
+  std::string b;
+  std::vector<std::string> patterns;
+  std::vector<std::string> ignored;
+};
+Result<Outcome> diff(const DiffOptions& options, Context& context);
+
+enum class ModelCheck : std::uint8_t { strict, off };
+enum class OnFailure : std::uint8_t { roll_back, leave };
+
+struct RestoreOptions {
+  std::string target;
+  std::string file;
+  std::vector<std::string> patterns;
+  Execution execution = Execution::real;
+  ModelCheck model = ModelCheck::strict;
+  OnFailure on_failure = OnFailure::roll_back;
+};
+Result<Outcome> restore(const RestoreOptions& options, Context& context);
+
 struct SimulateOptions {
   std::string profile;
   std::string listen;                 ///< URL; empty: a free port of this computer

@@ -94,8 +94,12 @@ class Device {
   /// The bytes of FC 11h. An exception response is an error like any other.
   Result<Bytes> report_server_id();
 
-  /// Goes on with a profile that was found by the answer to FC 11h.
-  void use(const catalogue::Profile& profile);
+  /// Goes on with a profile that was found by the answer to FC 11h, and what that says.
+  void use(const catalogue::Profile& profile, catalogue::Identity identity);
+
+  /// What the tool said of itself when its registers were last checked; empty before, and for a
+  /// product without an identity.
+  [[nodiscard]] const std::optional<catalogue::Identity>& identity() const { return identity_; }
 
   /// Ends the connection; everything that needs it fails with `closed` from now on. A tool that
   /// serves one client at a time must be let go before it is opened anew.
@@ -113,8 +117,8 @@ class Device {
   /// firmware 2103"; empty before.
   [[nodiscard]] const std::string& identity_text() const { return identity_text_; }
 
-  /// Reads all in the fewest requests. A refused register stands in its reading; anything else ends
-  /// it.
+  /// Reads all in the fewest requests, and the limits of what exists. A refused register stands in
+  /// its reading; anything else ends it.
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
                                          Limits limits, const link::Progress& progress = {});
 
@@ -165,7 +169,10 @@ class Device {
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
   Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
-                     const link::RegisterImage& image) const;
+                     const link::RegisterImage& values,
+                     const link::RegisterImage& limit_values) const;
+  std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
+                                                const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
 
@@ -177,6 +184,7 @@ class Device {
   link::Client client_;
   bool registers_known_ = false;
   std::string identity_text_ = {};
+  std::optional<catalogue::Identity> identity_ = std::nullopt;
 };
 
 }  // namespace spindle::device

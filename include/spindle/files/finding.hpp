@@ -4,6 +4,12 @@
 
 namespace spindle::files {
 
+/// Line and column of something in a file, from 1; line 0: it is not there.
+struct Place {
+  int line = 0;
+  int column = 0;
+};
+
 /// One fault in a file.
 struct Finding {
   std::string file;

@@ -9,12 +9,6 @@
 
 namespace spindle::files {
 
-/// Where something stands in the file; both from 1.
-struct Place {
-  int line = 0;
-  int column = 0;
-};
-
 /// One named tool of the tools file (contract, section 2.1).
 struct Tool {
   std::string name;

@@ -22,8 +22,6 @@ line_opener(Clock& clock, const Interrupt& interrupt);
 /// A variable of the environment; empty when it is not set.
 std::optional<std::string> environment(std::string_view name);
 
-bool file_exists(const std::string& path);
-
 /// The folder of the running executable, without a slash at its end.
 std::string program_folder();
 

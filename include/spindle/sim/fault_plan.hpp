@@ -38,10 +38,11 @@ enum class FaultKind : std::uint8_t {
   push_inside,  ///< first half of an event frame, then after 1 ms its rest together with the answer
   push_after,   ///< an event frame just after the answer
   close,        ///< connection closed instead of the answer
-  close_inside,  ///< connection closed in the middle of the answer
-  close_after,   ///< connection closed after the answer
-  ignore_write,  ///< a write is echoed, but nothing is stored
-  store_other,   ///< a write is echoed, but value + N (default 1) is stored
+  close_inside,     ///< connection closed in the middle of the answer
+  close_after,      ///< connection closed after the answer
+  ignore_write,     ///< a write is echoed, but nothing is stored
+  store_other,      ///< a write is echoed, but value + N (default 1) is stored
+  reset_neighbour,  ///< a write is stored, and the register N (default 1) behind it becomes 0
 };
 
 /// One fault: kind, argument, and when. Counts answers of the whole server from 1; with neither
