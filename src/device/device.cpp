@@ -96,7 +96,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   if (profile.link.framing == modbus::Framing::rtu) {
     const unsigned baud = endpoint.baud.value_or(profile.link.serial.baud);
     session.gap = gap_of(profile.link.serial, baud);
-    session.broadcast_gap = profile.link.serial.broadcast_pause;
+    session.broadcast_gap = session.gap + profile.link.serial.broadcast_pause;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;
