@@ -6,11 +6,21 @@
 #include <set>
 #include <utility>
 
+#include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 
 namespace spindle::commands {
 namespace {
+
+/// Whom a broadcast inside the program reaches.
+const std::vector<std::uint8_t> simulated_bus = {1, 2, 3};
+
+std::vector<std::uint8_t> units_for(const link::Endpoint& endpoint,
+                                    const catalogue::LinkFacts& facts) {
+  const std::uint8_t unit = endpoint.unit.value_or(modbus::UnitId{facts.unit}).value;
+  return unit == 0 ? simulated_bus : std::vector<std::uint8_t>{unit};
+}
 
 /// The identity has one of the lengths at which the profile says that something more begins.
 Result<void> check_identity_bytes(const catalogue::Profile& profile,
@@ -36,9 +46,14 @@ Result<SimulatedTool> make_simulated_tool(const std::string& profile,
   if (!loaded) return tl::unexpected(std::move(loaded.error()));
   auto start = context.profiles.load_simulation(profile);
   if (!start) return tl::unexpected(std::move(start.error()));
-  if (loaded->link.framing != modbus::Framing::tcp) {
+  if (loaded->run) {
+    auto bus = sim::make_blv_bus(*loaded, *start, {.units = options.units});
+    return SimulatedTool{std::move(*loaded), std::move(bus)};
+  }
+  if (!loaded->events) {
     return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "serial tools can not be simulated by this version",
+                                .message = "this product can not be simulated",
+                                .hint = "its profile has neither 'run' nor 'events'",
                                 .name = profile});
   }
   if (auto known = check_identity_bytes(*loaded, options.identity_bytes); !known) {
@@ -62,7 +77,9 @@ device::OpenTransport with_simulated_tools(const Context& context, SimulatedTool
     if (endpoint.medium != link::Medium::simulated) {
       return context.open(endpoint, facts, connect_timeout);
     }
-    auto tool = make_simulated_tool(endpoint.profile, options, context);
+    SimulatedToolOptions here = options;
+    here.units = units_for(endpoint, facts);
+    auto tool = make_simulated_tool(endpoint.profile, here, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     return sim::make_sim_transport(std::move(tool->server), tool->profile.link.framing, {},
                                    context.clock, context.interrupt);

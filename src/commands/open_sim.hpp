@@ -12,6 +12,7 @@ struct SimulatedToolOptions {
   std::optional<std::uint16_t> model = std::nullopt;
   sim::FaultPlan faults = {};
   std::optional<Duration> rundown_every = std::nullopt;  ///< an operator's; empty: nobody works
+  std::vector<std::uint8_t> units = {1};                 ///< addresses on a simulated line
   unsigned ng_every = 0;  ///< every so many run-downs of the operator end NG; 0: none
 };
 

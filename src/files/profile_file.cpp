@@ -483,6 +483,13 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
   if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
   assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
   assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
+  if (const YamlNode* alarms = map.get("permanent-alarms")) {
+    expect(*alarms, YamlNode::Kind::sequence, findings);
+    for (const YamlNode& item : alarms->items) {
+      const auto code = to_unsigned(item, last_register, findings);
+      if (code) facts.permanent_alarms.push_back(static_cast<std::int64_t>(*code));
+    }
+  }
   assign(facts.absent, read_areas(map.get("absent"), findings));
   map.finish();
   return facts;

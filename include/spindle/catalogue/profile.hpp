@@ -187,6 +187,7 @@ struct SimulationFacts {
   std::uint8_t limit_exception =
       static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_value);
   std::uint16_t stopped_error = 0;  ///< error code of a run that was stopped before its target
+  std::vector<std::int64_t> permanent_alarms = {};  ///< that only switching off and on ends
   struct Value {
     std::string pattern;
     std::int64_t raw = 0;
