@@ -43,10 +43,8 @@ std::string meaning_of(const Parameter& parameter) {
 /// What only some products say of their parameters.
 void add_drive_fields(const Parameter& parameter, report::Record& record) {
   if (!parameter.bits.empty()) {
-    report::Pairs bits;
-    for (const auto& bit : parameter.bits) {
-      bits.emplace_back(std::to_string(bit.bit), bit.when ? bit_text(bit, parameter) : bit.text);
-    }
+    report::Texts bits;
+    for (const auto& bit : parameter.bits) bits.push_back(bit_text(bit, parameter));
     record.fields.push_back({"bits", bits});
   }
   if (parameter.except) {

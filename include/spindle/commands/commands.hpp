@@ -30,10 +30,15 @@ Result<Outcome> get(const GetOptions& options, Context& context);
 
 enum class Execution : std::uint8_t { real, dry_run };
 
+/// Whether a tool stores what was written once more, where it would forget it at power-off.
+enum class Storing : std::uint8_t { no, yes };
+
 struct SetOptions {
   std::string target;
   std::vector<std::string> assignments;  ///< NAME=VALUE
   Execution execution = Execution::real;
+  Storing storing = Storing::no;
+  Reach reach = Reach::one;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
 
@@ -43,6 +48,7 @@ struct DoOptions {
   std::string target;
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
+  Reach reach = Reach::one;
 };
 Result<Outcome> perform(const DoOptions& options, Context& context);
 
@@ -72,11 +78,21 @@ struct RemoteStartOptions {
   std::string direction;          ///< value of the action direction; empty: leave as it is
   std::optional<Duration> limit;  ///< stop after this time
   Acceptance acceptance = Acceptance::verified_only;
+  // Of a motor that a command word runs.
+  std::string speed = {};  ///< r/min
+  catalogue::Direction direction_of_motor = catalogue::Direction::forward;
+  std::optional<std::uint16_t> operation = std::nullopt;  ///< operation data; empty: the profile's
+  std::string acceleration = {};                          ///< seconds; empty: leave as it is
+  std::string deceleration = {};                          ///< seconds; empty: leave as it is
+  std::optional<Duration> watchdog = std::nullopt;        ///< the driver's own; empty: leave it
+  std::optional<catalogue::StopMode> stop = std::nullopt;
 };
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context);
 
 struct RemoteStopOptions {
   std::vector<std::string> targets;
+  std::optional<catalogue::StopMode> stop = std::nullopt;
+  Reach reach = Reach::one;
 };
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 
