@@ -248,11 +248,12 @@ Result<catalogue::Profile> load_profile(const Target& target, const Context& con
 
 /// Unit 0 on a serial line is everybody, and nobody answers.
 Result<void> check_reach(const Target& target, const catalogue::Profile& profile) {
-  const bool serial = profile.link.framing == modbus::Framing::rtu ||
-                      target.endpoint.medium == link::Medium::serial ||
-                      target.endpoint.medium == link::Medium::rtu_over_tcp;
+  const bool serial_line = target.endpoint.medium == link::Medium::serial ||
+                           target.endpoint.medium == link::Medium::rtu_over_tcp;
+  const bool serial_product = profile.link.framing == modbus::Framing::rtu;
   const std::uint8_t unit = target.endpoint.unit.value_or(modbus::UnitId{profile.link.unit}).value;
-  const bool everybody = serial && unit == 0;
+  const bool meant = serial_product || (serial_line && target.endpoint.unit);
+  const bool everybody = meant && unit == 0;
   if (everybody == (target.reach == Reach::everybody)) return {};
   Error error{.code = Errc::usage};
   if (everybody) {

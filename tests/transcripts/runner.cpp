@@ -258,7 +258,8 @@ class Stage {
     const auto found = endpoint.medium == link::Medium::tcp
                            ? tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)))
                            : tools_.find(address(endpoint));
-    if (endpoint.medium != link::Medium::tcp && found == tools_.end()) {
+    const bool serial = endpoint.medium != link::Medium::tcp;
+    if (serial && (found == tools_.end() || found->second->bus == nullptr)) {
       return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
