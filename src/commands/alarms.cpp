@@ -105,6 +105,30 @@ const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table
   return known == texts->end() ? nullptr : &known->second;
 }
 
+/// One code of a list, told and remembered.
+void tell(const Source& source, std::size_t index, const device::Reading& reading,
+          const catalogue::CodeTables& tables, const OpenTool& tool, Findings& findings,
+          Listing& listing, const Clock& clock) {
+  if (!reading.value) {
+    findings.outcome.fail(reading.value.error());
+    listing.add(reading.value.error());
+    return;
+  }
+  findings.outcome.succeed();
+  // The rest of a history that is not full says nothing.
+  const bool unused = index > 1 && reading.value->number == Decimal(0);
+  if (unused && !tool.profile->alarm_lists.empty()) return;
+  const catalogue::CodeText* text = nullptr;
+  if (source.list != data_list) {
+    text = text_of(reading.value->number.mantissa(), source.table, tables, tool);
+  }
+  if (source.list == present_list) {
+    findings.present = *reading.value;
+    if (text != nullptr) findings.resettable = text->resettable;
+  }
+  listing.add(alarm_record(source.list, index, *reading.value, text, tool.target, clock));
+}
+
 Result<void> show(const AlarmPlan& plan, OpenTool& tool, Findings& findings, Context& context) {
   const auto tables = context.profiles.load_code_tables(tool.profile->path);
   if (!tables) return tl::unexpected(tables.error());
@@ -116,27 +140,9 @@ Result<void> show(const AlarmPlan& plan, OpenTool& tool, Findings& findings, Con
   Listing listing(context, columns);
   std::size_t index = 0;
   for (std::size_t at = 0; at < readings->size(); ++at) {
-    const std::string& list = plan.sources[at].list;
-    index = at > 0 && plan.sources[at - 1].list == list ? index + 1 : 1;
-    const device::Reading& reading = (*readings)[at];
-    if (!reading.value) {
-      findings.outcome.fail(reading.value.error());
-      listing.add(reading.value.error());
-      continue;
-    }
-    findings.outcome.succeed();
-    // The rest of a history that is not full says nothing.
-    const bool unused = index > 1 && reading.value->number == Decimal(0);
-    if (unused && !tool.profile->alarm_lists.empty()) continue;
-    const catalogue::CodeText* text = nullptr;
-    if (list != data_list) {
-      text = text_of(reading.value->number.mantissa(), plan.sources[at].table, *tables, tool);
-    }
-    if (list == present_list) {
-      findings.present = *reading.value;
-      if (text != nullptr) findings.resettable = text->resettable;
-    }
-    listing.add(alarm_record(list, index, *reading.value, text, tool.target, context.clock));
+    const Source& source = plan.sources[at];
+    index = at > 0 && plan.sources[at - 1].list == source.list ? index + 1 : 1;
+    tell(source, index, (*readings)[at], *tables, tool, findings, listing, context.clock);
   }
   return listing.end();
 }

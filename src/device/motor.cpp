@@ -161,23 +161,24 @@ Result<StopResult> MotorStopper::stop(Device& device, Clock& clock) {
   if (!sent) return tl::unexpected(std::move(sent.error()));
   const Duration needed = mode_ == StopMode::decelerate && !harder_ ? stopping_ : Duration::zero();
   const TimePoint deadline = clock.now() + needed + device.session().options().answer_timeout;
-  bool forgiven = false;  // one lost answer of a stop that was acknowledged
+  auto stopped = await_standstill(device, clock, deadline);
+  if (stopped == StopResult::unconfirmed) harder_ = true;
+  return stopped;
+}
+
+Result<StopResult> MotorStopper::await_standstill(Device& device, Clock& clock,
+                                                  TimePoint deadline) const {
+  bool forgiving = true;  // of one lost answer: the stop itself was acknowledged
   while (true) {
-    const auto still = motor_->stands_still(device);
-    if (!still && (forgiven || still.error().code != Errc::no_answer)) {
-      return tl::unexpected(still.error());
-    }
-    if (still == Shown::yes) return StopResult::confirmed;
-    if (!still) {
-      forgiven = true;
-      continue;
-    }
+    auto still = motor_->stands_still(device);
+    const bool lost = !still && still.error().code == Errc::no_answer;
+    if (lost && std::exchange(forgiving, false)) continue;
+    if (!still) return tl::unexpected(std::move(still.error()));
+    if (*still == Shown::yes) return StopResult::confirmed;
     const TimePoint next = clock.now() + confirm_interval;
-    if (next > deadline) break;
+    if (next > deadline) return StopResult::unconfirmed;
     if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
-  harder_ = true;
-  return StopResult::unconfirmed;
 }
 
 Duration time_of(const Reading& reading, Duration fallback) {

@@ -86,6 +86,7 @@ class MotorStopper {
 
  private:
   [[nodiscard]] std::uint16_t word() const;
+  Result<StopResult> await_standstill(Device& device, Clock& clock, TimePoint deadline) const;
 
   const Motor* motor_;
   catalogue::StopMode mode_;
