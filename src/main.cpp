@@ -22,6 +22,6 @@ int main(int count, char** arguments) {
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,
       .disk = local_disk(),
-      .program_folder = program_folder()};
+      .installation = installation()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
 }

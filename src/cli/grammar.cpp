@@ -31,6 +31,7 @@ struct Typed {
   std::string connect_timeout;
   std::string retries;
   std::string color;
+  std::string trace;
   bool json = false;
   bool yes = false;
   bool no_input = false;
@@ -140,6 +141,7 @@ void add_common_options(CLI::App& app, Typed& typed) {
   flag(&app, "--no-input", typed.no_input, "never ask; what would have to be asked is refused");
   flag(&app, "-q,--quiet", typed.quiet, "no summary and no notes on stderr");
   flag(&app, "-v,--verbose", typed.verbose, "every frame and decision on stderr");
+  option(&app, "--trace", typed.trace, "FILE", "every frame into a pcapng file for Wireshark");
   option(&app, "--color", typed.color, "WHEN", "auto, always or never");
   flag(&app, "-h,--help", typed.help, "show this help");
   flag(&app, "--version", typed.version, "show the version");
@@ -957,6 +959,7 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   common.connect_timeout = *connect_timeout;
   if (typed.no_input) common.consent = commands::Consent::no_input;
   if (typed.yes) common.consent = commands::Consent::given;
+  common.trace_file = typed.trace;
   if (typed.verbose) common.verbosity = commands::Verbosity::frames;
   return {};
 }
@@ -1023,13 +1026,14 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
     invocation.text = help_of(app, draft);
     return invocation;
   }
-  if (draft.typed.version && !misspelt) {
-    invocation.text = fmt::format("spindle {}\n", version);
-    return invocation;
-  }
-  if (extra) return tl::unexpected(unexpected_argument(app, draft, *extra));
+  const bool wants_version = draft.typed.version && !misspelt;
+  if (extra && !wants_version) return tl::unexpected(unexpected_argument(app, draft, *extra));
   if (auto understood = understand_common(draft.typed, invocation); !understood) {
     return tl::unexpected(std::move(understood.error()));
+  }
+  if (wants_version) {
+    invocation.asks = Invocation::Asks::version;
+    return invocation;
   }
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));

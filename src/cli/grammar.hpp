@@ -16,7 +16,9 @@ enum class ColorChoice : std::uint8_t { automatic, always, never };
 
 /// What was typed, understood; nothing has been touched yet.
 struct Invocation {
-  /// Set: print this and end with status 0 (--help, --version).
+  /// What is wanted of the program: a command's deed, or to know what runs here (--version).
+  enum class Asks : std::uint8_t { command, version } asks = Asks::command;
+  /// Set: print this and end with status 0 (--help).
   std::optional<std::string> text = std::nullopt;
   report::Format format = report::Format::table;
   report::Talk talk = report::Talk::normal;

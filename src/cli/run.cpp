@@ -1,5 +1,7 @@
 #include "spindle/cli/run.hpp"
 
+#include <fmt/format.h>
+
 #include <exception>
 #include <filesystem>
 #include <utility>
@@ -7,6 +9,7 @@
 #include "complete.hpp"
 #include "grammar.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/files/capture.hpp"
 #include "version.hpp"
 
 namespace spindle::cli {
@@ -46,7 +49,7 @@ std::vector<std::string> profile_folders(const World& world) {
   if (!data.empty()) folders.push_back(data + "/spindle/profiles");
   for (const std::string_view below :
        {"/../share/spindle/profiles", "/profiles", "/../profiles", "/../../profiles"}) {
-    const std::filesystem::path folder = world.program_folder + std::string(below);
+    const std::filesystem::path folder = world.installation.folder + std::string(below);
     folders.push_back(folder.lexically_normal().string());
   }
   return folders;
@@ -83,6 +86,16 @@ report::Color color_of(const World& world, ColorChoice choice) {
   return able ? report::Color::on : report::Color::off;
 }
 
+/// The head of the capture file; what follows is appended frame by frame.
+Result<void> begin_capture(const std::string& path, const Disk& disk) {
+  if (path.empty()) return {};
+  auto begun = disk.write(path, files::capture_head(), Overwrite::refuse);
+  if (!begun && begun.error().status() == ExitStatus::usage) {
+    begun.error().hint = "choose another name for --trace";
+  }
+  return begun;
+}
+
 Result<commands::Outcome> run_command(const Invocation& invocation, World& world,
                                       report::Renderer& renderer) {
   const auto tools = find_tools(world, invocation);
@@ -103,6 +116,9 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                             .tools = *tools,
                             .renderer = renderer,
                             .common = invocation.common};
+  if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
+    return tl::unexpected(std::move(begun.error()));
+  }
   return invocation.run(context);
 }
 
@@ -126,6 +142,25 @@ int run_completion(const std::vector<std::string>& words, World& world) {
   return exit_status(written ? ExitStatus::ok : written.error().status());
 }
 
+Result<void> tell_version(const World& world, report::Format format, report::Renderer& renderer) {
+  const std::string& library = world.installation.modbus_library;
+  const std::string plain = fmt::format("spindle {}\nlibmodbus {}\nprofile format {}", version,
+                                        library, files::profile_format);
+  if (format != report::Format::json) return world.io.out(plain + "\n");
+  report::Texts profiles;
+  for (const auto& entry : files::ProfileStore(profile_folders(world)).list()) {
+    profiles.push_back(entry.id);
+  }
+  return renderer.line({.type = "version",
+                        .target = {},
+                        .time = world.clock.wall(),
+                        .fields = {{"version", std::string(version)},
+                                   {"libmodbus", library},
+                                   {"profile_format", Decimal(files::profile_format)},
+                                   {"profiles", std::move(profiles)}}},
+                       plain);
+}
+
 int run_guarded(const std::vector<std::string>& arguments, World& world) {
   if (!arguments.empty() && arguments.front() == completion_command) {
     return run_completion({arguments.begin() + 1, arguments.end()}, world);
@@ -136,6 +171,10 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   if (invocation) world.io.color = color_of(world, invocation->color);
   const auto renderer = report::make_renderer(format, world.io, talk);
   if (!invocation) return tell(invocation.error(), world, *renderer);
+  if (invocation->asks == Invocation::Asks::version) {
+    const auto told = tell_version(world, format, *renderer);
+    return told ? exit_status(ExitStatus::ok) : tell(told.error(), world, *renderer);
+  }
   if (invocation->text) {
     const auto written = world.io.out(*invocation->text);
     return written ? exit_status(ExitStatus::ok) : tell(written.error(), world, *renderer);

@@ -65,12 +65,14 @@ Result<Target> single_target(const std::string& text, const Context& context) {
   return tl::unexpected(unknown_target(text, context.tools));
 }
 
-device::LinkOptions link_options(const Target& target, const Context& context) {
-  return {.answer_timeout = context.common.timeout,
-          .connect_timeout = context.common.connect_timeout,
-          .retries = context.common.retries,
-          .trace = make_trace(target.shown, context),
-          .shown = target.shown};
+device::LinkOptions link_options(const Target& target, const catalogue::Profile& profile,
+                                 const Context& context) {
+  return {
+      .answer_timeout = context.common.timeout,
+      .connect_timeout = context.common.connect_timeout,
+      .retries = context.common.retries,
+      .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link), context),
+      .shown = target.shown};
 }
 
 SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
@@ -291,7 +293,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
     return tl::unexpected(std::move(meant.error()));
   }
   auto device = device::Device::open(
-      with_port(target.endpoint, profile), profile, link_options(target, context),
+      with_port(target.endpoint, profile), profile, link_options(target, profile, context),
       with_simulated_tools(context, simulated_options(simulated_operator)), context.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {

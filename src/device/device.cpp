@@ -117,19 +117,6 @@ Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
   return caution * link::standard_silence(baud);
 }
 
-modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
-  switch (endpoint.medium) {
-    case link::Medium::tcp:
-      return modbus::Framing::tcp;
-    case link::Medium::serial:
-    case link::Medium::rtu_over_tcp:
-      return modbus::Framing::rtu;
-    case link::Medium::simulated:
-      break;
-  }
-  return facts.framing;
-}
-
 link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
   link::DemuxRules rules{.framing = framing, .spontaneous = {}};
   if (profile.events) {
@@ -209,6 +196,19 @@ std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& o
 }
 
 }  // namespace
+
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
+  switch (endpoint.medium) {
+    case link::Medium::tcp:
+      return modbus::Framing::tcp;
+    case link::Medium::serial:
+    case link::Medium::rtu_over_tcp:
+      return modbus::Framing::rtu;
+    case link::Medium::simulated:
+      break;
+  }
+  return facts.framing;
+}
 
 Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                const LinkOptions& options, std::unique_ptr<link::Session> session)

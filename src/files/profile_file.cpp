@@ -9,6 +9,7 @@
 #include "files/profile_entries.hpp"
 #include "files/yaml_map.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/files/profile_store.hpp"
 
 namespace spindle::files {
 namespace {
@@ -16,9 +17,6 @@ namespace {
 using catalogue::Area;
 using catalogue::CodeText;
 using catalogue::Evidence;
-
-/// The only format there is; a later one gets a number of its own.
-constexpr std::uint16_t known_format = 1;
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
@@ -404,9 +402,9 @@ ProfileHead read_head(const YamlNode& document, Findings& findings) {
   if (!expect(document, YamlNode::Kind::map, findings)) return head;
   YamlMap map(document, findings);
   const YamlNode* format = map.get("format", Need::required);
-  if (format != nullptr && format->text != std::to_string(known_format)) {
+  if (format != nullptr && format->text != std::to_string(profile_format)) {
     findings.add(format->at, fmt::format("unknown format '{}'; this version reads format {}",
-                                         format->text, known_format));
+                                         format->text, profile_format));
   }
   if (const YamlNode* base = map.get("extends")) {
     assign(head.extends, to_text(*base, findings));

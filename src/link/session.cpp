@@ -73,6 +73,10 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {}
 
+Session::~Session() {
+  if (trace_.bytes) trace_.bytes(Direction::received, {});
+}
+
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
   if (quarantined_until_ && !is_repeated_by_answer(request)) {

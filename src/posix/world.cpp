@@ -1,5 +1,8 @@
 #include "spindle/posix/world.hpp"
 
+#include <fmt/format.h>
+#include <modbus.h>
+
 #include <cstdlib>
 #include <filesystem>
 
@@ -31,10 +34,12 @@ std::optional<std::string> environment(std::string_view name) {
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
 }
 
-std::string program_folder() {
+Installation installation() {
   std::error_code failed;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", failed);
-  return failed ? std::string(".") : program.parent_path().string();
+  return {.folder = failed ? std::string(".") : program.parent_path().string(),
+          .modbus_library = fmt::format("{}.{}.{}", libmodbus_version_major,
+                                        libmodbus_version_minor, libmodbus_version_micro)};
 }
 
 }  // namespace spindle::posix

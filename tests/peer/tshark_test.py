@@ -242,5 +242,34 @@ class Judge(support.PeerTest):
         self.assertNotEqual(row["crc"], CRC_GOOD)
 
 
+class TraceTest(unittest.TestCase):
+    """What --trace writes needs no options to be understood, on whatever port or line it was."""
+
+    def packets(self, *arguments):
+        path = support.scratch_folder() / "trace.pcapng"
+        spindle(*arguments, "--trace", str(path))
+        fields = ("_ws.col.Protocol", "_ws.col.Info", "frame.comment")
+        options = [word for field in fields for word in ("-e", field)]
+        seen = support.run("tshark", "-r", path, "-T", "fields", "-E", "separator=|", *options)
+        complaints = support.run("tshark", "-r", path, "-Y", COMPLAINT)
+        self.assertEqual(complaints.stdout, "")
+        return [line.split("|") for line in seen.stdout.splitlines()]
+
+    def test_tcp(self):
+        packets = self.packets("get", "sim:doga-bm", "preset.1.target-torque")
+        self.assertEqual({packet[0] for packet in packets}, {"Modbus/TCP"})
+        told = [packet[1] for packet in packets]
+        self.assertRegex(told[0], "Query: .* Report Slave ID")
+        self.assertRegex(told[1], "Response: .* Report Slave ID")
+        self.assertRegex(told[-1], "Response: .* Read Holding Registers")
+        self.assertEqual({packet[2] for packet in packets}, {"sim:doga-bm"})
+
+    def test_rtu(self):
+        packets = self.packets("set", "sim:orientalmotor-blv", "operation.2.speed=900")
+        self.assertEqual({packet[0] for packet in packets}, {"Modbus RTU"})
+        told = " ".join(packet[1] for packet in packets)
+        self.assertIn("Write Multiple Registers", told)
+        self.assertEqual(told.count("Query"), told.count("Response"))
+
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -265,7 +265,7 @@ class Stage {
               return name == "XDG_STATE_HOME" ? std::optional<std::string>("/state") : std::nullopt;
             },
         .disk = disk_.functions(),
-        .program_folder = SPINDLE_SOURCE_DIR};
+        .installation = {SPINDLE_SOURCE_DIR, "3.1.6"}};
     status_ = cli::run(arguments, world);
     Lines lines;
     std::istringstream stream(without_source_folder(std::move(shown)));

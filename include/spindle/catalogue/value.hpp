@@ -29,8 +29,8 @@ Result<Value> decode(const Parameter& parameter, RegisterView registers);
 Result<Registers> encode(const Parameter& parameter, const Decimal& number);
 
 /// What a user typed: a number ("2.71", "0x1F" where the scale is 1), a label of the enumeration,
-/// or names of bits joined by '+' or ',' (ASCII case ignored). Checked against encoding, labels and the profile's range. Errors
-/// `bad_value` (with a suggestion for labels) and `out_of_range`.
+/// or names of bits joined by '+' or ',' (ASCII case ignored). Checked against encoding, labels and
+/// the profile's range. Errors `bad_value` (with a suggestion for labels) and `out_of_range`.
 Result<Value> parse_value(const Parameter& parameter, std::string_view text);
 
 /// `out_of_range` when the number is outside; the message names limit and `whose` ("of the

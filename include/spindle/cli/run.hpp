@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "spindle/base/disk.hpp"
+#include "spindle/base/installation.hpp"
 #include "spindle/commands/context.hpp"
 
 namespace spindle::cli {
@@ -22,7 +23,7 @@ struct World {
   std::function<void()> end_waits;  ///< ends every wait, as a signal would
   std::function<std::optional<std::string>(std::string_view name)> environment;
   Disk disk;
-  std::string program_folder;  ///< where the executable is; its profiles are found from here
+  Installation installation;
 };
 
 /// The whole program: parses the arguments (without the program's name), runs one command, and

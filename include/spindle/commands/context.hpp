@@ -38,6 +38,7 @@ struct CommonOptions {
   std::optional<unsigned> retries = std::nullopt;
   Consent consent = Consent::ask;
   Verbosity verbosity = Verbosity::normal;
+  std::string trace_file = {};  ///< --trace; empty: no capture
 };
 
 /// A line and a clock that signals do not end: for the last words that leave a tool safe.

@@ -19,6 +19,9 @@ namespace spindle::device {
 using OpenTransport = std::function<Result<std::unique_ptr<link::Transport>>(
     const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>;
 
+/// How frames are bounded there: by the medium, and by the product where it is simulated.
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts);
+
 /// What the user may override of a profile's link facts.
 struct LinkOptions {
   std::optional<Duration> answer_timeout = std::nullopt;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,9 @@
 #include "spindle/files/finding.hpp"
 
 namespace spindle::files {
+
+/// The version of the profile format that is read (key `format`).
+inline constexpr std::int64_t profile_format = 1;
 
 /// A profile that can be named.
 struct ProfileEntry {

@@ -57,6 +57,9 @@ class Session {
  public:
   Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
           Trace trace = {});
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
 
   /// Sends the request and waits for its answer. An exception response is returned as a PDU, not as
   /// an error. Errors: those of Transport; `no_answer`; `incomplete_answer` (part of a frame);

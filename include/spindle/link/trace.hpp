@@ -25,7 +25,8 @@ enum class Decision : std::uint8_t {
   quarantine
 };
 
-/// Hears every frame and every decision of one connection, for --verbose. Either function may be
+/// Hears all bytes and every decision of one connection, for --verbose and --trace. Bytes come as
+/// they are sent and received; none at all say that the connection is over. Either function may be
 /// empty.
 struct Trace {
   std::function<void(Direction, ByteView bytes)> bytes;

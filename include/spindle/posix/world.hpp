@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "spindle/base/installation.hpp"
 #include "spindle/base/interrupt.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/link/endpoint.hpp"
@@ -22,7 +23,8 @@ line_opener(Clock& clock, const Interrupt& interrupt);
 /// A variable of the environment; empty when it is not set.
 std::optional<std::string> environment(std::string_view name);
 
-/// The folder of the running executable, without a slash at its end.
-std::string program_folder();
+/// The folder of the running executable, without a slash at its end, and the libraries that it runs
+/// with.
+Installation installation();
 
 }  // namespace spindle::posix
