@@ -167,7 +167,7 @@ printf '%s\n' "$url"
 
 say "who is on the line?"
 run 0 scan "${url%\?*}" --units 1-4 --timeout 50ms --profile orientalmotor-blv
-shown '2 .*found|found 2|2 answer'
+shown '4 asked, 2 found'
 run 0 identify "$url" --profile orientalmotor-blv
 shown orientalmotor-blv
 
