@@ -231,6 +231,7 @@ struct TypedRestore {
   bool dry_run = false;
   bool force = false;
   bool no_rollback = false;
+  bool save = false;
 };
 struct TypedSimulate {
   commands::SimulateOptions options;
@@ -314,6 +315,9 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
   flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
 }
 
+constexpr std::string_view save_words =
+    "store it in the tool's non-volatile memory afterwards (BLV); asks";
+
 constexpr std::string_view broadcast_words =
     "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
 
@@ -338,8 +342,7 @@ void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_option("TARGET", typed.set.options.target, "tool name or URL");
   command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
   flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
-  flag(command, "--save", typed.set.save,
-       "store it in the tool's non-volatile memory afterwards (BLV); asks");
+  flag(command, "--save", typed.set.save, std::string(save_words));
   flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
 }
 
@@ -719,6 +722,7 @@ Result<Outcome> run_restore(TypedRestore typed, Context& context) {
   if (typed.dry_run) typed.options.execution = commands::Execution::dry_run;
   if (typed.force) typed.options.model = commands::ModelCheck::off;
   if (typed.no_rollback) typed.options.on_failure = commands::OnFailure::leave;
+  if (typed.save) typed.options.storing = commands::Storing::yes;
   return commands::restore(typed.options, context);
 }
 
@@ -737,6 +741,7 @@ void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_flag("--force", typed.restore.force, "also to a tool of another model");
   command->add_flag("--no-rollback", typed.restore.no_rollback,
                     "leave what was written when something fails");
+  command->add_flag("--save", typed.restore.save, std::string(save_words));
 }
 
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {

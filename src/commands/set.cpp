@@ -14,6 +14,7 @@
 #include "spindle/catalogue/value.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
+#include "storing.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -237,9 +238,6 @@ Error not_stored(const Step& step, const device::Written& written, const Target&
        .register_address = step.assignment->parameter.address.value});
 }
 
-/// The action by which a tool stores what it was told.
-constexpr std::string_view store_action = "save";
-
 /// When a value acts; empty where there is nothing to say.
 std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
   if (!effect) return "";
@@ -264,14 +262,8 @@ Result<void> ask_first(const SetOptions& options, const Profile& profile, const 
                        const Context& context) {
   std::vector<std::string> what;
   if (options.reach == Reach::everybody) what.emplace_back("set");
-  if (options.storing == Storing::yes) {
-    if (!profile.find_action(store_action)) {
-      return tl::unexpected(Error{.code = Errc::usage,
-                                  .message = "this product stores what it is told by itself",
-                                  .name = "--save"});
-    }
-    what.emplace_back(store_action);
-  }
+  if (auto storing = check_storing(options.storing, profile); !storing) return storing;
+  if (options.storing == Storing::yes) what.emplace_back(store_action);
   if (what.empty() || options.execution == Execution::dry_run) return {};
   return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), target.shown), context);
 }
@@ -407,28 +399,12 @@ class Writer {
     }
   }
 
-  /// The last deed of --save, once and only when all was written.
-  Result<void> store() {
-    if (options_->storing == Storing::no || outcome_.failed() > 0) return {};
-    auto deed = parse_deed(std::string(store_action), *tool_->profile);
-    if (!deed) return tl::unexpected(std::move(deed.error()));
-    const auto result = perform_deed(*deed, *tool_, *context_);
-    log_.add(logged(*deed, result));
-    Listing listing(*context_, deed_columns());
-    if (result) listing.add(deed_record(*deed, *result, tool_->target, context_->clock));
-    std::optional<Error> error;
-    if (!result) error = result.error();
-    if (result == device::ActionResult::not_confirmed) error = not_confirmed(*deed, tool_->target);
-    if (error) {
-      outcome_.fail(*error);
-      listing.add(*error);
-    }
-    return listing.end();
-  }
-
   Result<Outcome> end(std::vector<report::Field> counts, const std::string& sentence) {
     auto drawn = listing_.end();
-    if (drawn && options_->execution == Execution::real) drawn = store();
+    const bool stores = options_->storing == Storing::yes && outcome_.failed() == 0;
+    if (drawn && stores && options_->execution == Execution::real) {
+      drawn = store(*tool_, log_, outcome_, *context_);
+    }
     if (drawn) {
       drawn = context_->renderer.summary(summary_record(std::move(counts), outcome_.status(),
                                                         tool_->target.shown, context_->clock),

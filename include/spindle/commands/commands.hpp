@@ -141,6 +141,7 @@ struct RestoreOptions {
   Execution execution = Execution::real;
   ModelCheck model = ModelCheck::strict;
   OnFailure on_failure = OnFailure::roll_back;
+  Storing storing = Storing::no;  ///< in non-volatile memory, once and only when all succeeded
 };
 Result<Outcome> restore(const RestoreOptions& options, Context& context);
 
