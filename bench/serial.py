@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
 """How long spindle takes on a serial line, against what the line itself takes: serial.py BUILD [-n N]
 
-BUILD is a build folder. A bus of registers is served on a pseudo terminal that plays wire time, gaps and
-the 10 ms that a BLV driver waits before it answers; its log says when bytes came and went.
+BUILD is a build folder. A bus of registers, and then the simulated BLV driver, is served on a pseudo
+terminal that plays wire time, gaps and the 10 ms that a BLV driver waits before it answers; its log says
+when bytes came and went.
 """
 
 import argparse
+import datetime
+import os
 import pathlib
 import re
 import statistics
@@ -17,7 +20,8 @@ CHARACTER_BITS = 11  # start, eight data, parity, stop
 DELAY = 0.010
 REGISTERS = 64
 AT_ONCE = 16
-PROFILE = pathlib.Path(__file__).resolve().parent.parent / "tests" / "end_to_end" / "drive.yaml"
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+PROFILE = ROOT / "tests" / "end_to_end" / "drive.yaml"
 
 
 class Bus:
@@ -43,6 +47,52 @@ class Bus:
         return [(int(at) / 1e9, way, bytes.fromhex(text)) for at, way, text in lines]
 
 
+class Driver:
+    """The simulated BLV driver. Its log counts milliseconds, which is enough for what takes hundreds."""
+
+    def __init__(self, program, folder, baud):
+        self._log = folder / "log"
+        with open(self._log, "wb") as log:
+            self._process = subprocess.Popen(
+                [program, "simulate", "orientalmotor-blv", "--pty", folder / "line", "--baud", str(baud), "-v"],
+                stdout=subprocess.PIPE, stderr=log, text=True)
+        self.url = self._process.stdout.readline().strip()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._process.terminate()
+        self._process.wait(10)
+        self._process.stdout.close()
+
+    def heard(self):
+        lines = re.findall(r"^(\S+)Z client \d+ (->|<-) ([0-9A-F ]+)$", self._log.read_text(), re.MULTILINE)
+        return [(datetime.datetime.fromisoformat(at).timestamp(), way[1 if way == "->" else 0], bytes.fromhex(text))
+                for at, way, text in lines]
+
+
+def needed_for(heard, baud, gap):
+    """What the line itself takes for these frames: wire time, gaps and the driver's delays."""
+    exchanges = sum(way == ">" for _, way, _ in heard)
+    wire = sum(len(data) for _, _, data in heard) * CHARACTER_BITS / baud
+    return exchanges, wire + exchanges * (gap + DELAY) + (exchanges - 1) * gap
+
+
+def ask_driver(program, baud, gap, command, *arguments):
+    """As read_all, of one command to the simulated driver; and how many requests it took."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        with Driver(program, folder, baud) as driver:
+            began = time.monotonic()
+            subprocess.run([program, command, driver.url, "--profile", "orientalmotor-blv", *arguments], check=True,
+                           cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            whole = time.monotonic() - began
+        heard = driver.heard()
+    exchanges, needed = needed_for(heard, baud, gap)
+    return heard[-1][0] - heard[0][0], whole, needed, exchanges
+
+
 def read_all(program, build, baud, gap):
     """Seconds from the first byte of the first query to the last of the last answer, and of the whole
     program; and what the line needs for it."""
@@ -53,12 +103,18 @@ def read_all(program, build, baud, gap):
                            check=True, stdout=subprocess.DEVNULL)
             whole = time.monotonic() - began
         heard = bus.heard()
-    exchanges = sum(way == ">" for _, way, _ in heard)
+    exchanges, needed = needed_for(heard, baud, gap)
     if exchanges != REGISTERS // AT_ONCE:
         raise SystemExit(f"{exchanges} requests for {REGISTERS} registers")
-    wire = sum(len(data) for _, _, data in heard) * CHARACTER_BITS / baud
-    needed = wire + exchanges * (gap + DELAY) + (exchanges - 1) * gap
     return heard[-1][0] - heard[0][0], whole, needed
+
+
+def tell(what, baud, runs):
+    ratios = [line / needed for line, _, needed, *_ in runs]
+    print(f"{what} at {baud} baud: the line needs {runs[0][2] * 1e3:.1f} ms, "
+          f"spindle took {statistics.median(run[0] for run in runs) * 1e3:.1f} ms "
+          f"({statistics.median(ratios):.3f} x, at best {min(ratios):.3f} x), "
+          f"start and end of the program included {statistics.median(run[1] for run in runs) * 1e3:.1f} ms", flush=True)
 
 
 def main():
@@ -68,13 +124,14 @@ def main():
     options = parser.parse_args()
     build = options.build.resolve()
     program = build / "spindle"
+    os.environ["SPINDLE_PROFILE_PATH"] = str(ROOT / "profiles")
     for baud, gap in ((9600, 0.0055), (115200, 0.0035)):
         runs = [read_all(program, build, baud, gap) for _ in range(options.n)]
-        ratios = [line / needed for line, _, needed in runs]
-        print(f"{REGISTERS} registers at {baud} baud: the line needs {runs[0][2] * 1e3:.1f} ms, "
-              f"spindle took {statistics.median(run[0] for run in runs) * 1e3:.1f} ms "
-              f"({statistics.median(ratios):.3f} x, at best {min(ratios):.3f} x), "
-              f"start and end of the program included {statistics.median(run[1] for run in runs) * 1e3:.1f} ms")
+        tell(f"{REGISTERS} registers", baud, runs)
+        for what, *command in (("all operation data of the simulated BLV", "get", "operation.*"),
+                               ("a whole backup of the simulated BLV", "backup", "-f", "backup.yaml")):
+            runs = [ask_driver(program, baud, gap, *command) for _ in range(options.n)]
+            tell(f"{what}, {runs[0][3]} requests,", baud, runs)
     with tempfile.TemporaryDirectory() as folder, Bus(build, pathlib.Path(folder), 9600, 0.0055) as bus:
         timeout = 0.050
         began = time.monotonic()

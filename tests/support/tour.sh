@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A short tour of spindle against a simulated tool on a loopback port: tour.sh SPINDLE
+# A short tour of spindle against a simulated tool on a loopback port and simulated motor drivers on a
+# pseudo terminal: tour.sh SPINDLE
 # Fails when a step does not end as it should.
 set -euo pipefail
 
@@ -16,10 +17,12 @@ unset SPINDLE_TOOLS
 cd "$scratch"
 
 simulator=
+drivers=
 cleanup() {
-  if [[ -n $simulator ]]; then
-    stop "$simulator"
-  fi
+  local started
+  for started in $simulator $drivers; do
+    stop "$started"
+  done
   rm -rf "$scratch"
 }
 trap cleanup EXIT
@@ -39,10 +42,13 @@ stop() {
 
 fail() {
   printf 'tour: %s\n' "$*" >&2
-  if [[ -s $scratch/simulator.log ]]; then
-    printf 'the simulator said:\n' >&2
-    cat "$scratch/simulator.log" >&2
-  fi
+  local log
+  for log in "$scratch"/{simulator,drivers}.log; do
+    if [[ -s $log ]]; then
+      printf 'the simulator said:\n' >&2
+      cat "$log" >&2
+    fi
+  done
   exit 1
 }
 
@@ -147,5 +153,40 @@ grep -q 'fastening-ok' watched || fail "the watcher saw no result"
 say "is there an alarm?"
 run 0 alarms "$url" --profile doga-bm
 shown 'present'
+
+say "the second system: two simulated BLV motor drivers on a serial line, here a pseudo terminal"
+typed simulate orientalmotor-blv --pty line --units 1-2
+mkfifo lines
+"$program" simulate orientalmotor-blv --pty line --units 1-2 >lines 2>drivers.log &
+drivers=$!
+disown
+exec {lines}<lines
+read -r -t 5 url <&"$lines" || fail "the simulator did not say where it serves"
+[[ $url == rtu://*/line\?unit=1 ]] || fail "'$url' is not a line with a unit"
+printf '%s\n' "$url"
+
+say "who is on the line?"
+run 0 scan "${url%\?*}" --units 1-4 --timeout 50ms --profile orientalmotor-blv
+shown '4 asked, 2 found'
+run 0 identify "$url" --profile orientalmotor-blv
+shown orientalmotor-blv
+
+say "a speed is set, and the motor is run for a second: it always ends in a stop"
+run 0 set "$url" --profile orientalmotor-blv operation.3.speed=1200
+shown 'operation\.3\.speed .* 1200 .*written'
+run 0 remote-start "$url" --profile orientalmotor-blv --speed 500 --for 1s --watchdog 1s --yes
+shown 'started'
+shown 'the motor stands still'
+
+say "is there an alarm, or was there one?"
+run 0 alarms "$url" --profile orientalmotor-blv
+shown 'present'
+
+say "what is set in the driver goes into a file"
+run 0 backup "$url" --profile orientalmotor-blv -f driver.yaml
+shown '1 saved'
+grep 'operation\.3\.' driver.yaml || fail "the backup lacks operation data 3"
+run 0 diff driver.yaml "$url" --profile orientalmotor-blv
+shown '0 different'
 
 say "that was the tour; 'spindle --help' shows the rest, and so does ./check"
