@@ -12,8 +12,8 @@ namespace spindle::files {
 struct Tool {
   std::string name;
   std::string url;
-  std::string profile;                     ///< empty: not given
-  std::string torque_unit;                 ///< empty: unknown
+  std::string profile = {};                ///< empty: not given
+  std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
 };
 
