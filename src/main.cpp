@@ -1,5 +1,6 @@
 #include "spindle/cli/run.hpp"
 #include "spindle/posix/clock.hpp"
+#include "spindle/posix/disk.hpp"
 #include "spindle/posix/serve.hpp"
 #include "spindle/posix/signals.hpp"
 #include "spindle/posix/world.hpp"
@@ -20,7 +21,7 @@ int main(int count, char** arguments) {
       .serve = tool_server(clock, signals.interrupt()),
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,
-      .file_exists = file_exists,
+      .disk = local_disk(),
       .program_folder = program_folder()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
 }

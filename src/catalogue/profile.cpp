@@ -31,7 +31,7 @@ std::vector<std::string> names_of(const Entries& entries) {
   return names;
 }
 
-Parameter numbered_parameter(const NumberedFacts& facts, std::uint16_t number) {
+Parameter make_numbered(const NumberedFacts& facts, std::uint16_t number) {
   return {.name = fmt::format("{}{}", facts.prefix, number),
           .title = fmt::format("Parameter {}", number),
           .table = facts.table,
@@ -55,7 +55,7 @@ std::optional<Parameter> find_numbered(const NumberedFacts& facts, std::string_v
   if (!all_digits(digits)) return std::nullopt;
   const auto number = parse_unsigned(digits, facts.to);
   if (!number || *number < facts.from) return std::nullopt;
-  return numbered_parameter(facts, static_cast<std::uint16_t>(*number));
+  return make_numbered(facts, static_cast<std::uint16_t>(*number));
 }
 
 /// "p900" deserves the numbers that exist rather than a similar name.
@@ -101,7 +101,7 @@ std::vector<Parameter> match_named(const Profile& profile, std::string_view patt
 std::vector<Parameter> match_numbered(const NumberedFacts& facts, std::string_view pattern) {
   std::vector<Parameter> found;
   for (unsigned number = facts.from; number <= facts.to; ++number) {
-    Parameter parameter = numbered_parameter(facts, static_cast<std::uint16_t>(number));
+    Parameter parameter = make_numbered(facts, static_cast<std::uint16_t>(number));
     if (glob_match(pattern, parameter.name)) found.push_back(std::move(parameter));
   }
   return found;
@@ -187,6 +187,10 @@ Result<std::vector<Parameter>> Profile::select(const std::vector<std::string>& n
     }
   }
   return selected;
+}
+
+Parameter Profile::numbered_parameter(std::uint16_t number) const {
+  return make_numbered(*numbered, number);
 }
 
 Result<Action> Profile::find_action(std::string_view name) const {

@@ -55,6 +55,7 @@ struct Draft {
   Typed typed;
   std::map<const CLI::App*, Words> words;
   const CLI::App* chosen = nullptr;
+  Invocation::ToolsFile tools_use = Invocation::ToolsFile::loaded;
   Run run;
 };
 
@@ -201,8 +202,29 @@ struct TypedWatch {
   bool no_push = false;
   bool no_reconnect = false;
 };
+struct TypedTools {
+  bool check = false;
+};
+struct TypedScan {
+  commands::ScanOptions options;
+  std::string units;
+};
+struct TypedBackup {
+  commands::BackupOptions options;
+  bool force = false;
+  bool include_secrets = false;
+};
+struct TypedRestore {
+  commands::RestoreOptions options;
+  bool dry_run = false;
+  bool force = false;
+  bool no_rollback = false;
+};
 struct TypedSimulate {
   commands::SimulateOptions options;
+  std::string units;
+  std::string baud;
+  bool no_gap = false;
   std::string identity_bytes;
   std::string firmware;
   std::string serial;
@@ -220,11 +242,16 @@ struct TypedCommands {
   TypedSet set;
   TypedDo perform;
   TypedPing ping;
+  TypedScan scan;
   TypedWatch watch;
   TypedRemoteStart remote_start;
   commands::RemoteStopOptions remote_stop;
   TypedAlarms alarms;
+  TypedBackup backup;
+  commands::DiffOptions diff;
+  TypedRestore restore;
   TypedSimulate simulate;
+  TypedTools tools;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
   commands::ProfileNameOptions profile_show;
@@ -340,6 +367,53 @@ void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
   option(command, "--interval", typed.ping.interval, "DURATION", "time between them (default 1s)");
 }
 
+/// "1-3,7": units of a serial line, each once, in the order given.
+Result<std::vector<modbus::UnitId>> to_units(const std::string& text) {
+  constexpr std::uint64_t last_unit = 247;  // Modbus over Serial Line 1.02, 2.2
+  std::vector<modbus::UnitId> units;
+  for (const std::string_view range : split(text, ',')) {
+    const auto dash = range.find('-');
+    const auto first = parse_unsigned(range.substr(0, dash), last_unit);
+    const auto last =
+        dash == std::string_view::npos ? first : parse_unsigned(range.substr(dash + 1), last_unit);
+    if (!first || !last || *first == 0 || *last < *first) {
+      return tl::unexpected(
+          bad_option("--units", text, "units from 1 to 247, such as 1-31 or 1,5"));
+    }
+    for (std::uint64_t unit = *first; unit <= *last; ++unit) {
+      const modbus::UnitId id{static_cast<std::uint8_t>(unit)};
+      if (std::find(units.begin(), units.end(), id) == units.end()) units.push_back(id);
+    }
+  }
+  return units;
+}
+
+std::string scan_words() {
+  return "The line is asked at the rate and parity of the target or profile, and at no others: a\n"
+         "driver that hears three bad frames in a row stops its motor, and every frame at a wrong\n"
+         "rate is bad. A wrong unit costs one --timeout; nothing is asked twice.\n";
+}
+
+Result<Outcome> run_scan(TypedScan scan, Context& context) {
+  if (scan.options.bus.empty()) return tl::unexpected(missing("scan", "BUS"));
+  auto units = to_units(scan.units.empty() ? "1-31" : scan.units);
+  if (!units) return tl::unexpected(std::move(units.error()));
+  scan.options.units = std::move(*units);
+  return commands::scan(scan.options, context);
+}
+
+void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"scan", "BUS [--units 1-31]",
+                           "which units answer on a serial line, at the given settings",
+                           "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
+                           "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
+                           "spindle scan rtu+tcp://192.168.10.30:4001 --json",
+                           scan_words};
+  CLI::App* command = add_command(app, draft, words, typed.scan, run_scan);
+  command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");
+  option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
+}
+
 template <typename Number>
 Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
                          std::optional<Number>& into) {
@@ -364,6 +438,17 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
           })
           .and_then([&] { return fill_number("--burst", typed.burst, 10'000, options.burst); });
   if (!filled) return tl::unexpected(std::move(filled.error()));
+  if (!typed.units.empty()) {
+    auto units = to_units(typed.units);
+    if (!units) return tl::unexpected(std::move(units.error()));
+    options.units = std::move(*units);
+  }
+  if (!typed.baud.empty()) {
+    const auto baud = to_number("--baud", typed.baud, 1, 4'000'000);
+    if (!baud) return tl::unexpected(baud.error());
+    options.baud = static_cast<unsigned>(*baud);
+  }
+  if (typed.no_gap) options.gaps = sim::LineModel::Gaps::ignored;
   const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
   if (!rundown_every) return tl::unexpected(rundown_every.error());
   options.rundown_every = *rundown_every;
@@ -521,6 +606,79 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
                     std::string(accept_unverified_words));
 }
 
+Result<Outcome> run_backup(TypedBackup typed, Context& context) {
+  if (typed.options.targets.empty()) return tl::unexpected(missing("backup", "TARGET"));
+  if (typed.force) typed.options.overwrite = Overwrite::allow;
+  if (typed.include_secrets) typed.options.secrets = commands::Secrets::include;
+  return commands::backup(typed.options, context);
+}
+
+void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
+                           "every stored parameter into a file that people can read and git can "
+                           "compare",
+                           "spindle backup station3\n"
+                           "spindle backup station3 -f before-the-change.yaml\n"
+                           "spindle backup @line1 --dir backups --force"};
+  CLI::App* command = add_command(app, draft, words, typed.backup, run_backup);
+  auto& options = typed.backup.options;
+  command->add_option("TARGET", options.targets, "tool name, @group or URL");
+  option(command, "-f,--file", options.file, "FILE",
+         "where to (default TARGET.yaml in the present folder); - is standard output");
+  option(command, "--dir", options.folder, "FOLDER", "one file TARGET.yaml a tool in this folder");
+  command->add_flag("--force", typed.backup.force, "replace files that are there");
+  command->add_flag("--include-secrets", typed.backup.include_secrets,
+                    "also what the profile marks as secret");
+}
+
+void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"diff", "A B [NAME|PATTERN...] [--ignore PATTERN]",
+                           "compare tools, backup files and defaults by parameter name",
+                           "spindle diff station3 station3.yaml\n"
+                           "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
+                           "spindle diff station3 station4 --ignore 'p*'"};
+  const auto run = [](const commands::DiffOptions& options, Context& context) {
+    if (options.a.empty() || options.b.empty()) {
+      return Result<Outcome>(tl::unexpected(missing("diff", options.a.empty() ? "A" : "B")));
+    }
+    return commands::diff(options, context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.diff, run);
+  command->add_option("A", typed.diff.a, "tool, backup file, or 'defaults'");
+  command->add_option("B", typed.diff.b, "the same");
+  command->add_option("NAME", typed.diff.patterns, "compare only these");
+  command->add_option("--ignore", typed.diff.ignored, "leave these out, repeatable")
+      ->type_name("PATTERN")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+Result<Outcome> run_restore(TypedRestore typed, Context& context) {
+  if (typed.options.target.empty()) return tl::unexpected(missing("restore", "TARGET"));
+  if (typed.options.file.empty()) return tl::unexpected(missing("restore", "FILE"));
+  if (typed.dry_run) typed.options.execution = commands::Execution::dry_run;
+  if (typed.force) typed.options.model = commands::ModelCheck::off;
+  if (typed.no_rollback) typed.options.on_failure = commands::OnFailure::leave;
+  return commands::restore(typed.options, context);
+}
+
+void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"restore", "TARGET FILE [NAME|PATTERN...]",
+                           "plan, confirm, write what differs, verify; put back if it fails",
+                           "spindle restore station3 station3.yaml --dry-run\n"
+                           "spindle restore station3 station3.yaml 'preset.1.*'\n"
+                           "spindle restore station3 old-tool.yaml --yes --json"};
+  CLI::App* command = add_command(app, draft, words, typed.restore, run_restore);
+  auto& options = typed.restore.options;
+  command->add_option("TARGET", options.target, "tool name or URL");
+  command->add_option("FILE", options.file, "backup file");
+  command->add_option("NAME", options.patterns, "restore only these");
+  command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
+  command->add_flag("--force", typed.restore.force, "also to a tool of another model");
+  command->add_flag("--no-rollback", typed.restore.no_rollback,
+                    "leave what was written when something fails");
+}
+
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {
       "simulate", "PROFILE [--listen URL]",
@@ -536,7 +694,14 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   auto& options = typed.simulate.options;
   command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
   option(command, "--listen", options.listen, "URL",
-         "where to listen (default tcp://127.0.0.1:0: a free port)");
+         "where to listen (default a free port of 127.0.0.1)");
+  option(command, "--pty", options.pty, "PATH",
+         "serial tools: make a pseudo terminal that this path leads to");
+  option(command, "--units", typed.simulate.units, "LIST",
+         "serial tools: which units, such as 1-3");
+  option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
+  flag(command, "--no-gap", typed.simulate.no_gap,
+       "serial tools: also hear clients that keep too short a silence");
   command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
       ->type_name("FAULT")
       ->expected(1)
@@ -598,6 +763,25 @@ void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
       ->add_option("PROFILE", typed.profile_check.profile, "name or file");
 }
 
+void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
+  constexpr Words words = {"tools", "[--check]",
+                           "the named tools of the tools file, with endpoints and profiles",
+                           "spindle tools\n"
+                           "spindle tools --json\n"
+                           "spindle tools --check --tools ./spindle.yaml"};
+  const auto run = [](const TypedTools& tools, Context& context) {
+    return tools.check ? commands::check_tools(context) : commands::tools(context);
+  };
+  CLI::App* command = add_command(app, draft, words, typed.tools, run);
+  command->add_flag_callback(
+      "--check",
+      [&] {
+        typed.tools.check = true;
+        draft.tools_use = Invocation::ToolsFile::only_found;
+      },
+      "every fault of the file, with its place");
+}
+
 void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_identify(app, draft, typed);
   add_list(app, draft, typed);
@@ -608,9 +792,14 @@ void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_remote_start(app, draft, typed);
   add_remote_stop(app, draft, typed);
   add_alarms(app, draft, typed);
+  add_backup(app, draft, typed);
+  add_diff(app, draft, typed);
+  add_restore(app, draft, typed);
   add_ping(app, draft, typed);
+  add_scan(app, draft, typed);
   add_simulate(app, draft, typed);
   add_profile(app, draft, typed);
+  add_tools(app, draft, typed);
 }
 
 void build(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -780,6 +969,7 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
+  invocation.tools_use = draft.tools_use;
   invocation.run = std::move(draft.run);
   return invocation;
 }

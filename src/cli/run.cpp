@@ -7,6 +7,7 @@
 #include "complete.hpp"
 #include "grammar.hpp"
 #include "spindle/base/text.hpp"
+#include "version.hpp"
 
 namespace spindle::cli {
 namespace {
@@ -28,6 +29,12 @@ std::string xdg_folder(const World& world, std::string_view name, std::string_vi
   return home.empty() ? std::string() : home + "/" + std::string(below_home);
 }
 
+/// Where spindle keeps what it remembers between runs; empty when nobody says.
+std::string state_folder(const World& world) {
+  const std::string folder = xdg_folder(world, "XDG_STATE_HOME", ".local/state");
+  return folder.empty() ? folder : folder + "/spindle";
+}
+
 /// The user's own profiles first, then the installed ones, then those of the build tree.
 std::vector<std::string> profile_folders(const World& world) {
   std::vector<std::string> folders;
@@ -45,19 +52,25 @@ std::vector<std::string> profile_folders(const World& world) {
   return folders;
 }
 
-Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
-  if (!invocation.tools_file.empty()) return files::load_tools(invocation.tools_file);
-  if (const std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) {
-    return files::load_tools(named);
-  }
+/// The tools file that counts; empty when there is none.
+std::string find_tools_file(const World& world, const Invocation& invocation) {
+  if (!invocation.tools_file.empty()) return invocation.tools_file;
+  if (std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) return named;
   std::vector<std::string> places = {"./spindle.yaml"};
   const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
   if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
   places.emplace_back("/etc/spindle/tools.yaml");
-  for (const std::string& place : places) {
-    if (world.file_exists(place)) return files::load_tools(place);
+  for (std::string& place : places) {
+    if (world.disk.exists(place)) return std::move(place);
   }
-  return files::Tools();
+  return {};
+}
+
+Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
+  const std::string path = find_tools_file(world, invocation);
+  const bool is_loaded = invocation.tools_use == Invocation::ToolsFile::loaded;
+  if (path.empty() || !is_loaded) return files::Tools{.path = path};
+  return files::load_tools(path);
 }
 
 report::Color color_of(const World& world, ColorChoice choice) {
@@ -75,6 +88,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   const auto tools = find_tools(world, invocation);
   if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles(profile_folders(world));
+  const std::string state = state_folder(world);
   commands::Context context{.io = world.io,
                             .clock = world.clock,
                             .interrupt = world.interrupt,
@@ -82,6 +96,9 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                             .calm = world.calm,
                             .serve = world.serve,
                             .end_waits = world.end_waits,
+                            .disk = world.disk,
+                            .state_folder = state,
+                            .version = version,
                             .profiles = profiles,
                             .tools = *tools,
                             .renderer = renderer,

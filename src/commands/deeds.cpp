@@ -52,18 +52,6 @@ bool is_weak(Evidence evidence) {
   return evidence == Evidence::sibling || evidence == Evidence::inferred;
 }
 
-std::string_view to_text(device::ActionResult result) {
-  switch (result) {
-    case device::ActionResult::confirmed:
-      return "confirmed";
-    case device::ActionResult::sent:
-      return "sent";
-    case device::ActionResult::not_confirmed:
-      return "not-confirmed";
-  }
-  return "";
-}
-
 const std::array<Column, 3> columns = {
     {{"ACTION", "action"}, {"VALUE", "value", report::Align::right}, {"RESULT", "result"}}};
 
@@ -116,6 +104,18 @@ Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& targe
   }
   if (hazardous.empty()) return {};
   return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
+}
+
+std::string_view to_text(device::ActionResult result) {
+  switch (result) {
+    case device::ActionResult::confirmed:
+      return "confirmed";
+    case device::ActionResult::sent:
+      return "sent";
+    case device::ActionResult::not_confirmed:
+      return "not-confirmed";
+  }
+  return "";
 }
 
 report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,

@@ -31,6 +31,8 @@ Result<void> check_evidence(const catalogue::Action& action, const Target& targe
 Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
                              const Context& context);
 
+std::string_view to_text(device::ActionResult result);
+
 report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,
                            const Clock& clock);
 std::span<const report::Column> deed_columns();

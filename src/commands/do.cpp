@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "change_log.hpp"
 #include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
@@ -70,8 +71,10 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
 Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Context& context) {
   Outcome outcome;
   Listing listing(context, deed_columns());
+  ChangeLog log("do", tool, context);
   for (const Deed& deed : deeds) {
     const auto result = tool.device.perform(deed.action, deed.value);
+    log.add(logged(deed, result));
     if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
     std::optional<Error> error;
     if (!result) error = result.error();

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "spindle/link/serial_settings.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 
@@ -27,6 +28,29 @@ Result<void> check_identity_bytes(const catalogue::Profile& profile,
             .name = "--identity-bytes"});
 }
 
+/// The state machine for this kind of tool.
+Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profile,
+                                                 const catalogue::SimulationFacts& start,
+                                                 const SimulatedToolOptions& options) {
+  if (profile.link.framing == modbus::Framing::rtu) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "serial tools can not be simulated by this version",
+                                .name = profile.id});
+  }
+  if (auto known = check_identity_bytes(profile, options.identity_bytes); !known) {
+    return tl::unexpected(std::move(known.error()));
+  }
+  return sim::make_bm_tool(profile, start,
+                           {.identity_bytes = options.identity_bytes,
+                            .firmware = options.firmware,
+                            .serial = options.serial,
+                            .tool_model = options.model,
+                            .faults = options.faults,
+                            .rundown_every = options.rundown_every,
+                            .ng_every = options.ng_every,
+                            .burst = options.burst});
+}
+
 }  // namespace
 
 Result<SimulatedTool> make_simulated_tool(const std::string& profile,
@@ -36,24 +60,16 @@ Result<SimulatedTool> make_simulated_tool(const std::string& profile,
   if (!loaded) return tl::unexpected(std::move(loaded.error()));
   auto start = context.profiles.load_simulation(profile);
   if (!start) return tl::unexpected(std::move(start.error()));
-  if (loaded->link.framing != modbus::Framing::tcp) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "serial tools can not be simulated by this version",
-                                .name = profile});
-  }
-  if (auto known = check_identity_bytes(*loaded, options.identity_bytes); !known) {
-    return tl::unexpected(std::move(known.error()));
-  }
-  auto server = sim::make_bm_tool(*loaded, *start,
-                                  {.identity_bytes = options.identity_bytes,
-                                   .firmware = options.firmware,
-                                   .serial = options.serial,
-                                   .tool_model = options.model,
-                                   .faults = options.faults,
-                                   .rundown_every = options.rundown_every,
-                                   .ng_every = options.ng_every,
-                                   .burst = options.burst});
-  return SimulatedTool{std::move(*loaded), std::move(server)};
+  auto server = make_server(*loaded, *start, options);
+  if (!server) return tl::unexpected(std::move(server.error()));
+  return SimulatedTool{std::move(*loaded), std::move(*server)};
+}
+
+Duration simulated_character_time(const catalogue::LinkFacts& facts, std::optional<unsigned> baud) {
+  const catalogue::SerialFacts& serial = facts.serial;
+  const link::Endpoint line{.baud = baud};
+  return link::character_time(
+      link::serial_settings(line, serial.baud, serial.parity, serial.stop_bits));
 }
 
 device::OpenTransport with_simulated_tools(const Context& context, SimulatedToolOptions options) {
@@ -63,10 +79,13 @@ device::OpenTransport with_simulated_tools(const Context& context, SimulatedTool
     if (endpoint.medium != link::Medium::simulated) {
       return context.open(endpoint, facts, connect_timeout);
     }
-    auto tool = make_simulated_tool(endpoint.profile, options, context);
+    SimulatedToolOptions wanted = options;
+    wanted.baud = endpoint.baud;
+    auto tool = make_simulated_tool(endpoint.profile, wanted, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
-    return sim::make_sim_transport(std::move(tool->server), tool->profile.link.framing, {},
-                                   context.clock, context.interrupt);
+    return sim::make_sim_transport(
+        std::move(tool->server), tool->profile.link.framing, {}, context.clock, context.interrupt,
+        {.character_time = simulated_character_time(tool->profile.link, endpoint.baud)});
   };
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "findings.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
@@ -18,8 +19,6 @@ const std::array<Column, 5> profile_columns = {{{"PROFILE", "profile"},
                                                 {"ACTIONS", "actions", report::Align::right},
                                                 {"FILE", "file"}}};
 
-const std::array<Column, 2> finding_columns = {{{"PLACE", "place"}, {"FINDING", "message"}}};
-
 Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
   return {.type = "profile",
           .target = {},
@@ -29,17 +28,6 @@ Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
                      {"parameters", number(static_cast<std::int64_t>(profile.parameters.size()))},
                      {"actions", number(static_cast<std::int64_t>(profile.actions.size()))},
                      {"file", profile.path}}};
-}
-
-Record finding_record(const files::Finding& finding, const Clock& clock) {
-  return {.type = "finding",
-          .target = {},
-          .time = clock.wall(),
-          .fields = {{"place", fmt::format("{}:{}:{}", finding.file, finding.line, finding.column)},
-                     {"file", finding.file},
-                     {"line", number(finding.line)},
-                     {"column", number(finding.column)},
-                     {"message", finding.message}}};
 }
 
 }  // namespace
@@ -83,21 +71,7 @@ Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context
 Result<Outcome> profile_check(const ProfileNameOptions& options, Context& context) {
   const auto findings = context.profiles.check(options.profile);
   if (!findings) return tl::unexpected(findings.error());
-  Outcome outcome;
-  outcome.succeed();
-  Listing listing(context, finding_columns);
-  for (const files::Finding& finding : *findings) {
-    listing.add(finding_record(finding, context.clock));
-  }
-  if (findings->empty()) {
-    context.renderer.note(fmt::format("{}: no faults", options.profile));
-    return finish(listing, outcome);
-  }
-  if (auto ended = listing.end(); !ended) return tl::unexpected(std::move(ended.error()));
-  return tl::unexpected(Error{.code = Errc::bad_file,
-                              .message = fmt::format("{} fault{} in this profile", findings->size(),
-                                                     findings->size() == 1 ? "" : "s"),
-                              .name = options.profile});
+  return tell_findings(*findings, options.profile, "profile", context);
 }
 
 }  // namespace spindle::commands

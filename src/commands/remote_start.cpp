@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "change_log.hpp"
 #include "deeds.hpp"
 #include "event_records.hpp"
 #include "listing.hpp"
@@ -99,7 +100,8 @@ class RemoteRun {
         plan_(&plan),
         tool_(&tool),
         context_(&context),
-        calm_context_(calm_context(context)) {}
+        calm_context_(calm_context(context)),
+        log_("remote-start", tool, context) {}
 
   Result<Outcome> run() {
     auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
@@ -123,6 +125,7 @@ class RemoteRun {
   Result<void> select() {
     for (const Deed& deed : plan_->selections) {
       const auto result = tool_->device.perform(deed.action, deed.value);
+      log_.add(logged(deed, result));
       if (!result) return tl::unexpected(result.error());
       if (result == device::ActionResult::not_confirmed) {
         return tl::unexpected(not_confirmed(deed, tool_->target));
@@ -196,6 +199,7 @@ class RemoteRun {
       kind = records.kind_of(event->block);
       listing.add(records.event(*event));
     }
+    log_run(followed, kind, stop);
     judge(followed, kind);
     if (stop.result == device::StopResult::unconfirmed) {
       outcome_ = {};  // nothing else matters as much
@@ -206,6 +210,18 @@ class RemoteRun {
     if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
     if (!listed || !told) return outcome_;
     return summarise(kind, stop).map([&] { return outcome_; });
+  }
+
+  void log_run(const Result<device::FollowedRun>& followed, const std::string& kind,
+               const device::StopReport& stop) {
+    const bool stopped = stop.result != device::StopResult::unconfirmed;
+    const bool refused = !followed && followed.error().code == Errc::exception_response;
+    std::string result = refused ? "refused" : "no-result";
+    if (!kind.empty()) result = kind;
+    log_.add({.name = plan_->start.name,
+              .register_address = plan_->start.address.value,
+              .new_value = Decimal(*plan_->start.value),
+              .result = stopped ? result : "stop-not-confirmed"});
   }
 
   void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
@@ -270,6 +286,7 @@ class RemoteRun {
   OpenTool* tool_;
   Context* context_;
   Context calm_context_;  ///< lines that are opened on it refer to it
+  ChangeLog log_;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
 };

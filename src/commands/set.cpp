@@ -4,8 +4,10 @@
 #include <optional>
 #include <utility>
 
+#include "change_log.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/catalogue/snapshot.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
@@ -108,29 +110,17 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
   return assignments;
 }
 
-Error beyond(const Assignment& assignment, std::string_view side, const Value& limit,
-             std::string_view which, modbus::RegisterAddress address) {
-  return {.code = Errc::out_of_range,
-          .message = fmt::format("{} is {} {}, the {} that the tool itself reports (register {})",
-                                 assignment.value.number.to_string(), side,
-                                 limit.number.to_string(), which, address.value),
-          .name = assignment.parameter.name,
-          .register_address = assignment.parameter.address.value};
+std::optional<Decimal> number_of(const std::optional<Value>& value) {
+  return value ? std::optional(value->number) : std::nullopt;
 }
 
 /// The tool's own limits; a parameter whose limits should exist but can not be read is not written.
 Result<void> check_own_limits(const Assignment& assignment, const device::Reading& reading,
                               const Profile& profile) {
   if (reading.limits_error) return tl::unexpected(*reading.limits_error);
-  const auto own = profile.limit_registers(assignment.parameter);
-  const Decimal& number = assignment.value.number;
-  if (reading.minimum && number < reading.minimum->number) {
-    return tl::unexpected(beyond(assignment, "below", *reading.minimum, "minimum", own->minimum));
-  }
-  if (reading.maximum && number > reading.maximum->number) {
-    return tl::unexpected(beyond(assignment, "above", *reading.maximum, "maximum", own->maximum));
-  }
-  return {};
+  return catalogue::check_own_limits(assignment.parameter, assignment.value.number,
+                                     number_of(reading.minimum), number_of(reading.maximum),
+                                     profile);
 }
 
 /// One assignment with what the tool holds now.
@@ -209,7 +199,8 @@ class Writer {
   Writer(OpenTool& tool, Execution execution, Context& context)
       : tool_(&tool),
         context_(&context),
-        listing_(context, execution == Execution::dry_run ? plan_columns : write_columns) {}
+        listing_(context, execution == Execution::dry_run ? plan_columns : write_columns),
+        log_("set", tool, context) {}
 
   Result<Outcome> plan(const std::vector<Step>& steps) {
     for (const Step& step : steps) {
@@ -259,24 +250,31 @@ class Writer {
     listing_.add(error);
   }
 
+  void log(const Step& step, std::string_view result, const Value& now) {
+    log_.add(logged(step.assignment->parameter, step.before, now, result));
+  }
+
   void write_one(const Step& step) {
     const Value& wanted = step.assignment->value;
     const auto written = tool_->device.write(step.assignment->parameter, step.before, wanted);
     if (!written) {
-      if (written.error().code == Errc::exception_response) {
-        note(step, Ending::refused, step.before);
-      }
+      const bool refused = written.error().code == Errc::exception_response;
+      if (refused) note(step, Ending::refused, step.before);
+      log(step, refused ? to_text(Ending::refused) : "unknown", refused ? step.before : wanted);
       fail(written.error());
       return;
     }
     if (written->result == device::WriteResult::written) {
       note(step, Ending::written, written->now);
+      log(step, to_text(Ending::written), written->now);
       ++changed_;
       outcome_.succeed();
       return;
     }
     const bool same = written->result == device::WriteResult::mismatch;
-    note(step, same ? Ending::mismatch : Ending::coerced, written->now);
+    const Ending ending = same ? Ending::mismatch : Ending::coerced;
+    note(step, ending, written->now);
+    log(step, to_text(ending), written->now);
     fail(not_stored(step, *written, tool_->target));
   }
 
@@ -293,6 +291,7 @@ class Writer {
   OpenTool* tool_;
   Context* context_;
   Listing listing_;
+  ChangeLog log_;
   Outcome outcome_ = {};
   std::size_t changed_ = 0;
   std::size_t unchanged_ = 0;

@@ -10,19 +10,26 @@
 
 namespace spindle::commands {
 
-/// Calls `handle(target)` for every target, each in a thread of its own when there are several, and
-/// returns the results in the order of the targets. Threads share nothing that changes.
+/// Places of the targets that share a line, line by line.
+std::vector<std::vector<std::size_t>> by_line(const std::vector<Target>& targets);
+
+/// Calls `handle(target)` for every target, in a thread of its own for every line when there are
+/// several, and returns the results in the order of the targets. The units of one serial line take
+/// turns: only one at a time can have it. Threads share nothing that changes.
 template <typename Handle>
 auto side_by_side(const std::vector<Target>& targets, Handle handle) {
   using Handled = std::invoke_result_t<Handle, const Target&>;
   std::vector<std::optional<Handled>> slots(targets.size());
-  const auto fill = [&](std::size_t index) { slots[index] = handle(targets[index]); };
-  if (targets.size() == 1) {
-    fill(0);
+  const auto fill = [&](const std::vector<std::size_t>& line) {
+    for (const std::size_t index : line) slots[index] = handle(targets[index]);
+  };
+  const auto lines = by_line(targets);
+  if (lines.size() == 1) {
+    fill(lines.front());
   } else {
     std::vector<std::jthread> threads;
-    threads.reserve(targets.size());
-    for (std::size_t index = 0; index < targets.size(); ++index) threads.emplace_back(fill, index);
+    threads.reserve(lines.size());
+    for (const auto& line : lines) threads.emplace_back(fill, line);
   }
   std::vector<Handled> results;
   results.reserve(slots.size());

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <type_traits>
 #include <utility>
 
@@ -29,20 +30,79 @@ auto parse_each(const std::string& option, const std::vector<std::string>& texts
   return all;
 }
 
-Result<link::Endpoint> listen_endpoint(const std::string& text) {
+Error misplaced(std::string message, std::string hint) {
+  return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
+}
+
+/// What only makes sense on a serial line, by the name of its option; empty: nothing was asked for.
+std::string_view serial_option(const SimulateOptions& options) {
+  if (!options.pty.empty()) return "--pty";
+  if (!options.units.empty()) return "--units";
+  if (options.baud) return "--baud";
+  return options.gaps == sim::LineModel::Gaps::ignored ? "--no-gap" : "";
+}
+
+Result<link::Endpoint> listen_endpoint(const std::string& text, const catalogue::Profile& profile) {
+  const bool serial = profile.link.framing == modbus::Framing::rtu;
+  const std::string_view usual = serial ? "rtu+tcp://127.0.0.1:0" : "tcp://127.0.0.1:0";
+  std::string url = text.empty() ? std::string(usual) : text;
   // Port 0 asks the system for a free one; as a target it would make no sense.
-  const bool any_port = text.ends_with(":0");
-  auto endpoint = link::parse_endpoint(any_port ? text.substr(0, text.size() - 2) : text);
+  const bool any_port = url.ends_with(":0");
+  if (any_port) url.back() = '1';
+  auto endpoint = link::parse_endpoint(url);
   if (!endpoint) return endpoint;
-  if (endpoint->medium != link::Medium::tcp) {
-    return tl::unexpected(Error{.code = Errc::bad_target,
-                                .message = "a simulated tool of this kind listens on tcp://",
-                                .hint = "such as tcp://127.0.0.1:0",
-                                .target = text});
+  const auto wanted = serial ? link::Medium::rtu_over_tcp : link::Medium::tcp;
+  if (endpoint->medium != wanted) {
+    return tl::unexpected(
+        Error{.code = Errc::bad_target,
+              .message = fmt::format("a simulated tool of this kind listens on {}",
+                                     serial ? "rtu+tcp:// or a --pty" : "tcp://"),
+              .hint = fmt::format("such as {}", usual),
+              .target = text});
   }
   if (any_port) endpoint->port = 0;
-  endpoint->text = text;
   return endpoint;
+}
+
+/// Where the tool is served; of a pseudo terminal the path is absolute, as clients name it.
+Result<link::Endpoint> place_of(const SimulateOptions& options, const catalogue::Profile& profile) {
+  const std::string_view only_serial = serial_option(options);
+  if (!only_serial.empty() && profile.link.framing == modbus::Framing::tcp) {
+    return tl::unexpected(misplaced(
+        fmt::format("{} is for serial tools, and {} speaks Modbus TCP", only_serial, profile.id),
+        "leave it out"));
+  }
+  if (options.pty.empty()) return listen_endpoint(options.listen, profile);
+  if (!options.listen.empty()) {
+    return tl::unexpected(misplaced("--pty and --listen are two places", "choose one of them"));
+  }
+  link::Endpoint place{.medium = link::Medium::serial};
+  place.device = std::filesystem::absolute(options.pty).lexically_normal().string();
+  return place;
+}
+
+/// What a client gives as its target, complete with what it needs to get an answer.
+std::string url_of(const link::Endpoint& place, const SimulateOptions& options) {
+  if (place.medium == link::Medium::tcp) return link::to_url(place);
+  std::string url = place.medium == link::Medium::serial ? fmt::format("rtu://{}", place.device)
+                                                         : link::to_url(place);
+  url += fmt::format("?unit={}", options.units.empty() ? 1 : options.units.front().value);
+  if (options.baud) url += fmt::format("&baud={}", *options.baud);
+  return url;
+}
+
+sim::ServeOptions serve_options(const link::Endpoint& place, const catalogue::Profile& profile,
+                                const SimulateOptions& options, sim::FaultPlan faults) {
+  sim::ServeOptions serve{.host = place.host,
+                          .port = place.port.value_or(profile.link.port),
+                          .framing = profile.link.framing,
+                          .pty = place.device,
+                          .faults = std::move(faults)};
+  if (profile.link.framing == modbus::Framing::tcp) return serve;
+  serve.baud = options.baud.value_or(profile.link.serial.baud);
+  serve.line = {.character_time = simulated_character_time(profile.link, options.baud),
+                .gaps = options.gaps};
+  return serve;
 }
 
 report::Record simulation_record(const std::string& profile, const std::string& url,
@@ -104,31 +164,29 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   if (!faults) return tl::unexpected(std::move(faults.error()));
   auto outages = parse_each("--outage", options.outages, sim::parse_outage);
   if (!outages) return tl::unexpected(std::move(outages.error()));
-  auto listen = listen_endpoint(options.listen);
-  if (!listen) return tl::unexpected(std::move(listen.error()));
   auto tool = make_simulated_tool(options.profile,
                                   {.identity_bytes = options.identity_bytes,
                                    .firmware = options.firmware,
                                    .serial = options.serial,
                                    .model = options.model,
+                                   .units = options.units,
+                                   .baud = options.baud,
                                    .faults = *faults,
                                    .rundown_every = options.rundown_every,
                                    .ng_every = options.ng_every.value_or(0),
                                    .burst = options.burst.value_or(1)},
                                   context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
-  if (!listen->port) listen->port = tool->profile.link.port;
+  auto place = place_of(options, tool->profile);
+  if (!place) return tl::unexpected(std::move(place.error()));
   Outcome outcome;
   outcome.succeed();
   Traffic traffic;
-  sim::ServeOptions serve{.host = listen->host,
-                          .port = *listen->port,
-                          .framing = tool->profile.link.framing,
-                          .faults = std::move(*faults),
-                          .outages = std::move(*outages)};
+  sim::ServeOptions serve = serve_options(*place, tool->profile, options, std::move(*faults));
+  serve.outages = std::move(*outages);
   serve.listening = [&](std::uint16_t port) {
-    listen->port = port;
-    return announce(tool->profile.id, link::to_url(*listen), context);
+    place->port = port;
+    return announce(tool->profile.id, url_of(*place, options), context);
   };
   serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     traffic.count(heard);

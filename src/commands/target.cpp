@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "open_sim.hpp"
@@ -118,7 +119,7 @@ Result<void> find_profile(OpenTool& tool, const Context& context) {
   }
   // Products that their answer does not tell apart share the register map of their common base.
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
-  tool.device.use(*tool.profile);
+  tool.device.use(*tool.profile, std::move(identification->identity));
   return {};
 }
 
@@ -200,6 +201,16 @@ Error Target::blamed(Error error) const {
   error.target = shown;
   if (endpoint.text != shown) error.endpoint = endpoint.text;
   return error;
+}
+
+std::string shared_line(const link::Endpoint& endpoint) {
+  if (endpoint.medium == link::Medium::rtu_over_tcp) {
+    return fmt::format("{}:{}", endpoint.host, endpoint.port.value_or(0));
+  }
+  if (endpoint.medium != link::Medium::serial) return {};
+  std::error_code unreadable;  // then the path as it is
+  const auto port = std::filesystem::weakly_canonical(endpoint.device, unreadable);
+  return unreadable ? endpoint.device : port.string();
 }
 
 bool is_target(std::string_view text, const Context& context) {

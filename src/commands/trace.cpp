@@ -21,6 +21,8 @@ std::string_view to_text(link::Decision decision) {
       return "stray frame, ignored";
     case link::Decision::late:
       return "late answer, ignored";
+    case link::Decision::echo:
+      return "echo of our request, ignored";
     case link::Decision::junk:
       return "no frame";
     case link::Decision::retry:

@@ -1,7 +1,11 @@
 #include "watched_tool.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
+
+#include "side_by_side.hpp"
 
 namespace spindle::commands {
 
@@ -55,10 +59,28 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience) {
   return device::Watcher::Link{std::move(*device), std::move(identity)};
 }
 
+namespace {
+
+/// A watch holds its line for as long as it lasts.
+Result<void> check_lines(const std::vector<Target>& targets) {
+  for (const auto& line : by_line(targets)) {
+    if (line.size() == 1) continue;
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message = fmt::format("{} and {} are on one serial line, which only one watch can have",
+                               targets[line[0]].shown, targets[line[1]].shown),
+        .hint = "watch one of them at a time"});
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
                                                ProfileShelf& shelf, const Context& context) {
   auto resolved = resolve_targets(targets, context);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
+  if (auto apart = check_lines(*resolved); !apart) return tl::unexpected(std::move(apart.error()));
   std::vector<WatchedTool> tools;
   tools.reserve(resolved->size());
   for (Target& target : *resolved) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "spindle/link/serial_settings.hpp"
+
 namespace spindle::device {
 namespace {
 
@@ -46,6 +48,14 @@ void append_without_absent(const Area& area, const std::vector<Area>& absent,
   append(std::uint32_t{area.to} + 1);
 }
 
+bool is_said_absent(const Parameter& parameter, const catalogue::Profile& profile) {
+  const auto& absent = profile.link.absent;
+  return std::any_of(absent.begin(), absent.end(), [&](const Area& area) {
+    return area.table == parameter.table && area.from <= parameter.address.value &&
+           parameter.address.value <= area.to;
+  });
+}
+
 modbus::RegisterTable event_table(const catalogue::EventFacts& events) {
   const bool input =
       events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
@@ -61,6 +71,10 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
   for (const Area& area : profile.link.contiguous) {
     append_without_absent(area, absent, limits.contiguous);
   }
+  for (const Area& area : absent) {
+    limits.absent.push_back(
+        {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
+  }
   if (profile.events) {
     const bool input = profile.events->function ==
                        static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
@@ -71,15 +85,31 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
   return limits;
 }
 
+/// A profile without rules gives more than the standard asks for, because there are devices that do
+/// not hear what the standard allows.
 Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
   for (const catalogue::GapRule& rule : serial.gaps) {
     if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
   }
-  return Duration::zero();
+  constexpr int caution = 3;
+  return caution * link::standard_silence(baud);
 }
 
-link::DemuxRules demux_rules(const catalogue::Profile& profile) {
-  link::DemuxRules rules{.framing = profile.link.framing, .spontaneous = {}};
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
+  switch (endpoint.medium) {
+    case link::Medium::tcp:
+      return modbus::Framing::tcp;
+    case link::Medium::serial:
+    case link::Medium::rtu_over_tcp:
+      return modbus::Framing::rtu;
+    case link::Medium::simulated:
+      break;
+  }
+  return facts.framing;
+}
+
+link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
+  link::DemuxRules rules{.framing = framing, .spontaneous = {}};
   if (profile.events) {
     rules.spontaneous.push_back(
         {profile.events->function, static_cast<std::uint8_t>(2 * profile.events->count)});
@@ -88,15 +118,21 @@ link::DemuxRules demux_rules(const catalogue::Profile& profile) {
 }
 
 link::SessionOptions session_options(const catalogue::Profile& profile,
-                                     const link::Endpoint& endpoint, const LinkOptions& options) {
+                                     const link::Endpoint& endpoint, const LinkOptions& options,
+                                     TimePoint now) {
   link::SessionOptions session;
-  session.rules = demux_rules(profile);
+  session.rules = demux_rules(profile, framing_of(endpoint, profile.link));
   session.unit = endpoint.unit.value_or(modbus::UnitId{profile.link.unit});
   session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
-  if (profile.link.framing == modbus::Framing::rtu) {
-    const unsigned baud = endpoint.baud.value_or(profile.link.serial.baud);
-    session.gap = gap_of(profile.link.serial, baud);
-    session.broadcast_gap = profile.link.serial.broadcast_pause;
+  if (session.rules.framing == modbus::Framing::rtu) {
+    const catalogue::SerialFacts& serial = profile.link.serial;
+    const auto line = link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits);
+    session.gap = endpoint.gap.value_or(gap_of(serial, line.baud));
+    session.broadcast_gap = session.gap + serial.broadcast_pause;
+    session.character_time = character_time(line);
+    session.echo =
+        endpoint.medium == link::Medium::simulated ? link::LocalEcho::absent : endpoint.echo;
+    session.in_use_until = now;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;
@@ -161,6 +197,10 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       retries_(options.retries.value_or(profile.link.retries)),
       client_(*session_, read_limits(*profile_), retries_) {}
 
+Device::~Device() {
+  if (session_) session_->settle();
+}
+
 Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                             const LinkOptions& options, const OpenTransport& open_transport,
                             Clock& clock) {
@@ -173,12 +213,17 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
     return tl::unexpected(std::move(error));
   }
   auto session = std::make_unique<link::Session>(
-      std::move(*transport), clock, session_options(profile, endpoint, options), options.trace);
+      std::move(*transport), clock, session_options(profile, endpoint, options, clock.now()),
+      options.trace);
   return Device(endpoint, profile, options, std::move(session));
 }
 
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
+  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
+  if (serial && error.code == Errc::no_answer && error.hint.empty()) {
+    error.hint = "check unit, rate, parity and wiring; 'spindle scan' shows which units answer";
+  }
   error.target = target_;
   error.endpoint = endpoint_;
   return error;
@@ -211,9 +256,10 @@ void Device::set_retries(unsigned retries) {
   client_ = link::Client(*session_, read_limits(*profile_), retries_);
 }
 
-void Device::use(const catalogue::Profile& profile) {
+void Device::use(const catalogue::Profile& profile, catalogue::Identity identity) {
   profile_ = &profile;
-  session_->set_rules(demux_rules(*profile_));
+  identity_ = std::move(identity);
+  session_->set_rules(demux_rules(*profile_, session_->options().rules.framing));
   client_ = link::Client(*session_, read_limits(*profile_), retries_);
   registers_known_ = true;
 }
@@ -225,12 +271,15 @@ Result<void> Device::require_known_registers() {
     return tl::unexpected(std::move(answer.error()));
   }
   const auto& facts = *profile_->identity;
-  const auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
+  auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
   const auto generation = catalogue::generation_of(facts, identity);
   registers_known_ = generation == catalogue::Generation::known;
   identity_text_ =
       fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
-  if (registers_known_) return {};
+  if (registers_known_) {
+    identity_ = std::move(identity);
+    return {};
+  }
   Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
   error.message =
       generation == catalogue::Generation::later
@@ -247,42 +296,70 @@ Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& par
                                                Limits limits, const link::Progress& progress) {
   std::vector<RegisterRange> wanted;
   wanted.reserve(parameters.size());
-  for (const Parameter& parameter : parameters) {
-    wanted.push_back(range_of(parameter));
-    const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
-    if (!own) continue;
-    wanted.push_back(range_at(parameter, own->minimum));
-    wanted.push_back(range_at(parameter, own->maximum));
-  }
-  auto image = client_.read_each(wanted, progress);
-  if (!image) return tl::unexpected(located(std::move(image.error())));
+  for (const Parameter& parameter : parameters) wanted.push_back(range_of(parameter));
+  std::vector<RegisterRange> wanted_limits;
+  if (limits == Limits::read) wanted_limits = limit_ranges(parameters, nullptr);
+  const std::size_t first_part = progress ? client_.count_requests(wanted) : 0;
+  const std::size_t second_part =
+      progress && !wanted_limits.empty() ? client_.count_requests(wanted_limits) : 0;
+  auto values = client_.read_each(wanted, [&](std::size_t done, std::size_t total) {
+    if (progress) progress(done, total + second_part);
+  });
+  if (!values) return tl::unexpected(located(std::move(values.error())));
+  // What does not exist has no limits worth asking for.
+  if (limits == Limits::read) wanted_limits = limit_ranges(parameters, &*values);
+  auto limit_values = client_.read_each(wanted_limits, [&](std::size_t done, std::size_t total) {
+    if (progress) progress(first_part + done, first_part + total);
+  });
+  if (!limit_values) return tl::unexpected(located(std::move(limit_values.error())));
   std::vector<Reading> readings;
   readings.reserve(parameters.size());
   for (const Parameter& parameter : parameters) {
-    readings.push_back(reading_of(parameter, limits, *image));
+    readings.push_back(reading_of(parameter, limits, *values, *limit_values));
   }
   return readings;
 }
 
+/// The registers of the tool's own limits; of those parameters that exist, as far as is known.
+std::vector<RegisterRange> Device::limit_ranges(const std::vector<Parameter>& parameters,
+                                                const link::RegisterImage* values) {
+  std::vector<RegisterRange> ranges;
+  for (const Parameter& parameter : parameters) {
+    const auto own = profile_->limit_registers(parameter);
+    if (!own || (values == nullptr && is_said_absent(parameter, *profile_))) continue;
+    const RegisterRange minimum = range_at(parameter, own->minimum);
+    const RegisterRange maximum = range_at(parameter, own->maximum);
+    if (values != nullptr && !values->get(range_of(parameter))) {
+      client_.avoid(minimum);
+      client_.avoid(maximum);
+      continue;
+    }
+    ranges.push_back(minimum);
+    ranges.push_back(maximum);
+  }
+  return ranges;
+}
+
 Reading Device::reading_of(const Parameter& parameter, Limits limits,
-                           const link::RegisterImage& image) const {
+                           const link::RegisterImage& values,
+                           const link::RegisterImage& limit_values) const {
   const auto with_name = [&](Error error) {
     error = located(std::move(error));
     error.name = parameter.name;
     return error;
   };
-  const auto value_at = [&](const RegisterRange& range) {
+  const auto value_at = [&](const RegisterRange& range, const link::RegisterImage& image) {
     return image.get(range)
         .and_then([&](const Registers& registers) { return decode(parameter, registers); })
         .map_error(with_name);
   };
   Reading reading{.parameter = parameter,
-                  .registers = image.get(range_of(parameter)).map_error(with_name),
-                  .value = value_at(range_of(parameter))};
+                  .registers = values.get(range_of(parameter)).map_error(with_name),
+                  .value = value_at(range_of(parameter), values)};
   const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
-  if (!own) return reading;
-  auto minimum = value_at(range_at(parameter, own->minimum));
-  auto maximum = value_at(range_at(parameter, own->maximum));
+  if (!own || !reading.registers) return reading;
+  auto minimum = value_at(range_at(parameter, own->minimum), limit_values);
+  auto maximum = value_at(range_at(parameter, own->maximum), limit_values);
   if (minimum) reading.minimum = *minimum;
   if (maximum) reading.maximum = *maximum;
   if (!minimum) reading.limits_error = minimum.error();
@@ -415,14 +492,21 @@ Result<std::optional<Registers>> Device::last_event() {
 }
 
 Result<Duration> Device::ping() {
-  const Clock& clock = session_->clock();
-  const auto word = static_cast<std::uint16_t>(session_->counters().requests);
-  const auto request =
-      profile_->link.loopback ? modbus::loopback_request(word) : modbus::report_server_id_request();
-  const TimePoint start = clock.now();
-  auto response = session_->transact(request);
+  // FC 08 belongs to serial lines, so without a profile it is the best guess there.
+  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
+  const bool loopback = profile_->link.loopback || (serial && profile_->id.empty());
+  auto response = session_->transact(loopback ? modbus::loopback_request(session_->fresh_word())
+                                              : modbus::report_server_id_request());
   if (!response) return tl::unexpected(located(std::move(response.error())));
-  return clock.now() - start;
+  return session_->last_round_trip();
+}
+
+Result<Probe> Device::probe(modbus::UnitId unit) {
+  session_->set_unit(unit);
+  auto response = session_->transact(modbus::loopback_request(session_->fresh_word()));
+  if (!response) return tl::unexpected(located(std::move(response.error())));
+  const bool refused = (response->function & modbus::exception_bit) != 0;
+  return Probe{refused ? Answered::exception : Answered::data, session_->last_round_trip()};
 }
 
 }  // namespace spindle::device

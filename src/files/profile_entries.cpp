@@ -37,6 +37,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 24> unit_wor
     {"cN.m", "cN.m"}, {"lbf.in", "lbf.in"}, {"ozf.in", "ozf.in"}, {"lbf.ft", "lbf.ft"},
 }};
 
+constexpr std::array<std::pair<std::string_view, catalogue::Cloning>, 2> clone_words = {
+    {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}}};
+
 constexpr std::array<std::pair<std::string_view, Hazard>, 5> hazard_words = {
     {{"none", Hazard::none},
      {"moves", Hazard::moves},
@@ -161,6 +164,8 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   assign(parameter.source, map.text("source", Need::required));
   assign(parameter.note, map.text("note"));
   overlaps = map.flag("overlaps").value_or(false);
+  assign(parameter.cloning, map.word<catalogue::Cloning>("clone", "value of clone", clone_words));
+  if (map.flag("secret").value_or(false)) parameter.secrecy = catalogue::Secrecy::secret;
   read_repetition(map, entry);
   return entry;
 }
@@ -241,7 +246,7 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
   YamlMap group(node, findings);
   for (const std::string_view key :
        {"name", "n", "stride", "table", "encoding", "scale", "unit", "access", "evidence",
-        "repeats", "source", "note", "overlaps", "fields"}) {
+        "repeats", "source", "note", "overlaps", "clone", "secret", "fields"}) {
     group.allow(key);
   }
   group.finish();

@@ -202,6 +202,27 @@ void read_only_has_no_default(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
+void read_only_is_never_cloned(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const bool marked = parameter.cloning == catalogue::Cloning::never;
+    if (!marked || parameter.access == Access::read_write) return;
+    findings.add_once(origin.of("clone"),
+                      fmt::format("{}: what is read-only is never restored, so 'clone' says "
+                                  "nothing",
+                                  parameter.name));
+  });
+}
+
+void secrets_are_stored(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const bool marked = parameter.secrecy == catalogue::Secrecy::secret;
+    if (!marked || parameter.table == RegisterTable::holding) return;
+    findings.add_once(origin.of("secret"),
+                      fmt::format("{}: no backup holds input registers, so 'secret' says nothing",
+                                  parameter.name));
+  });
+}
+
 /// The first thing wrong with a list of labels; empty when it is good.
 std::string fault_of(const std::vector<Label>& labels, const Parameter& parameter) {
   Parameter earlier = parameter;
@@ -421,7 +442,7 @@ void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 23> rules = {
+constexpr std::array<Rule, 25> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -431,6 +452,8 @@ constexpr std::array<Rule, 23> rules = {
     input_registers_are_read_only,
     ranges_fit,
     read_only_has_no_default,
+    read_only_is_never_cloned,
+    secrets_are_stored,
     defaults_fit,
     labels_are_unique,
     entries_have_a_source,

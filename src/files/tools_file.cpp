@@ -59,6 +59,13 @@ Tool read_tool(const YamlEntry& entry, Findings& findings) {
   std::transform(torque_units.begin(), torque_units.end(), units.begin(),
                  [](std::string_view unit) { return std::pair(unit, unit); });
   assign(tool.torque_unit, map.word<std::string_view>("torque-unit", "torque unit", units));
+  const auto place_of = [&](std::string_view key) {
+    const YamlNode* value = entry.value.find(key);
+    return value == nullptr ? Place() : Place{value->at.line, value->at.column};
+  };
+  tool.url_at = place_of("url");
+  tool.profile_at = place_of("profile");
+  tool.verified_at = place_of("verified");
   if (const YamlNode* verified = map.get("verified")) {
     tool.verified = read_words(*verified, findings);
   }
@@ -100,12 +107,10 @@ void read_tools(const YamlNode& document, Tools& tools, Findings& findings) {
   map.finish();
 }
 
-}  // namespace
-
-Result<Tools> load_tools(const std::string& path) {
+/// Everything that can be read, with what is wrong.
+Result<Tools> read_tools_file(const std::string& path, Findings& findings) {
   const auto text = read_text_file(path);
   if (!text) return tl::unexpected(text.error());
-  Findings findings;
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
   Tools tools;
@@ -113,8 +118,23 @@ Result<Tools> load_tools(const std::string& path) {
   if (!documents.empty()) read_tools(documents.front(), tools, findings);
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
-  if (!findings.empty()) return tl::unexpected(findings.error());
   return tools;
+}
+
+}  // namespace
+
+Result<Tools> load_tools(const std::string& path) {
+  Findings findings;
+  auto tools = read_tools_file(path, findings);
+  if (tools && !findings.empty()) return tl::unexpected(findings.error());
+  return tools;
+}
+
+Result<CheckedTools> check_tools(const std::string& path) {
+  Findings findings;
+  auto tools = read_tools_file(path, findings);
+  if (!tools) return tl::unexpected(std::move(tools.error()));
+  return CheckedTools{std::move(*tools), findings.list()};
 }
 
 }  // namespace spindle::files

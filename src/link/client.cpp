@@ -36,6 +36,12 @@ void append_pieces(RegisterRange range, const ReadLimits& limits,
   pieces.push_back(range);
 }
 
+bool is_said_absent(const RegisterRange& range, const ReadLimits& limits) {
+  return std::any_of(limits.absent.begin(), limits.absent.end(), [&](const RegisterRange& area) {
+    return area.table == range.table && area.first < end_of(range) && range.first < end_of(area);
+  });
+}
+
 bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t to,
                 const ReadLimits& limits, const std::set<std::uint32_t>& absent) {
   if (from >= to) return true;
@@ -51,7 +57,9 @@ bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t t
 
 void add(std::vector<PlannedRead>& plan, const RegisterRange& piece, const ReadLimits& limits,
          const std::set<std::uint32_t>& absent) {
-  if (!plan.empty() && plan.back().range.table == piece.table) {
+  const bool joins = !plan.empty() && plan.back().range.table == piece.table &&
+                     !is_said_absent(piece, limits) && !is_said_absent(plan.back().range, limits);
+  if (joins) {
     PlannedRead& last = plan.back();
     const std::uint32_t end = std::max(end_of(last.range), end_of(piece));
     if (end - last.range.first <= limits.max_read &&
@@ -174,6 +182,18 @@ Result<Registers> Client::read(const RegisterRange& range) {
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
                                         const Progress& progress) {
   RegisterImage image;
+  const auto plan = plan_reads(askable(wanted, image), limits_, absent_registers());
+  std::size_t done = 0;
+  for (const PlannedRead& planned : plan) {
+    if (auto read = read_or_bisect(planned, image); !read) return tl::unexpected(read.error());
+    if (progress) progress(++done, plan.size());
+  }
+  return image;
+}
+
+/// The pieces that are not known to be absent; the others fail in the image.
+std::vector<RegisterRange> Client::askable(const std::vector<RegisterRange>& wanted,
+                                           RegisterImage& image) const {
   std::vector<RegisterRange> pieces;
   for (const RegisterRange& range : wanted) append_pieces(range, limits_, pieces);
   const auto asked = std::partition(pieces.begin(), pieces.end(), [&](const RegisterRange& piece) {
@@ -182,13 +202,7 @@ Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted
   for (auto piece = asked; piece != pieces.end(); ++piece)
     image.fail(*piece, *known_absent(*piece));
   pieces.erase(asked, pieces.end());
-  const auto plan = plan_reads(pieces, limits_, absent_registers());
-  std::size_t done = 0;
-  for (const PlannedRead& planned : plan) {
-    if (auto read = read_or_bisect(planned, image); !read) return tl::unexpected(read.error());
-    if (progress) progress(++done, plan.size());
-  }
-  return image;
+  return pieces;
 }
 
 Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& image) {
@@ -233,8 +247,18 @@ const Error* Client::known_absent(const RegisterRange& range) const {
   return nullptr;
 }
 
+void Client::avoid(const RegisterRange& range) {
+  const std::uint32_t first = register_key(range.table, range.first);
+  for (std::uint32_t key = first; key < first + range.count; ++key) avoided_.insert(key);
+}
+
+std::size_t Client::count_requests(const std::vector<RegisterRange>& wanted) const {
+  RegisterImage unused;
+  return plan_reads(askable(wanted, unused), limits_, absent_registers()).size();
+}
+
 std::set<std::uint32_t> Client::absent_registers() const {
-  std::set<std::uint32_t> registers;
+  std::set<std::uint32_t> registers = avoided_;
   for (const auto& [range, error] : absent_) {
     const std::uint32_t first = register_key(range.table, range.first);
     for (std::uint32_t key = first; key < first + range.count; ++key) registers.insert(key);

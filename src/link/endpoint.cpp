@@ -10,12 +10,16 @@
 #include <utility>
 #include <vector>
 
+#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::link {
 namespace {
 
 constexpr std::uint8_t max_serial_unit = 247;  // Modbus over Serial Line 1.02, 2.2
+
+// A longer silence is a slip of the pen; answers themselves take less.
+constexpr Duration max_gap = std::chrono::seconds(1);
 
 Error bad_target(std::string_view url, std::string message, std::string hint = {}) {
   return Error{.code = Errc::bad_target,
@@ -197,7 +201,7 @@ using Setter = std::function<Result<void>(Endpoint&, std::string_view)>;
 
 struct UrlOption {
   std::string_view name;
-  bool serial_only;
+  std::vector<Medium> media;  ///< where it means something
   Setter set;
 };
 
@@ -244,11 +248,45 @@ Result<void> set_stop(Endpoint& endpoint, std::string_view value) {
   return {};
 }
 
+Result<void> set_gap(Endpoint& endpoint, std::string_view value) {
+  const auto gap = parse_duration(value);
+  if (!gap || *gap > max_gap) {
+    return tl::unexpected(
+        bad_option(endpoint, "gap", value, fmt::format("a time up to {}", to_text(max_gap))));
+  }
+  endpoint.gap = *gap;
+  return {};
+}
+
+Result<void> set_switching(Endpoint& endpoint, std::string_view value) {
+  if (value != "true" && value != "false") {
+    return tl::unexpected(bad_option(endpoint, "rs485", value, "true or false"));
+  }
+  endpoint.switching = value == "true" ? LineSwitching::kernel : LineSwitching::adapter;
+  return {};
+}
+
+Result<void> set_echo(Endpoint& endpoint, std::string_view value) {
+  if (value == "true") {
+    endpoint.echo = LocalEcho::present;
+  } else if (value == "false") {
+    endpoint.echo = LocalEcho::absent;
+  } else if (value != "auto") {
+    return tl::unexpected(bad_option(endpoint, "echo", value, "true, false or auto"));
+  }
+  return {};
+}
+
 const std::vector<UrlOption>& url_options() {
-  static const std::vector<UrlOption> options = {{"unit", false, set_unit},
-                                                 {"baud", true, set_baud},
-                                                 {"parity", true, set_parity},
-                                                 {"stop", true, set_stop}};
+  using enum Medium;
+  static const std::vector<UrlOption> options = {
+      {"unit", {tcp, serial, rtu_over_tcp, simulated}, set_unit},
+      {"baud", {serial, rtu_over_tcp, simulated}, set_baud},
+      {"parity", {serial}, set_parity},
+      {"stop", {serial}, set_stop},
+      {"gap", {serial, rtu_over_tcp}, set_gap},
+      {"rs485", {serial}, set_switching},
+      {"echo", {serial, rtu_over_tcp}, set_echo}};
   return options;
 }
 
@@ -258,7 +296,8 @@ Result<void> apply_option(Endpoint& endpoint, std::string_view item,
   const std::string_view name = item.substr(0, equals);
   std::vector<std::string> names;
   for (const UrlOption& option : url_options()) {
-    if (option.serial_only && endpoint.medium != Medium::serial) continue;
+    if (std::find(option.media.begin(), option.media.end(), endpoint.medium) == option.media.end())
+      continue;
     names.emplace_back(option.name);
     if (option.name != name) continue;
     if (equals == std::string_view::npos) {

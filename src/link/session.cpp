@@ -11,18 +11,25 @@ namespace {
 
 // Somebody who watches takes events at once; this bounds memory when nobody does.
 constexpr std::size_t max_queued = 4096;
+
+// A tool that answers at all has long done so; whoever pressed Ctrl-C hardly notices.
+constexpr Duration longest_settling = std::chrono::milliseconds(250);
+
 constexpr std::uint16_t first_transaction = 0x8000;
 
-std::string describe_frame(const modbus::Adu& adu) {
-  return fmt::format("id {:04X}, unit {}, function {:02X}, data {}", adu.transaction.value,
-                     adu.unit.value, adu.pdu.function, to_hex(adu.pdu.data));
-}
+using modbus::FunctionCode;
 
 /// Whether the answer is a copy of the request, so that only an echo can be mistaken for it.
 bool is_repeated_by_answer(const modbus::Pdu& request) {
   const auto function = static_cast<modbus::FunctionCode>(request.function);
   return function == modbus::FunctionCode::write_single_register ||
          function == modbus::FunctionCode::diagnostics;
+}
+
+Error everybody_error() {
+  return {.code = Errc::usage,
+          .message = "unit 0 means every unit of the line at once, and none of them answers",
+          .hint = "name one, such as unit=1; 'spindle scan' shows which are there"};
 }
 
 /// How long an RTU frame is that answers the request, judged by what has come of it.
@@ -61,13 +68,17 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
     : transport_(std::move(transport)),
       clock_(&clock),
       options_(std::move(options)),
-      trace_(std::move(trace)) {}
+      trace_(std::move(trace)),
+      created_(clock.now()),
+      last_activity_(options_.in_use_until),
+      echo_(options_.echo) {}
 
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
   if (quarantined_until_ && !is_repeated_by_answer(request)) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
+  if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
   return exchange(request);
 }
 
@@ -76,6 +87,7 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   next_transaction_ = next_transaction_ == 0xFFFF
                           ? first_transaction
                           : static_cast<std::uint16_t>(next_transaction_ + 1);
+  if (is_rtu() && options_.unit == modbus::UnitId{}) return tl::unexpected(everybody_error());
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
   auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {
@@ -97,10 +109,32 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     buffer_.clear();
-  } else if (!is_repeated_by_answer(outstanding.request.pdu)) {
-    echoing_ = outstanding.echoes > 0;
+    const bool mistakable = !is_repeated_by_answer(outstanding.request.pdu);
+    if (mistakable) abandoned_ = outstanding.request;
   }
+  learn_echo(outstanding);
   return answer;
+}
+
+/// An exchange whose echo can not be taken for its answer shows whether there is one.
+void Session::learn_echo(const Outstanding& outstanding) {
+  const bool telling = !is_repeated_by_answer(outstanding.request.pdu);
+  if (options_.echo != LocalEcho::automatic || !telling) return;
+  const bool complete = outstanding.answer || clock_->now() >= outstanding.deadline;
+  if (outstanding.echoes > 0) {
+    echo_ = LocalEcho::present;
+  } else if (complete) {
+    echo_ = LocalEcho::absent;
+  }
+}
+
+/// The answer to a loop-back is its own echo. Before the first one a read, whose answer is not,
+/// shows whether the adapter hears itself; a unit that does not answer it is not there.
+Result<void> Session::find_echo(const modbus::Pdu& request) {
+  const bool loopback = request.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
+  if (!is_rtu() || !loopback || echo_ != LocalEcho::automatic) return {};
+  return transact(modbus::read_request(modbus::RegisterTable::holding, {}, 1))
+      .map([](const modbus::Pdu&) {});
 }
 
 Result<void> Session::broadcast(const modbus::Pdu& request) {
@@ -151,7 +185,7 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
     strip_echo(outstanding);
     auto sorted = sort_buffered(&outstanding);
     if (!sorted) return tl::unexpected(std::move(sorted.error()));
-    if (outstanding.answer) return std::move(*outstanding.answer);
+    if (outstanding.answer) return *outstanding.answer;
     if (expired) return tl::unexpected(timeout_error(outstanding));
     auto more = fill(outstanding.deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
@@ -159,14 +193,18 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
   }
 }
 
-/// Takes away the copy of the request that some adapters receive of all that they send.
+/// Takes away the copy of the request that some adapters receive of all that they send. Where the
+/// copy looks like an answer, accept() tells them apart.
 void Session::strip_echo(Outstanding& outstanding) {
   const Bytes& sent = outstanding.bytes;
-  const bool ambiguous = is_repeated_by_answer(outstanding.request.pdu) && !echoing_;
-  if (!is_rtu() || ambiguous || outstanding.echoes > 0 || buffer_.size() < sent.size()) return;
+  const bool strippable = is_rtu() && options_.echo != LocalEcho::absent &&
+                          outstanding.echoes == 0 &&
+                          !is_repeated_by_answer(outstanding.request.pdu);
+  if (!strippable || buffer_.size() < sent.size()) return;
   const auto end = buffer_.begin() + static_cast<std::ptrdiff_t>(sent.size());
   if (!std::equal(sent.begin(), sent.end(), buffer_.begin(), end)) return;
   buffer_.erase(buffer_.begin(), end);
+  decide(Decision::echo, outstanding.request);
   ++outstanding.echoes;
 }
 
@@ -226,8 +264,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
   const modbus::Adu* request = outstanding == nullptr ? nullptr : &outstanding->request;
   switch (judge(request, received, options_.rules)) {
     case Verdict::answer:
-      decide(Decision::answer, received);
-      outstanding->answer = received.pdu;
+      accept(received, *outstanding);
       return;
     case Verdict::exception_response:
       decide(Decision::exception_response, received);
@@ -246,6 +283,18 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       decide(is_late(received) ? Decision::late : Decision::stray, received);
       ++counters_.strays;
       return;
+  }
+}
+
+/// The answer, unless it is the adapter's copy of a request that its answer repeats.
+void Session::accept(const modbus::Adu& received, Outstanding& outstanding) const {
+  const bool copy = is_rtu() && received.pdu == outstanding.request.pdu;
+  if (copy && echo_ == LocalEcho::present && outstanding.echoes == 0) {
+    decide(Decision::echo, received);
+    ++outstanding.echoes;
+  } else {
+    decide(Decision::answer, received);
+    outstanding.answer = received.pdu;
   }
 }
 
@@ -291,12 +340,36 @@ Result<void> Session::leave_quarantine() {
     trace_.decision(Decision::quarantine, "waiting until no late answer can come");
   if (auto silent = wait_for_silence(*quarantined_until_); !silent) return silent;
   if (options_.proof == SessionOptions::Proof::loopback) {
-    // The word changes with every request, so an old answer can not pass for this one.
-    auto proved = exchange(modbus::loopback_request(next_transaction_));
+    auto proved = exchange(modbus::loopback_request(fresh_word()));
     if (!proved) return tl::unexpected(std::move(proved.error()));
   }
   quarantined_until_.reset();
+  abandoned_.reset();
   return {};
+}
+
+void Session::settle() {
+  if (!abandoned_) return;
+  transport_->shield();
+  const TimePoint until = clock_->now() + longest_settling;
+  while (abandoned_) {
+    const auto frame = take_frame();
+    if (frame && *frame) {
+      const Verdict verdict = judge(&*abandoned_, **frame, options_.rules);
+      decide(Decision::stray, **frame);
+      if (verdict == Verdict::answer || verdict == Verdict::exception_response) abandoned_.reset();
+      continue;
+    }
+    const auto more = fill(std::min(until, *quarantined_until_));
+    if (!more || !*more || clock_->now() >= until) return;
+  }
+}
+
+std::uint16_t Session::fresh_word() const {
+  // Consecutive numbers from a start that two processes hardly share.
+  using std::chrono::milliseconds;
+  const auto age = std::chrono::floor<milliseconds>(created_.time_since_epoch()).count();
+  return static_cast<std::uint16_t>(static_cast<std::uint64_t>(age) + next_transaction_);
 }
 
 /// Whether the frame has an id that only our own requests have had.
@@ -325,6 +398,13 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
         fmt::format("no answer to '{}' with a right checksum ({})", tried, to_hex(buffer_));
   }
   return error;
+}
+
+/// A serial line has no ids.
+std::string Session::describe_frame(const modbus::Adu& adu) const {
+  const std::string id = is_rtu() ? "" : fmt::format("id {:04X}, ", adu.transaction.value);
+  return fmt::format("{}unit {}, function {:02X}, data {}", id, adu.unit.value, adu.pdu.function,
+                     to_hex(adu.pdu.data));
 }
 
 void Session::decide(Decision decision, const modbus::Adu& adu) const {

@@ -177,6 +177,12 @@ Deframing deframe_rtu(Role role, ByteView buffered) {
 
 }  // namespace
 
+std::optional<Adu> whole_rtu_frame(ByteView bytes) {
+  const bool possible = bytes.size() >= rtu_head + crc_size && bytes.size() <= max_rtu_size;
+  if (!possible || !crc_fits(bytes)) return std::nullopt;
+  return rtu_frame_at(bytes, 0).adu;
+}
+
 Bytes frame(Framing framing, const Adu& adu) {
   return framing == Framing::tcp ? frame_tcp(adu) : frame_rtu(adu);
 }

@@ -2,10 +2,13 @@
 
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+
+#include "posix/baud.hpp"
 
 namespace spindle::posix {
 namespace {
@@ -20,6 +23,9 @@ constexpr std::size_t read_size = 4096;
 // More unread input than this is no client of good will.
 constexpr std::size_t max_discarded_reads = 64;
 
+// What bits at another rate are heard as: no frame.
+constexpr std::uint8_t noise_byte = 0xFF;
+
 // How long the second direction may outlive the first. A client on a slow link has long taken
 // everything by then.
 constexpr Duration linger = std::chrono::seconds(2);
@@ -31,23 +37,29 @@ std::optional<TimePoint> earlier(std::optional<TimePoint> a, std::optional<TimeP
 
 }  // namespace
 
-ServedClient::ServedClient(Descriptor socket, sim::ConnectionId connection, Service& service)
-    : socket_(std::move(socket)),
+ServedClient::ServedClient(Descriptor descriptor, Wire wire, sim::ConnectionId connection,
+                           Service& service)
+    : descriptor_(std::move(descriptor)),
+      wire_(wire),
       connection_(connection),
       options_(&service.options),
       peer_(service.server, connection, service.options.framing, service.options.faults,
-            service.answers) {
+            service.answers, service.options.line) {
   hear(sim::Heard::connected, {});
 }
 
 ServedClient::~ServedClient() {
+  if (wire_ == Wire::socket) discard_input();
+  hear(sim::Heard::disconnected, {});
+}
+
+void ServedClient::discard_input() const {
   // Closing with unread input would reset the connection and take away what the client has not
   // read yet.
-  ::shutdown(socket_.number(), SHUT_WR);
+  ::shutdown(descriptor(), SHUT_WR);
   std::array<std::uint8_t, read_size> discarded;
   std::size_t reads = health_ == Health::sound ? max_discarded_reads : 0;
-  while (reads > 0 && ::recv(socket_.number(), discarded.data(), discarded.size(), 0) > 0) --reads;
-  hear(sim::Heard::disconnected, {});
+  while (reads > 0 && ::recv(descriptor(), discarded.data(), discarded.size(), 0) > 0) --reads;
 }
 
 short ServedClient::events() const {
@@ -64,13 +76,14 @@ std::optional<TimePoint> ServedClient::wake_at() const {
 
 void ServedClient::read(TimePoint now) {
   std::array<std::uint8_t, read_size> bytes;
-  const ssize_t received = ::recv(socket_.number(), bytes.data(), bytes.size(), 0);
+  const ssize_t received = ::read(descriptor(), bytes.data(), bytes.size());
   if (received < 0) {
     if (errno != EAGAIN && errno != EINTR) health_ = Health::broken;
   } else if (received == 0) {
     end_input(now);
   } else if (output_ == Half::open) {
     const ByteView got(bytes.data(), static_cast<std::size_t>(received));
+    if (at_another_rate()) bytes.fill(noise_byte);
     hear(sim::Heard::request, got);
     peer_.receive(got, now);
   }
@@ -102,7 +115,10 @@ bool ServedClient::finished(TimePoint now) const {
 
 void ServedClient::flush() {
   while (!outgoing_.empty() && health_ == Health::sound) {
-    const ssize_t sent = ::send(socket_.number(), outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL);
+    const ssize_t sent =
+        wire_ == Wire::socket
+            ? ::send(descriptor(), outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL)
+            : ::write(descriptor(), outgoing_.data(), outgoing_.size());
     if (sent >= 0) {
       outgoing_.erase(outgoing_.begin(), outgoing_.begin() + sent);
     } else if (errno == EAGAIN) {
@@ -121,7 +137,16 @@ void ServedClient::end_input(TimePoint now) {
 void ServedClient::end_output(TimePoint now) {
   output_ = Half::ended;
   if (!linger_until_) linger_until_ = now + linger;
-  ::shutdown(socket_.number(), SHUT_WR);
+  if (wire_ == Wire::terminal) health_ = Health::broken;
+  if (wire_ == Wire::socket) ::shutdown(descriptor(), SHUT_WR);
+}
+
+/// The client's bits are not what they seem to a server that counts them at its own rate.
+bool ServedClient::at_another_rate() const {
+  if (wire_ == Wire::socket || options_->baud == 0) return false;
+  termios settings = {};
+  return ::tcgetattr(descriptor(), &settings) == 0 &&
+         ::cfgetospeed(&settings) != speed_of(options_->baud);
 }
 
 void ServedClient::hear(sim::Heard heard, ByteView bytes) const {

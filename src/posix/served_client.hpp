@@ -16,16 +16,20 @@ struct Service {
   sim::AnswerCounter answers = {};
 };
 
-/// One connection to a simulated tool: carries bytes between a non-blocking socket and a
-/// sim::Peer, and ends both directions in good order.
+/// One connection to a simulated tool: carries bytes between a non-blocking descriptor and a
+/// sim::Peer, and ends both directions in good order. A serial line has no order to end in: it is
+/// there or gone.
 class ServedClient {
  public:
-  ServedClient(Descriptor socket, sim::ConnectionId connection, Service& service);
+  /// What the descriptor is.
+  enum class Wire : std::uint8_t { socket, terminal };
+
+  ServedClient(Descriptor descriptor, Wire wire, sim::ConnectionId connection, Service& service);
   ~ServedClient();
   ServedClient(const ServedClient&) = delete;
   ServedClient& operator=(const ServedClient&) = delete;
 
-  [[nodiscard]] int descriptor() const { return socket_.number(); }
+  [[nodiscard]] int descriptor() const { return descriptor_.number(); }
   /// What to poll for now.
   [[nodiscard]] short events() const;
   /// When write() or finished() will have news without the client's doing.
@@ -44,11 +48,14 @@ class ServedClient {
   enum class Half : std::uint8_t { open, ended };
 
   void flush();
+  void discard_input() const;
   void end_input(TimePoint now);
   void end_output(TimePoint now);
   void hear(sim::Heard heard, ByteView bytes) const;
+  [[nodiscard]] bool at_another_rate() const;
 
-  Descriptor socket_;
+  Descriptor descriptor_;
+  Wire wire_;
   sim::ConnectionId connection_;
   const ServeOptions* options_;
   sim::Peer peer_;

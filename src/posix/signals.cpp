@@ -16,7 +16,8 @@ namespace {
 // A shell reads 128 + n as "ended by signal n".
 constexpr int signal_status_base = 128;
 
-constexpr std::array watched_signals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP};
+constexpr std::array watched_signals = {SIGINT,  SIGTERM, SIGHUP, SIGQUIT,
+                                        SIGPIPE, SIGXFSZ, SIGTSTP};
 
 // Supervisors, wrappers and terminals send several signals for one wish. Those that follow this
 // soon (a hand is slower) are part of the first, or they would end the process before it has
@@ -62,7 +63,9 @@ extern "C" void on_signal(int number) {
 struct sigaction action_for(int number) {
   struct sigaction action = {};
   // No SA_RESTART: a question at the terminal must end too, and that is a plain read().
-  action.sa_handler = number == SIGPIPE ? SIG_IGN : on_signal;
+  // A reader that has gone and a file that may not grow are told by the write itself.
+  const bool is_told = number == SIGPIPE || number == SIGXFSZ;
+  action.sa_handler = is_told ? SIG_IGN : on_signal;
   for (const int other : watched_signals) ::sigaddset(&action.sa_mask, other);
   return action;
 }

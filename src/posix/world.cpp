@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "spindle/posix/serial.hpp"
 #include "spindle/posix/tcp.hpp"
 
 namespace spindle::posix {
@@ -13,24 +14,21 @@ line_opener(Clock& clock, const Interrupt& interrupt) {
   return
       [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
                            Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
-        if (endpoint.medium == link::Medium::tcp) {
-          return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
-                          interrupt);
+        if (endpoint.medium == link::Medium::serial) {
+          const catalogue::SerialFacts& serial = facts.serial;
+          return open_serial(
+              endpoint.device,
+              link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits),
+              endpoint.switching, clock, interrupt);
         }
-        return tl::unexpected(Error{.code = Errc::port_unusable,
-                                    .message = "serial lines are not supported by this version",
-                                    .hint = "reach the tool by tcp://"});
+        return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
+                        interrupt);
       };
 }
 
 std::optional<std::string> environment(std::string_view name) {
   const char* value = std::getenv(std::string(name).c_str());
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
-}
-
-bool file_exists(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::exists(path, ignored);
 }
 
 std::string program_folder() {

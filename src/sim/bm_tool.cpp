@@ -238,6 +238,9 @@ void SimulatedBm::store(const modbus::WriteSingleRequest& wanted) {
   const Fault* other = struck(FaultKind::store_other);
   const unsigned offset = other == nullptr ? 0U : number_of(*other);
   registers_.store(wanted.address.value, static_cast<std::uint16_t>(wanted.value + offset));
+  if (const Fault* reset = struck(FaultKind::reset_neighbour)) {
+    registers_.store(static_cast<std::uint16_t>(wanted.address.value + number_of(*reset)), 0);
+  }
 }
 
 const Fault* SimulatedBm::struck(FaultKind kind) const {

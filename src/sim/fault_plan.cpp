@@ -68,6 +68,10 @@ constexpr std::array kinds = {
              "N (16) bytes that are no frame instead of the answer"},
     KindInfo{FaultKind::noise, "noise", Argument::number, 1, 1, size_limit, "noise[=N]",
              "N (1) bytes of noise before the answer"},
+    KindInfo{FaultKind::echo, "echo", Argument::none, 0, 0, 0, "echo",
+             "the client's adapter hears its own requests (RTU)"},
+    KindInfo{FaultKind::foreign, "foreign", Argument::number, 78, 1, byte_limit, "foreign[=N]",
+             "an answer of unit N (78) just before the right one (RTU)"},
     KindInfo{FaultKind::bad_crc, "bad-crc", Argument::none, 0, 0, 0, "bad-crc",
              "one bit of the checksum is wrong (RTU)"},
     KindInfo{FaultKind::exception, "exception", Argument::required_number, 0, 0, byte_limit,
@@ -90,6 +94,9 @@ constexpr std::array kinds = {
              "a write is echoed, but nothing is stored or done"},
     KindInfo{FaultKind::store_other, "store-other", Argument::number, 1, 1, word_limit,
              "store-other[=N]", "a write is echoed, but its value plus N (1) is stored"},
+    KindInfo{FaultKind::reset_neighbour, "reset-neighbour", Argument::number, 1, 1, word_limit,
+             "reset-neighbour[=N]",
+             "a write is stored, and the register N (1) behind it becomes 0"},
 };
 
 const KindInfo& info_of(FaultKind kind) {

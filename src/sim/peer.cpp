@@ -15,6 +15,9 @@ using std::chrono::milliseconds;
 constexpr Duration piece_distance = milliseconds(1);
 constexpr Duration longest_hold = milliseconds(50);
 
+// Where no gap is kept, what has waited so long for its rest is a torn frame.
+constexpr Duration longest_pause = milliseconds(50);
+
 // Can not begin a frame: no protocol identifier, length or function of that kind exists.
 constexpr std::uint8_t noise_byte = 0xFF;
 
@@ -148,6 +151,15 @@ bool closes(const Strikes& strikes) {
          strikes.has(FaultKind::close_after);
 }
 
+// An answer of the same shape from another unit of the bus, with other data.
+Bytes foreign_bytes(const modbus::Adu& answer, const Fault* fault) {
+  if (fault == nullptr) return {};
+  modbus::Adu foreign = answer;
+  foreign.unit.value = static_cast<std::uint8_t>(number_of(*fault));
+  if (!foreign.pdu.data.empty()) foreign.pdu.data.back() ^= 1U;
+  return modbus::frame(Framing::rtu, foreign);
+}
+
 void append(Bytes& to, const Bytes& bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); }
 
 std::deque<Bytes> pieces_of(const Bytes& bytes, std::size_t size) {
@@ -174,12 +186,17 @@ Duration time_of(std::size_t pieces) {
 }  // namespace
 
 Peer::Peer(Server& server, ConnectionId connection, Framing framing, const FaultPlan& faults,
-           AnswerCounter& counter)
+           AnswerCounter& counter, const LineModel& line)
     : server_(&server),
       connection_(connection),
       framing_(framing),
       faults_(&faults),
-      counter_(&counter) {
+      counter_(&counter),
+      character_time_(framing == Framing::rtu ? line.character_time : Duration::zero()) {
+  const Duration gap = server_->required_gap();
+  if (framing_ == Framing::rtu && line.gaps == LineModel::Gaps::enforced && gap > gap.zero()) {
+    line_.emplace(gap, character_time_);
+  }
   server_->connected(connection_);
 }
 
@@ -187,8 +204,41 @@ Peer::~Peer() { server_->disconnected(connection_); }
 
 void Peer::receive(ByteView bytes, TimePoint now) {
   if (deaf_) return;
+  if (framing_ == Framing::rtu) echo(bytes, now);
+  if (line_) {
+    line_->hear(bytes, now);
+    return;
+  }
+  if (framing_ == Framing::rtu && !inbox_.empty() && now > last_byte_ + longest_pause) {
+    inbox_.clear();
+    server_->bad_frame(now);
+  }
+  last_byte_ = now;
   inbox_.insert(inbox_.end(), bytes.begin(), bytes.end());
   while (!deaf_ && take_request(now)) {
+  }
+}
+
+void Peer::echo(ByteView bytes, TimePoint now) {
+  const Strikes strikes(*faults_, counter_->value + 1);
+  if (!strikes.has(FaultKind::echo)) return;
+  enqueue(
+      {.due = now + time_on_the_wire(bytes.size()), .pieces = {Bytes(bytes.begin(), bytes.end())}});
+}
+
+Duration Peer::time_on_the_wire(std::size_t bytes) const {
+  return character_time_ * static_cast<Duration::rep>(bytes);
+}
+
+// The silence has ended a frame, so its bounds are known whatever is in it.
+void Peer::take_burst(TimePoint now) {
+  const auto burst = line_->take(now);
+  if (!burst || deaf_ || burst->timing == Burst::Timing::too_early) return;
+  const auto request = modbus::whole_rtu_frame(burst->bytes);
+  if (request) {
+    answer(*request, burst->end, now);
+  } else {
+    server_->bad_frame(now);
   }
 }
 
@@ -197,7 +247,8 @@ bool Peer::take_request(TimePoint now) {
   const modbus::Deframing found = modbus::deframe(framing_, modbus::Role::server, inbox_);
   if (const auto* request = std::get_if<modbus::Deframed>(&found)) {
     inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(request->consumed));
-    answer(request->adu, now);
+    if (request->skipped > 0) server_->bad_frame(now);
+    answer(request->adu, now + time_on_the_wire(request->consumed), now);
     return true;
   }
   const auto* junk = std::get_if<modbus::Junk>(&found);
@@ -206,6 +257,7 @@ bool Peer::take_request(TimePoint now) {
     hang_up(now);
     return false;
   }
+  server_->bad_frame(now);
   const std::size_t dropped = std::clamp<std::size_t>(junk->size, 1, inbox_.size());
   inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(dropped));
   return !inbox_.empty();
@@ -221,26 +273,32 @@ std::optional<modbus::Pdu> Peer::respond(const modbus::Adu& request, const Fault
                                     static_cast<std::uint8_t>(number_of(*exception)));
 }
 
-void Peer::answer(const modbus::Adu& request, TimePoint now) {
+void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
   const Strikes strikes(*faults_, counter_->value + 1);
   unit_ = request.unit;
   const auto response = respond(request, strikes.find(FaultKind::exception), now);
-  if (!response) return;
+  const bool broadcast = framing_ == Framing::rtu && request.unit == modbus::UnitId{};
+  if (!response || broadcast) return;
   ++counter_->value;
 
-  Bytes bytes = event_bytes(strikes.find(FaultKind::push_before), request.transaction);
+  const modbus::Adu right{request.transaction, request.unit, *response};
+  Bytes bytes;
+  if (framing_ == Framing::rtu) bytes = foreign_bytes(right, strikes.find(FaultKind::foreign));
+  append(bytes, event_bytes(strikes.find(FaultKind::push_before), request.transaction));
   const Bytes inside = event_bytes(strikes.find(FaultKind::push_inside), request.transaction);
   const std::size_t cut = inside.empty() ? 0 : bytes.size() + inside.size() / 2;
   append(bytes, inside);
-  append(bytes, spoiled(framing_, {request.transaction, request.unit, *response}, strikes));
+  append(bytes, spoiled(framing_, right, strikes));
   append(bytes, event_bytes(strikes.find(FaultKind::push_after), request.transaction));
 
   const Fault* split = strikes.find(FaultKind::split);
+  const TimePoint ready =
+      heard + server_->answer_delay(request.unit) + time_on_the_wire(bytes.size());
   Message message{
-      .due = now + strikes.longest(FaultKind::latency),
+      .due = ready + strikes.longest(FaultKind::latency),
       .pieces = split != nullptr ? pieces_of(bytes, number_of(*split)) : cut_at(bytes, cut)};
   if (strikes.has(FaultKind::late)) {
-    message.due = std::max(message.due, now + strikes.longest(FaultKind::late));
+    message.due = std::max(message.due, ready + strikes.longest(FaultKind::late));
   } else {
     message.due = std::max(message.due, in_order_from_);
     in_order_from_ = message.due + time_of(message.pieces.size());
@@ -306,17 +364,20 @@ void Peer::join_held(Message& message) {
 }
 
 std::optional<TimePoint> Peer::next_due() const {
-  if (outbox_.empty()) return std::nullopt;
-  return outbox_.front().due;
+  auto due = line_ ? line_->silent_at() : std::nullopt;
+  if (!outbox_.empty()) due = std::min(due.value_or(TimePoint::max()), outbox_.front().due);
+  return due;
 }
 
 Bytes Peer::take(TimePoint now) {
+  if (line_) take_burst(now);
   if (outbox_.empty()) return {};
   Message& front = outbox_.front();
   if (front.pieces.empty() || now < front.due) return {};
   Bytes piece = std::move(front.pieces.front());
   front.pieces.pop_front();
   front.begun = true;
+  if (line_) line_->spoke(now);
   if (!front.pieces.empty()) {
     front.due += piece_distance;
   } else if (front.ending == Ending::stay) {

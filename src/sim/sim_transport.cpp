@@ -16,13 +16,14 @@ FaultPlan with_base_latency(FaultPlan plan) {
 class SimTransport final : public link::Transport {
  public:
   SimTransport(Server& server, ConnectionId connection, modbus::Framing framing, FaultPlan faults,
-               AnswerCounter& counter, Clock& clock, const Interrupt& interrupt)
+               AnswerCounter& counter, Clock& clock, const Interrupt& interrupt,
+               const LineModel& line)
       : server_(&server),
         connection_(connection),
         faults_(with_base_latency(std::move(faults))),
         clock_(&clock),
         interrupt_(&interrupt),
-        peer_(server, connection, framing, faults_, counter) {}
+        peer_(server, connection, framing, faults_, counter, line) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
@@ -105,10 +106,10 @@ std::size_t SimTransport::hand_over(std::span<std::uint8_t> into) {
 class OwningSimTransport final : public link::Transport {
  public:
   OwningSimTransport(std::unique_ptr<Server> server, modbus::Framing framing, FaultPlan faults,
-                     Clock& clock, const Interrupt& interrupt)
+                     Clock& clock, const Interrupt& interrupt, const LineModel& line)
       : server_(std::move(server)),
         transport_(*server_, ConnectionId{1}, framing, std::move(faults), counter_, clock,
-                   interrupt) {}
+                   interrupt, line) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override {
     return transport_.send(bytes, deadline);
@@ -128,17 +129,19 @@ class OwningSimTransport final : public link::Transport {
 
 std::unique_ptr<link::Transport> make_sim_transport(std::unique_ptr<Server> server,
                                                     modbus::Framing framing, FaultPlan faults,
-                                                    Clock& clock, const Interrupt& interrupt) {
+                                                    Clock& clock, const Interrupt& interrupt,
+                                                    const LineModel& line) {
   return std::make_unique<OwningSimTransport>(std::move(server), framing, std::move(faults), clock,
-                                              interrupt);
+                                              interrupt, line);
 }
 
 std::unique_ptr<link::Transport> make_sim_transport(Server& server, ConnectionId connection,
                                                     modbus::Framing framing, FaultPlan faults,
                                                     AnswerCounter& counter, Clock& clock,
-                                                    const Interrupt& interrupt) {
+                                                    const Interrupt& interrupt,
+                                                    const LineModel& line) {
   return std::make_unique<SimTransport>(server, connection, framing, std::move(faults), counter,
-                                        clock, interrupt);
+                                        clock, interrupt, line);
 }
 
 }  // namespace spindle::sim

@@ -53,11 +53,12 @@ class ReadingTest(unittest.TestCase):
             self.assertEqual(value["minimum"] is not None, limited, value)
             self.assertEqual(value["maximum"] is not None, limited, value)
         reads = [request for request in requests if request.function == support.READ_HOLDING]
-        # A refused block is asked for again in two halves, down to the single hole.
-        halved = [r for r in reads if r.words[1] > 1 and self.touches_a_hole(*r.words)]
-        self.assertLessEqual(len(reads) - 2 * len(halved), 24, f"{len(reads)} reads in all")
-        halvings = 7  # of a block of 100, on either side of the holes
-        self.assertLessEqual(len(halved), 3 * 2 * halvings, halved)
+        # Each register that is said not to exist is asked for alone, and its limits never.
+        holes = [r for r in reads if r.words[1] == 1 and r.words[0] in HOLES]
+        self.assertEqual([r.words[0] for r in holes], list(HOLES))
+        self.assertLessEqual(len(reads) - len(holes), 24, f"{len(reads)} reads in all")
+        touching = [r for r in reads if self.touches_a_hole(*r.words)]
+        self.assertEqual(touching, holes)
         self.assertTrue(all(request.words[1] <= 100 for request in reads), reads)
 
     @staticmethod

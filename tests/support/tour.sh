@@ -122,6 +122,16 @@ run 0 set "$url" --profile doga-bm preset.1.target-torque=3.10
 run 0 get "$url" --profile doga-bm 'preset.1.*torque*'
 shown 'preset\.1\.target-torque +3\.10'
 
+say "the round trip: backup, change, compare, restore, nothing left"
+run 0 backup "$url" --profile doga-bm -f before.yaml
+run 0 set "$url" --profile doga-bm preset.1.target-torque=2.90 preset.2.speed=900
+run 1 diff before.yaml "$url" --profile doga-bm
+shown 'preset\.1\.target-torque .* 3\.10 +2\.90'
+run 0 restore "$url" before.yaml --profile doga-bm --yes
+shown '2 written'
+run 0 diff before.yaml "$url" --profile doga-bm
+shown '0 different'
+
 say "somebody watches, and the tool is started: under a guard that always ends in a stop"
 typed watch "$url" --profile doga-bm --count 1 --duration 20s
 "$program" watch "$url" --profile doga-bm --count 1 --duration 20s >watched 2>&1 &

@@ -1,12 +1,21 @@
 // Runs transcripts: what a user types and what the program prints, in one readable file. The whole
 // program runs in this process, against simulated tools on a clock that is moved by hand.
 //
-//   %tool URL PROFILE [FIRMWARE=N] [MODEL=N] [BYTES=N] [RUNDOWNS=DURATION] [NG=N] [FAULT=SPEC]...
+//   %tool URL PROFILE [FIRMWARE=N] [SERIAL=N] [MODEL=N] [BYTES=N] [RUNDOWNS=DURATION] [NG=N]
+//   [FAULT=SPEC]...
 //                         a tool that lives as long as the transcript; with an operator who drives
 //                         a screw now and then, every Nth of them NG
-//   %file NAME … %end     a file in the transcript's own folder
+//   %bus URL [UNITS=N] [FAULT=SPEC]...
+//                         a serial line (rtu:// or rtu+tcp://) with units 1 to N that have nothing
+//                         but registers, and are strict about their gaps
+//   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
+//                         backups are kept on
+//   %edit FILE OLD NEW    replaces a text in a file on that disk
+//   %disk full|empty      whether it takes any more
+//   %hide progress        from here on the line that a terminal shows for a moment is left out
 //   %answer TEXT          what the user types at the next question
 //   $ spindle ARGUMENTS   followed by what it prints
+//   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
 // Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
 // fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status; a
@@ -31,11 +40,15 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/cli/run.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/link/serial_settings.hpp"
 #include "spindle/posix/world.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "support/fake_clock.hpp"
+#include "support/memory_disk.hpp"
+#include "support/serial_bank.hpp"
 
 namespace {
 
@@ -113,6 +126,7 @@ class Stage {
       const std::string key = words[index].substr(0, equals);
       const std::string value = words[index].substr(equals + 1);
       if (key == "FIRMWARE") options.firmware = static_cast<std::uint16_t>(std::stoul(value));
+      if (key == "SERIAL") options.serial = static_cast<std::uint32_t>(std::stoul(value));
       if (key == "MODEL") options.tool_model = static_cast<std::uint16_t>(std::stoul(value));
       if (key == "BYTES") options.identity_bytes = std::stoul(value);
       if (key == "RUNDOWNS") options.rundown_every = parse_duration(value).value();
@@ -126,6 +140,26 @@ class Stage {
     tools_[address(endpoint.host, endpoint.port.value_or(tool->profile.link.port))] =
         std::move(tool);
   }
+
+  void add_bus(const std::vector<std::string>& words) {
+    auto tool = std::make_unique<Tool>();
+    test::SerialBank::Options options;
+    for (std::size_t index = 1; index < words.size(); ++index) {
+      const auto equals = words[index].find('=');
+      const std::string key = words[index].substr(0, equals);
+      const std::string value = words[index].substr(equals + 1);
+      if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
+      if (key != "UNITS") continue;
+      options.units.clear();
+      for (unsigned unit = 1; unit <= std::stoul(value); ++unit)
+        options.units.push_back({static_cast<std::uint8_t>(unit)});
+    }
+    tool->server = std::make_unique<test::SerialBank>(options);
+    tool->profile.link.framing = modbus::Framing::rtu;
+    const auto endpoint = link::parse_endpoint(words.at(0)).value();
+    tools_[commands::shared_line(endpoint)] = std::move(tool);
+  }
+  void hide_progress() { hides_progress_ = true; }
 
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
@@ -147,7 +181,11 @@ class Stage {
                      show(text, false);
                      return Result<void>();
                    },
-               .err = [&](std::string_view text) { show(text, true); },
+               .err =
+                   [&](std::string_view text) {
+                     const bool is_progress = text.starts_with("\r\x1b[K");
+                     if (!is_progress || !hides_progress_) show(text, true);
+                   },
                .read_line = [&] { return next_answer(show); },
                .in_is_terminal = !answers_.empty(),
                .err_is_terminal = !answers_.empty()},
@@ -163,8 +201,11 @@ class Stage {
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },
-        .environment = [](std::string_view) { return std::optional<std::string>(); },
-        .file_exists = posix::file_exists,
+        .environment =
+            [](std::string_view name) {
+              return name == "XDG_STATE_HOME" ? std::optional<std::string>("/state") : std::nullopt;
+            },
+        .disk = disk_.functions(),
         .program_folder = SPINDLE_SOURCE_DIR};
     status_ = cli::run(arguments, world);
     Lines lines;
@@ -176,6 +217,7 @@ class Stage {
   }
 
   [[nodiscard]] int status() const { return status_; }
+  [[nodiscard]] test::MemoryDisk& disk() { return disk_; }
 
  private:
   static std::string address(const std::string& host, std::uint16_t port) {
@@ -193,14 +235,20 @@ class Stage {
 
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkFacts& facts) {
-    if (endpoint.medium != link::Medium::tcp) {
+    const bool serial = endpoint.medium == link::Medium::serial;
+    const auto found =
+        tools_.find(serial ? commands::shared_line(endpoint)
+                           : address(endpoint.host, endpoint.port.value_or(facts.port)));
+    if (found == tools_.end() && serial) {
       return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
-    const auto found = tools_.find(address(endpoint.host, endpoint.port.value_or(facts.port)));
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
+    const catalogue::SerialFacts& line = facts.serial;
+    const sim::LineModel model{.character_time = link::character_time(link::serial_settings(
+                                   endpoint, line.baud, line.parity, line.stop_bits))};
     Tool& tool = *found->second;
     return sim::make_sim_transport(*tool.server, {++tool.connections}, tool.profile.link.framing,
-                                   tool.faults, tool.answers, clock_, *interrupt_);
+                                   tool.faults, tool.answers, clock_, *interrupt_, model);
   }
 
   files::ProfileStore profiles_;
@@ -209,8 +257,25 @@ class Stage {
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
+  test::MemoryDisk disk_;
+  bool hides_progress_ = false;
   int status_ = 0;
 };
+
+/// The lines that cat, grep and ls print of a disk.
+Lines look_at(const std::vector<std::string>& words, const test::MemoryDisk& disk) {
+  Lines shown;
+  if (words.at(0) == "ls") {
+    for (const auto& [path, text] : disk.files()) shown.push_back(path);
+    return shown;
+  }
+  std::istringstream stream(disk.text(words.back()));
+  for (std::string line; std::getline(stream, line);) {
+    const bool wanted = words.at(0) != "grep" || line.find(words.at(1)) != std::string::npos;
+    if (wanted) shown.push_back(line);
+  }
+  return shown;
+}
 
 constexpr std::string_view file_comment = "<!-- %file ";
 
@@ -235,26 +300,45 @@ class Player {
     if (markdown_ && !in_block_) return index;
     if (line.starts_with("%file ")) return write_file(line.substr(6), "%end", lines, index);
     if (line.starts_with("%")) directive(line);
-    if (line.starts_with("$ spindle")) return run(lines, index, true);
-    if (line.starts_with("$ echo $?")) return run(lines, index, false);
+    if (line.starts_with("$ spindle")) return run(lines, index);
+    if (line.starts_with("$ echo $?")) {
+      return show({std::to_string(stage_.status())}, lines, index);
+    }
+    if (line.starts_with("$ ")) {
+      return show(look_at(shell_words(line.substr(2)), stage_.disk()), lines, index);
+    }
     return index;
   }
 
   void directive(const std::string& line) {
     const auto words = shell_words(line.substr(1));
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
+    if (words.at(0) == "bus") stage_.add_bus({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));
+    if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
+    if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
+    if (words.at(0) == "hide") stage_.hide_progress();
+    if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
+  }
+
+  void edit(const std::string& name, const std::string& old_text, const std::string& new_text) {
+    std::string text = stage_.disk().text(name);
+    const std::size_t at = text.find(old_text);
+    if (at == std::string::npos) throw std::runtime_error("not in " + name + ": " + old_text);
+    stage_.disk().put(name, text.replace(at, old_text.size(), new_text));
   }
 
   /// Writes what stands between `index` and the line `end`; returns where that is.
   std::size_t write_file(const std::string& name, std::string_view end, const Lines& lines,
                          std::size_t index) {
-    std::ofstream file(name);
+    std::ostringstream text;
     while (++index < lines.size()) {
       played_.push_back(lines[index]);
       if (lines[index] == end) break;
-      file << lines[index] << '\n';
+      text << lines[index] << '\n';
     }
+    std::ofstream(name) << text.str();
+    stage_.disk().put(name, text.str());
     return index;
   }
 
@@ -267,14 +351,15 @@ class Player {
     return write_file(name, "```", lines, index);
   }
 
-  std::size_t run(const Lines& lines, std::size_t index, bool is_spindle) {
-    Lines printed = {std::to_string(stage_.status())};
-    if (is_spindle) {
-      ++commands_;
-      const auto words = shell_words(lines[index].substr(2));
-      printed = stage_.run({words.begin() + 1, words.end()},
-                           markdown_ ? Marking::plain : Marking::mark_stderr);
-    }
+  std::size_t run(const Lines& lines, std::size_t index) {
+    ++commands_;
+    const auto words = shell_words(lines[index].substr(2));
+    return show(stage_.run({words.begin() + 1, words.end()},
+                           markdown_ ? Marking::plain : Marking::mark_stderr),
+                lines, index);
+  }
+
+  std::size_t show(const Lines& printed, const Lines& lines, std::size_t index) {
     played_.insert(played_.end(), printed.begin(), printed.end());
     // The old output ends where the next thing begins.
     std::size_t next = index + 1;

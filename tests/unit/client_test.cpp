@@ -215,6 +215,10 @@ TEST_CASE("the fewest requests") {
        singles(input, 3200, 3211) + Ranges{{input, 3212, 2}},
        bm_limits(),
        {{input, 3200, 12}, {input, 3212, 2}}},
+      {"what is said to be absent, register by register",
+       singles(holding, 8, 14),
+       {.max_read = 10, .absent = {{holding, 10, 2}, {input, 8, 7}}},
+       {{holding, 8, 2}, {holding, 10, 1}, {holding, 11, 1}, {holding, 12, 3}}},
       {"pieces of the forbidden shape",
        {{input, 0, 28}},
        {.max_read = 14, .forbidden_shape = RegisterRange{input, 0, 14}},
@@ -437,6 +441,28 @@ TEST_CASE("a refused pair does not condemn its halves") {
   REQUIRE(bridging.client.read_each({{holding, 11, 1}}));
   REQUIRE(bridging.client.read_each({{holding, 9, 1}, {holding, 13, 1}}));
   CHECK(bridging.server.reads == Ranges{{holding, 11, 1}, {holding, 9, 1}, {holding, 13, 1}});
+}
+
+TEST_CASE("what is said to be absent is asked for all the same, and costs no other answer") {
+  Bench bench({.max_read = 10, .absent = {{holding, 10, 3}}});
+  bench.server.holes = {10, 12};
+  const Ranges wanted = singles(holding, 8, 14);
+  CHECK(bench.client.count_requests(wanted) == 5);
+  const auto image = bench.client.read_each(wanted);
+  REQUIRE(image);
+  CHECK(bench.server.reads.size() == 5);
+  for (const std::uint16_t there : Registers{8, 9, 11, 13, 14})
+    check_values(*image, {holding, there, 1});
+  for (const std::uint16_t hole : Registers{10, 12}) CHECK_FALSE(image->get({holding, hole, 1}));
+  CHECK(bench.client.count_requests(wanted) == 3);
+}
+
+TEST_CASE("registers that are to be avoided are not read along") {
+  Bench bench({.max_read = 100, .contiguous = {{holding, 0, 100}}});
+  bench.client.avoid({holding, 4, 2});
+  REQUIRE(bench.client.read_each({{holding, 3, 1}, {holding, 6, 1}}));
+  CHECK(bench.server.reads == Ranges{{holding, 3, 1}, {holding, 6, 1}});
+  REQUIRE(bench.client.read_each({{holding, 4, 1}}));  // asked for, it is read
 }
 
 TEST_CASE("a block that is refused because of what it reads along is read without it") {

@@ -208,7 +208,7 @@ TEST_CASE("a hole stands in its own reading, and the limits of a parameter besid
   REQUIRE_FALSE(hole.value.has_value());
   CHECK(hole.value.error().code == Errc::exception_response);
   CHECK(hole.value.error().name == "p564");
-  CHECK(hole.limits_error.has_value());
+  CHECK_FALSE(hole.limits_error.has_value());  // nobody asks for the limits of nothing
 
   for (const std::size_t without : {2U, 3U}) {
     CAPTURE(without);
@@ -456,4 +456,78 @@ TEST_CASE("the whole last event is read without a frame that looks like a pushed
   CHECK((*event)->front() == 1961);
   CHECK((*event)->back() == 402);
   for (const Pdu& request : bench.requests) CHECK(get_u16(request.data, 2) != 14);
+}
+
+// ---- serial lines ----
+
+namespace {
+
+Profile drive() {
+  Profile profile;
+  profile.id = "drive";
+  profile.link.framing = modbus::Framing::rtu;
+  profile.link.unit = 1;
+  profile.link.loopback = true;
+  profile.link.serial = {
+      .baud = 19200, .gaps = {{19200, 5500us}, {0, 3500us}}, .broadcast_pause = 5ms};
+  return profile;
+}
+
+link::SessionOptions options_for(const std::string& url, const Profile& profile) {
+  test::FakeClock clock;
+  const OpenTransport open = [](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
+    return Result<std::unique_ptr<link::Transport>>();
+  };
+  const auto endpoint = link::parse_endpoint(url).value();
+  auto device = Device::open(endpoint, profile, {}, open, clock).value();
+  device.use(profile, {});  // as after an identification: it must not change the framing
+  return device.session().options();
+}
+
+}  // namespace
+
+TEST_CASE("how a line is talked on follows the address, and the profile where it says nothing") {
+  struct Row {
+    std::string url;
+    modbus::Framing framing;
+    std::uint8_t unit;
+    Duration gap;
+    Duration broadcast_gap;
+    Duration character;
+    link::LocalEcho echo;
+  };
+  using enum modbus::Framing;
+  using link::LocalEcho;
+  const Duration at_9600 = 1145833ns;
+  const Duration at_19200 = 572916ns;
+  const Duration at_115200 = 95486ns;
+  for (const Row& row : {
+           Row{"rtu:///d", rtu, 1, 5500us, 10500us, at_19200, LocalEcho::automatic},
+           Row{"rtu:///d?unit=7&baud=9600&echo=true", rtu, 7, 5500us, 10500us, at_9600,
+               LocalEcho::present},
+           Row{"rtu:///d?baud=115200&echo=false", rtu, 1, 3500us, 8500us, at_115200,
+               LocalEcho::absent},
+           Row{"rtu:///d?baud=115200&gap=20ms", rtu, 1, 20ms, 25ms, at_115200,
+               LocalEcho::automatic},
+           Row{"rtu:///d?gap=0ms", rtu, 1, 0ms, 5ms, at_19200, LocalEcho::automatic},
+           Row{"rtu+tcp://h:1?unit=3", rtu, 3, 5500us, 10500us, at_19200, LocalEcho::automatic},
+           Row{"rtu+tcp://h:1?baud=115200", rtu, 1, 3500us, 8500us, at_115200,
+               LocalEcho::automatic},
+           Row{"sim:drive", rtu, 1, 5500us, 10500us, at_19200, LocalEcho::absent},
+           Row{"tcp://h?unit=4", tcp, 4, 0ms, 0ms, 0ms, LocalEcho::automatic},
+       }) {
+    CAPTURE(row.url);
+    const auto options = options_for(row.url, drive());
+    CHECK(options.rules.framing == row.framing);
+    CHECK(options.unit.value == row.unit);
+    CHECK(options.gap == row.gap);
+    CHECK(options.broadcast_gap == row.broadcast_gap);
+    CHECK(options.character_time == row.character);
+    CHECK(options.echo == row.echo);
+    CHECK(options.in_use_until == (row.framing == rtu ? test::FakeClock::start : TimePoint()));
+  }
+  // A profile without rules: three times the standard's silence.
+  const auto unknown = options_for("rtu:///d?baud=115200", Profile());
+  CHECK(unknown.gap == 5250us);
+  CHECK(options_for("rtu:///d", Profile()).gap == 3 * 4010416ns);
 }

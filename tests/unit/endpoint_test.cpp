@@ -7,6 +7,7 @@
 
 using namespace spindle;
 using namespace spindle::link;
+using namespace std::chrono_literals;
 
 namespace {
 
@@ -55,7 +56,25 @@ std::vector<Good> good_urls() {
       {"rtu+tcp://gateway:4001", {.medium = Medium::rtu_over_tcp, .host = "gateway", .port = 4001}},
       {"rtu+tcp://[::1]:4001?unit=31",
        {.medium = Medium::rtu_over_tcp, .host = "::1", .port = 4001, .unit = {{31}}}},
+      {"rtu:///d?gap=6ms&rs485=true&echo=true",
+       {.medium = Medium::serial,
+        .device = "/d",
+        .gap = 6ms,
+        .switching = LineSwitching::kernel,
+        .echo = LocalEcho::present}},
+      {"rtu:///d?gap=0ms&rs485=false&echo=false",
+       {.medium = Medium::serial, .device = "/d", .gap = 0ms, .echo = LocalEcho::absent}},
+      {"rtu:///d?gap=1s&echo=auto", {.medium = Medium::serial, .device = "/d", .gap = 1s}},
+      {"rtu+tcp://h:1?gap=5500us&echo=true&baud=115200",
+       {.medium = Medium::rtu_over_tcp,
+        .host = "h",
+        .port = 1,
+        .baud = 115200,
+        .gap = 5500us,
+        .echo = LocalEcho::present}},
       {"sim:doga-bm", {.medium = Medium::simulated, .profile = "doga-bm"}},
+      {"sim:driver?baud=115200",
+       {.medium = Medium::simulated, .profile = "driver", .baud = 115200}},
       {"sim://doga-bm", {.medium = Medium::simulated, .profile = "doga-bm"}},
       {"sim:./mine.yaml?unit=255",
        {.medium = Medium::simulated, .profile = "./mine.yaml", .unit = {{255}}}},
@@ -130,8 +149,22 @@ std::vector<Bad> bad_urls() {
       {"tcp://h?unti=1", "unknown option 'unti'", "did you mean 'unit'?"},
       {"tcp://h?speed=1", "unknown option 'speed'", "here there is unit"},
       {"tcp://h?baud=9600", "unknown option 'baud'", "here there is unit"},
-      {"sim:doga-bm?parity=even", "unknown option 'parity'", "here there is unit"},
-      {"rtu:///d?rate=9600", "unknown option 'rate'", "here there is unit, baud, parity, stop"},
+      {"sim:doga-bm?parity=even", "unknown option 'parity'", "here there is unit, baud"},
+      {"rtu+tcp://h:1?stop=1", "unknown option 'stop'"},
+      {"rtu+tcp://h:1?rs485=true", "unknown option 'rs485'", "here there is unit, baud, gap, echo"},
+      {"tcp://h?gap=5ms", "unknown option 'gap'", "here there is unit"},
+      {"sim:doga-bm?echo=true", "unknown option 'echo'"},
+      {"rtu:///d?gap=5", "gap=5: gap is a time up to 1s"},
+      {"rtu:///d?gap=", "gap=: gap is a time up to 1s"},
+      {"rtu:///d?gap=-1ms", "gap=-1ms: gap is a time up to 1s"},
+      {"rtu:///d?gap=1001ms", "gap=1001ms: gap is a time up to 1s"},
+      {"rtu:///d?gap=1ms&gap=1ms", "'gap' is given twice"},
+      {"rtu:///d?rs485=yes", "rs485=yes: rs485 is true or false"},
+      {"rtu:///d?rs485", "'rs485' has no value"},
+      {"rtu:///d?echo=on", "echo=on: echo is true, false or auto"},
+      {"rtu:///d?ehco=true", "unknown option 'ehco'", "did you mean 'echo'?"},
+      {"rtu:///d?rate=9600", "unknown option 'rate'",
+       "here there is unit, baud, parity, stop, gap, rs485, echo"},
       {"tcp://h?unit=1&", "unknown option ''"},
       {"tcp://h?&", "unknown option ''"},
       {"tcp://h?=1", "unknown option ''"},
@@ -165,6 +198,9 @@ TEST_CASE("every form of a URL is taken apart") {
     CHECK(endpoint->baud == expected.baud);
     CHECK(endpoint->parity == expected.parity);
     CHECK(endpoint->stop_bits == expected.stop_bits);
+    CHECK(endpoint->gap == expected.gap);
+    CHECK(endpoint->switching == expected.switching);
+    CHECK(endpoint->echo == expected.echo);
   }
 }
 

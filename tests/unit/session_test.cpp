@@ -115,7 +115,8 @@ SessionOptions rtu(SessionOptions::Proof proof = SessionOptions::Proof::none) {
           .answer_timeout = timeout,
           .gap = gap,
           .broadcast_gap = 10ms,
-          .proof = proof};
+          .proof = proof,
+          .echo = proof == SessionOptions::Proof::none ? LocalEcho::automatic : LocalEcho::absent};
 }
 
 Reaction tcp_answer(Duration after, Pdu pdu) { return answer(Framing::tcp, after, std::move(pdu)); }
@@ -821,6 +822,153 @@ TEST_CASE("rtu: the adapter's echo of the request is told from the answer") {
   present = false;
   CHECK(line.session.transact(arm).error().code == Errc::local_echo);
   CHECK(line.session.transact(read_two).error().code == Errc::local_echo);
+}
+
+TEST_CASE("rtu: a loop-back's echo is never its answer, whatever the adapter does") {
+  const Pdu loopback = modbus::loopback_request(0x1234);
+  struct Row {
+    std::string_view what;
+    LocalEcho echo;
+    bool echoing;
+    bool there;
+    std::optional<Errc> code;
+    std::vector<std::uint8_t> functions;  // of what was sent for two loop-backs
+  };
+  const std::vector<Row> rows = {
+      {"no echo", LocalEcho::automatic, false, true, {}, {0x03, 0x08, 0x08}},
+      {"echo", LocalEcho::automatic, true, true, {}, {0x03, 0x08, 0x08}},
+      {"no echo, nobody", LocalEcho::automatic, false, false, Errc::no_answer, {0x03, 0x08}},
+      {"echo, nobody", LocalEcho::automatic, true, false, Errc::local_echo, {0x03, 0x08}},
+      {"surely no echo", LocalEcho::absent, false, true, {}, {0x08, 0x08}},
+      {"surely an echo", LocalEcho::present, true, true, {}, {0x08, 0x08}},
+      {"surely an echo, nobody", LocalEcho::present, true, false, Errc::local_echo, {0x08, 0x08}},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    SessionOptions options = rtu();
+    options.echo = row.echo;
+    Line line(options);
+    line.script.otherwise = [&](ByteView request) {
+      const Bytes copy(request.begin(), request.end());
+      std::vector<Arrival> arrivals;
+      if (row.echoing) arrivals.push_back({1ms, copy});
+      if (row.there)
+        arrivals.push_back({15ms, copy[1] == 0x08 ? copy : rtu_frame(1, holding({7}))});
+      return arrivals;
+    };
+    for (int turn = 0; turn < 2; ++turn) {
+      const auto response = line.session.transact(loopback);
+      REQUIRE(response.has_value() == !row.code);
+      if (row.code) CHECK(response.error().code == *row.code);
+      if (!response) continue;
+      CHECK(*response == loopback);
+      CHECK(line.session.last_round_trip() == 15ms);
+    }
+    std::vector<std::uint8_t> functions;
+    for (const test::Sent& sent : line.script.sent) functions.push_back(sent.bytes[1]);
+    CHECK(functions == row.functions);
+  }
+}
+
+TEST_CASE("rtu: a refused read tells the echo as well") {
+  Line line(rtu());
+  line.script.on_request(rtu_answer(15ms, modbus::exception_response(0x03, 1)));
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{15ms, Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(modbus::loopback_request(7)) == modbus::loopback_request(7));
+}
+
+TEST_CASE("rtu: noise before the echo does not make it the answer") {
+  SessionOptions options = rtu();
+  options.echo = LocalEcho::present;
+  Line line(options);
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{1ms, hex("FF") + Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(arm).error().code == Errc::local_echo);
+}
+
+TEST_CASE("rtu: a line that others have just left is given its gap") {
+  SessionOptions options = rtu();
+  options.in_use_until = FakeClock::start;
+  Line line(options);
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
+  CHECK(line.sent_at(0) == gap);
+}
+
+TEST_CASE("rtu: one session asks one unit after the other, and a late answer is nobody's") {
+  SessionOptions options = rtu();
+  options.echo = LocalEcho::absent;
+  Line line(options);
+  const Pdu loopback = modbus::loopback_request(0x1234);
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{timeout + 8ms, Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(loopback).error().code == Errc::no_answer);
+  line.session.set_unit({2});
+  line.script.on_request([](ByteView request) {
+    return std::vector<Arrival>{{20ms, Bytes(request.begin(), request.end())}};
+  });
+  CHECK(line.session.transact(loopback) == loopback);
+  CHECK(line.sent_at(1) == timeout);  // no quarantine before a request that its answer repeats
+  CHECK(line.script.sent[1].bytes[0] == 2);
+  CHECK(line.session.counters().strays == 1);
+}
+
+TEST_CASE(
+    "rtu: a line is left when the answer to an abandoned read has come, or is not waited for") {
+  struct Row {
+    std::string_view what;
+    std::vector<Arrival> late;
+    Duration settled;  // after the interrupt at 10 ms
+  };
+  const Bytes answer_bytes = rtu_frame(1, two_values);
+  for (const Row& row :
+       {Row{"an answer", {{25ms, answer_bytes}}, 15ms},
+        Row{"an answer in pieces",
+            {{25ms, part(answer_bytes, 0, 3)}, {27ms, part(answer_bytes, 3, answer_bytes.size())}},
+            17ms},
+        Row{"an exception", {{25ms, rtu_frame(1, modbus::exception_response(0x03, 2))}}, 15ms},
+        Row{"another unit's", {{25ms, rtu_frame(2, two_values)}}, 250ms},
+        Row{"nothing", {}, 250ms}}) {
+    CAPTURE(row.what);
+    Line line(rtu());
+    line.clock.at(FakeClock::start + 10ms, [&] { line.interrupt.raise(2); });
+    line.script.on_request([&](ByteView) { return row.late; });
+    CHECK(line.session.transact(read_two).error().code == Errc::interrupted);
+    line.session.settle();
+    CHECK(line.elapsed() == 10ms + row.settled);
+    CHECK(line.script.sent.size() == 1);
+  }
+  Line done(rtu());
+  done.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(done.session.transact(read_two));
+  done.session.settle();
+  CHECK(done.elapsed() == 15ms);
+
+  Line told(rtu());  // an answer that repeats its request is nobody else's
+  told.script.on_request(silence());
+  CHECK_FALSE(told.session.transact(arm));
+  told.session.settle();
+  CHECK(told.elapsed() == timeout);
+
+  Line gone(rtu());
+  gone.script.on_request([](ByteView) { return std::vector<Arrival>{{10ms, Errc::reset}}; });
+  CHECK_FALSE(gone.session.transact(read_two));
+  gone.session.settle();
+  CHECK(gone.elapsed() == 10ms);
+}
+
+TEST_CASE("rtu: words for loop-backs differ from request to request and start to start") {
+  Line line(rtu());
+  const std::uint16_t first = line.session.fresh_word();
+  line.script.on_request(silence());
+  CHECK_FALSE(line.session.transact(modbus::loopback_request(first)));
+  CHECK(line.session.fresh_word() != first);
+  Session later(transport_to(line.script), line.clock, rtu());
+  CHECK(later.fresh_word() != first);
 }
 
 TEST_CASE("rtu: without an echo a write's only answer is its answer") {

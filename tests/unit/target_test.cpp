@@ -40,6 +40,9 @@ struct Bench {
             .calm = calm,
             .serve = serve,
             .end_waits = end_waits,
+            .disk = disk,
+            .state_folder = state_folder,
+            .version = "1.2.3",
             .profiles = profiles,
             .tools = tools,
             .renderer = *renderer,
@@ -69,6 +72,8 @@ struct Bench {
   commands::Calm calm{clock, interrupt, open};
   sim::Serve serve = {};
   std::function<void()> end_waits = {};
+  Disk disk = {};
+  std::string state_folder = {};
   files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};
   files::Tools tools;
   CommonOptions common = {};

@@ -14,6 +14,10 @@ namespace spindle::catalogue {
 /// Where a fact comes from, strongest first (contract, section 5, Evidence).
 enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
 enum class Access : std::uint8_t { read_only, read_write };
+/// Whether a value may be restored to another tool than its own.
+enum class Cloning : std::uint8_t { allowed, never };
+/// Whether backups hold a value without being told to.
+enum class Secrecy : std::uint8_t { open, secret };
 enum class Kind : std::uint8_t { u16, i16, u32, i32 };
 
 /// How registers become a number: an integer of `kind` (32-bit kinds: high word first) times
@@ -56,6 +60,8 @@ struct Parameter {
   std::optional<Decimal> default_value = std::nullopt;
   std::vector<Label> labels = {};
   Access access = Access::read_only;
+  Cloning cloning = Cloning::allowed;
+  Secrecy secrecy = Secrecy::open;
   Evidence evidence = Evidence::inferred;
   std::string source;  ///< document and section
   std::string note;  ///< what a user should know, such as when a change takes effect; may be empty

@@ -176,6 +176,9 @@ class Profile {
   /// that matches nothing.
   [[nodiscard]] Result<std::vector<Parameter>> select(const std::vector<std::string>& names) const;
 
+  /// The parameter with this number. Requires a profile with numbers.
+  [[nodiscard]] Parameter numbered_parameter(std::uint16_t number) const;
+
   /// Error `unknown_name` with a suggestion.
   [[nodiscard]] Result<Action> find_action(std::string_view name) const;
 

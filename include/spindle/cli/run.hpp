@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "spindle/base/disk.hpp"
 #include "spindle/commands/context.hpp"
 
 namespace spindle::cli {
@@ -20,7 +21,7 @@ struct World {
   sim::Serve serve;                 ///< puts a simulated tool on a port
   std::function<void()> end_waits;  ///< ends every wait, as a signal would
   std::function<std::optional<std::string>(std::string_view name)> environment;
-  std::function<bool(const std::string& path)> file_exists;
+  Disk disk;
   std::string program_folder;  ///< where the executable is; its profiles are found from here
 };
 

@@ -53,6 +53,13 @@ struct PingOptions {
 };
 Result<Outcome> ping(const PingOptions& options, Context& context);
 
+struct ScanOptions {
+  std::string bus;
+  std::vector<modbus::UnitId> units;
+};
+/// Which units of a serial line answer a loop-back, at the line's settings and no others.
+Result<Outcome> scan(const ScanOptions& options, Context& context);
+
 struct WatchOptions {
   std::vector<std::string> targets;
   std::vector<std::string> names;  ///< values to poll; none: events only
@@ -89,9 +96,45 @@ struct AlarmsOptions {
 };
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
 
+enum class Secrets : std::uint8_t { leave_out, include };
+
+struct BackupOptions {
+  std::vector<std::string> targets;
+  std::string file;    ///< of the one target; "-": standard output; empty: named after the target
+  std::string folder;  ///< where files named after their targets go; empty: the present one
+  Overwrite overwrite = Overwrite::refuse;
+  Secrets secrets = Secrets::leave_out;
+};
+Result<Outcome> backup(const BackupOptions& options, Context& context);
+
+struct DiffOptions {
+  std::string a;  ///< target, group of one, backup file, or "defaults"
+  std::string b;
+  std::vector<std::string> patterns;
+  std::vector<std::string> ignored;
+};
+Result<Outcome> diff(const DiffOptions& options, Context& context);
+
+enum class ModelCheck : std::uint8_t { strict, off };
+enum class OnFailure : std::uint8_t { roll_back, leave };
+
+struct RestoreOptions {
+  std::string target;
+  std::string file;
+  std::vector<std::string> patterns;
+  Execution execution = Execution::real;
+  ModelCheck model = ModelCheck::strict;
+  OnFailure on_failure = OnFailure::roll_back;
+};
+Result<Outcome> restore(const RestoreOptions& options, Context& context);
+
 struct SimulateOptions {
   std::string profile;
-  std::string listen = "tcp://127.0.0.1:0";
+  std::string listen;                 ///< URL; empty: a free port of this computer
+  std::string pty;                    ///< path of the pseudo terminal to make instead
+  std::vector<modbus::UnitId> units;  ///< of a serial tool; none: as many as usual
+  std::optional<unsigned> baud;       ///< of its line
+  sim::LineModel::Gaps gaps = sim::LineModel::Gaps::enforced;
   std::vector<std::string> faults;
   std::optional<unsigned> identity_bytes;
   std::optional<std::uint16_t> firmware;
@@ -103,6 +146,11 @@ struct SimulateOptions {
   std::vector<std::string> outages;       ///< KIND=TIME@every:TIME
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
+
+/// The named tools of the tools file.
+Result<Outcome> tools(Context& context);
+/// Every fault of the tools file; context.tools needs no more than its path.
+Result<Outcome> check_tools(Context& context);
 
 struct ProfileNameOptions {
   std::string profile;  ///< id or file

@@ -4,8 +4,10 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "spindle/base/disk.hpp"
 #include "spindle/base/interrupt.hpp"
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
@@ -54,6 +56,9 @@ struct Context {
   const Calm& calm;
   const sim::Serve& serve;
   const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
+  const Disk& disk;
+  const std::string& state_folder;  ///< where records of changes are kept; empty: nowhere is known
+  std::string_view version;         ///< of spindle
   const files::ProfileStore& profiles;
   const files::Tools& tools;
   report::Renderer& renderer;

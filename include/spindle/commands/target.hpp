@@ -38,6 +38,11 @@ Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& text
 /// The same for a command that takes one tool; a group of several is an error.
 Result<Target> resolve_target(const std::string& text, const Context& context);
 
+/// Names the line on which the target's unit is one of several, as only one connection at a time
+/// can have it: the port behind its links, or the device server. Empty for a tool with a line of
+/// its own.
+std::string shared_line(const link::Endpoint& endpoint);
+
 /// Whether a first argument is meant as a target rather than a parameter pattern.
 bool is_target(std::string_view text, const Context& context);
 

@@ -63,6 +63,14 @@ enum class ActionResult : std::uint8_t {
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
 
+/// What came back for a loop-back that any unit may answer.
+enum class Answered : std::uint8_t { data, exception };
+
+struct Probe {
+  Answered answered;
+  Duration round_trip;
+};
+
 enum class EventOutput : std::uint8_t { on, off };
 
 /// One tool behind one connection: reads, writes and acts by catalogue entries.
@@ -73,6 +81,12 @@ class Device {
   static Result<Device> open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                              const LinkOptions& options, const OpenTransport& open_transport,
                              Clock& clock);
+  /// On a serial line: leaves nothing behind that the next one would take for its answer.
+  ~Device();
+  Device(Device&&) noexcept = default;
+  Device& operator=(Device&&) noexcept = default;
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
 
   [[nodiscard]] const catalogue::Profile& profile() const { return *profile_; }
   [[nodiscard]] link::Session& session() { return *session_; }
@@ -80,8 +94,12 @@ class Device {
   /// The bytes of FC 11h. An exception response is an error like any other.
   Result<Bytes> report_server_id();
 
-  /// Goes on with a profile that was found by the answer to FC 11h.
-  void use(const catalogue::Profile& profile);
+  /// Goes on with a profile that was found by the answer to FC 11h, and what that says.
+  void use(const catalogue::Profile& profile, catalogue::Identity identity);
+
+  /// What the tool said of itself when its registers were last checked; empty before, and for a
+  /// product without an identity.
+  [[nodiscard]] const std::optional<catalogue::Identity>& identity() const { return identity_; }
 
   /// Ends the connection; everything that needs it fails with `closed` from now on. A tool that
   /// serves one client at a time must be let go before it is opened anew.
@@ -99,8 +117,8 @@ class Device {
   /// firmware 2103"; empty before.
   [[nodiscard]] const std::string& identity_text() const { return identity_text_; }
 
-  /// Reads all in the fewest requests. A refused register stands in its reading; anything else ends
-  /// it.
+  /// Reads all in the fewest requests, and the limits of what exists. A refused register stands in
+  /// its reading; anything else ends it.
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
                                          Limits limits, const link::Progress& progress = {});
 
@@ -139,6 +157,10 @@ class Device {
   /// response counts as an answer.
   Result<Duration> ping();
 
+  /// FC 08 to this unit of a serial line, once; all later requests go to it too. An exception
+  /// response counts as an answer.
+  Result<Probe> probe(modbus::UnitId unit);
+
  private:
   Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
          const LinkOptions& options, std::unique_ptr<link::Session> session);
@@ -147,7 +169,10 @@ class Device {
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
   Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
-                     const link::RegisterImage& image) const;
+                     const link::RegisterImage& values,
+                     const link::RegisterImage& limit_values) const;
+  std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
+                                                const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
 
@@ -159,6 +184,7 @@ class Device {
   link::Client client_;
   bool registers_known_ = false;
   std::string identity_text_ = {};
+  std::optional<catalogue::Identity> identity_ = std::nullopt;
 };
 
 }  // namespace spindle::device

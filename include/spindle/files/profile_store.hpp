@@ -6,19 +6,9 @@
 
 #include "spindle/base/error.hpp"
 #include "spindle/catalogue/profile.hpp"
+#include "spindle/files/finding.hpp"
 
 namespace spindle::files {
-
-/// One fault in a file.
-struct Finding {
-  std::string file;
-  int line = 0;    ///< from 1
-  int column = 0;  ///< from 1
-  std::string message;
-
-  /// "file:line:column: message"
-  [[nodiscard]] std::string to_string() const;
-};
 
 /// A profile that can be named.
 struct ProfileEntry {

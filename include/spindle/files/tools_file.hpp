@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "spindle/base/error.hpp"
+#include "spindle/files/finding.hpp"
 
 namespace spindle::files {
 
@@ -15,6 +16,9 @@ struct Tool {
   std::string profile = {};                ///< empty: not given
   std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
+  Place url_at = {};
+  Place profile_at = {};
+  Place verified_at = {};
 };
 
 struct Tools {
@@ -23,8 +27,17 @@ struct Tools {
   std::map<std::string, std::vector<std::string>> groups = {};
 };
 
-/// Strict: unknown and duplicate keys, unknown members of groups, wrong URLs and torque units are
-/// `bad_file` with file:line:col.
+/// Strict: unknown and duplicate keys, unknown members of groups and torque units are `bad_file`
+/// with file:line:col.
 Result<Tools> load_tools(const std::string& path);
+
+/// What could be read of a tools file, and everything that load_tools() would refuse in it.
+struct CheckedTools {
+  Tools tools;
+  std::vector<Finding> findings;
+};
+
+/// Error only when the file can not be read.
+Result<CheckedTools> check_tools(const std::string& path);
 
 }  // namespace spindle::files

@@ -25,6 +25,9 @@ struct ReadLimits {
   std::uint16_t max_read = modbus::max_read_count;
   /// Areas in which registers that nobody asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
+  /// Areas that are said not to exist. What is wanted there is asked for register by register, so
+  /// that no other answer is spoilt and a wrong saying loses nothing.
+  std::vector<RegisterRange> absent = {};
   /// A read whose answer would look like a spontaneous frame; never issued.
   std::optional<RegisterRange> forbidden_shape =
       std::nullopt;  // table and count; `first` is ignored
@@ -90,10 +93,18 @@ class Client {
   /// FC 08 00 with `word`.
   Result<void> loopback(std::uint16_t word);
 
+  /// Never reads these registers along with others, because they are unlikely to exist.
+  void avoid(const RegisterRange& range);
+
+  /// How many requests read_each() begins with.
+  [[nodiscard]] std::size_t count_requests(const std::vector<RegisterRange>& wanted) const;
+
   [[nodiscard]] Session& session() { return *session_; }
 
  private:
   Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
+  std::vector<RegisterRange> askable(const std::vector<RegisterRange>& wanted,
+                                     RegisterImage& image) const;
   Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image);
   void remember(const PlannedRead& refused, const Error& error, RegisterImage& image);
   [[nodiscard]] const Error* known_absent(const RegisterRange& range) const;
@@ -105,6 +116,7 @@ class Client {
   /// Ranges that were refused alone with exception 02. Of a refused pair it is not known which half
   /// is missing.
   std::map<RegisterRange, Error> absent_ = {};
+  std::set<std::uint32_t> avoided_ = {};
 };
 
 }  // namespace spindle::link

@@ -5,12 +5,17 @@
 #include <string_view>
 
 #include "spindle/base/clock.hpp"
+#include "spindle/link/local_echo.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::link {
 
 enum class Medium : std::uint8_t { tcp, serial, rtu_over_tcp, simulated };
 enum class Parity : std::uint8_t { none, even, odd };
+
+/// Who switches an RS-485 line between sending and receiving: an adapter that does it by itself, or
+/// the kernel with the port's RTS signal.
+enum class LineSwitching : std::uint8_t { adapter, kernel };
 
 /// Where a tool is, as the user wrote it (contract, section 2.1). What a URL leaves out is empty
 /// here and filled from the profile later.
@@ -25,15 +30,20 @@ struct Endpoint {
   std::optional<unsigned> baud = std::nullopt;
   std::optional<Parity> parity = std::nullopt;
   std::optional<unsigned> stop_bits = std::nullopt;
+  std::optional<Duration> gap = std::nullopt;  ///< silence before a request; else the profile's
+  LineSwitching switching = LineSwitching::adapter;
+  LocalEcho echo = LocalEcho::automatic;
 };
 
 /// Whether the text can only be meant as a URL: it begins with "WORD:".
 bool looks_like_url(std::string_view text);
 
-/// Parses tcp://HOST[:PORT][?unit=N], rtu:///PATH[?unit=&baud=&parity=&stop=],
-/// rtu+tcp://HOST:PORT[?unit=] and sim:PROFILE[?unit=]. IPv6 addresses stand in brackets. Error
-/// `bad_target` names the part that is wrong: unknown scheme (with a suggestion), empty host, port
-/// outside 1…65535, unit outside 0…255 (0…247 on rtu and rtu+tcp), unknown or repeated option.
+/// Parses tcp://HOST[:PORT][?unit=N], rtu:///PATH[?unit=&baud=&parity=&stop=&gap=&rs485=&echo=],
+/// rtu+tcp://HOST:PORT[?unit=&baud=&gap=&echo=] and sim:PROFILE[?unit=&baud=]. IPv6 addresses stand
+/// in brackets. Error `bad_target` names the part that is wrong: unknown scheme (with a
+/// suggestion), empty host, port outside 1…65535, unit outside 0…255 (0…247 on rtu and rtu+tcp),
+/// unknown or repeated option. The `baud` of rtu+tcp is that of the line behind the device server;
+/// it only says how long bytes and gaps take there.
 Result<Endpoint> parse_endpoint(std::string_view url);
 
 /// "tcp://HOST:PORT" or "rtu+tcp://HOST:PORT", with brackets around an IPv6 address: a network

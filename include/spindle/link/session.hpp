@@ -8,6 +8,7 @@
 #include <string>
 
 #include "spindle/link/demux.hpp"
+#include "spindle/link/local_echo.hpp"
 #include "spindle/link/trace.hpp"
 #include "spindle/link/transport.hpp"
 
@@ -27,6 +28,11 @@ struct SessionOptions {
   Duration character_time = Duration::zero();
   /// RTU: whether the line is proved with FC 08 after a quarantine.
   enum class Proof : std::uint8_t { none, loopback } proof = Proof::none;
+  /// RTU: whether the request itself comes back first. Where that is not known, a read of one
+  /// register goes before the first FC 08, because its own answer and echo look the same.
+  LocalEcho echo = LocalEcho::automatic;
+  /// RTU: until when others may have used the line; the first gap counts from then.
+  TimePoint in_use_until = {};
 };
 
 /// A frame that nobody asked for, with the time when its last byte arrived.
@@ -60,7 +66,7 @@ class Session {
   ///
   /// RTU: after a failure the line is in quarantine. A read then waits until no late answer can
   /// come any more and the line is proved; only FC 06 and FC 08, whose answers repeat them, go out
-  /// at once.
+  /// at once. Unit 0 is `usage`: broadcast() is for that.
   Result<modbus::Pdu> transact(const modbus::Pdu& request);
 
   /// RTU: sends to unit 0. Nobody answers, so success means "sent", never "done".
@@ -74,10 +80,18 @@ class Session {
   /// the session.
   void set_hearer(std::function<void(const Spontaneous&)> hear) { hear_ = std::move(hear); }
 
+  /// RTU: before the line is left to others, waits for the answer to a request that was abandoned,
+  /// though not for long: they would take it for theirs. Interrupts do not end this wait.
+  void settle();
+
   /// After this, interrupts no longer end waits on this connection.
   void shield() { transport_->shield(); }
 
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
+  /// Whom the requests from now on are for.
+  void set_unit(modbus::UnitId unit) { options_.unit = unit; }
+  /// For FC 08: another word for every request, and hardly that of an earlier process.
+  [[nodiscard]] std::uint16_t fresh_word() const;
   /// For a profile that is only known after the first answer.
   void set_rules(DemuxRules rules) { options_.rules = std::move(rules); }
   [[nodiscard]] const SessionOptions& options() const { return options_; }
@@ -96,6 +110,9 @@ class Session {
   Result<bool> fill(TimePoint deadline);
   Result<std::optional<modbus::Adu>> take_frame();
   void strip_echo(Outstanding& outstanding);
+  void accept(const modbus::Adu& received, Outstanding& outstanding) const;
+  void learn_echo(const Outstanding& outstanding);
+  Result<void> find_echo(const modbus::Pdu& request);
   Result<void> sort_buffered(Outstanding* outstanding);
   void sort(const modbus::Adu& received, Outstanding* outstanding);
   void keep(const modbus::Pdu& pdu);
@@ -106,6 +123,7 @@ class Session {
   [[nodiscard]] bool is_late(const modbus::Adu& stray) const;
   Error timeout_error(const Outstanding& outstanding) const;
   void decide(Decision decision, const modbus::Adu& adu) const;
+  [[nodiscard]] std::string describe_frame(const modbus::Adu& adu) const;
 
   std::unique_ptr<Transport> transport_;
   Clock* clock_;
@@ -116,10 +134,13 @@ class Session {
   std::deque<Spontaneous> queue_ = {};
   std::function<void(const Spontaneous&)> hear_ = {};
   std::uint16_t next_transaction_ = 0x8000;
-  TimePoint last_activity_ = {};
+  TimePoint created_;
+  TimePoint last_activity_;
   /// RTU: when no answer to an abandoned request can come any more.
   std::optional<TimePoint> quarantined_until_ = std::nullopt;
-  bool echoing_ = false;  ///< the adapter returns what it sends
+  /// RTU: the last request whose answer may still come and be mistaken.
+  std::optional<modbus::Adu> abandoned_ = std::nullopt;
+  LocalEcho echo_;  ///< as far as it is known
   Duration last_round_trip_ = {};
 };
 

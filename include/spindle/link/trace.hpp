@@ -20,6 +20,7 @@ enum class Decision : std::uint8_t {
   stray,
   late,
   junk,
+  echo,
   retry,
   quarantine
 };

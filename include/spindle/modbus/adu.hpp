@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -44,6 +45,10 @@ Bytes frame(Framing framing, const Adu& adu);
 /// before it are `skipped`. Waiting for silence is never needed. With nothing found in more than
 /// 256 bytes of buffer, Junk.
 Deframing deframe(Framing framing, Role role, ByteView buffered);
+
+/// The RTU frame that these bytes are, whatever its function, for a receiver whose silence told it
+/// where frames begin and end. Empty when the CRC does not fit.
+std::optional<Adu> whole_rtu_frame(ByteView bytes);
 
 /// The largest frame: 260 bytes on TCP, 256 on RTU.
 inline constexpr std::size_t max_adu_size = 260;

@@ -14,16 +14,13 @@
 
 namespace spindle::posix {
 
-/// Opens real lines. A port that the endpoint leaves out is the profile's. Serial lines are refused
-/// with `port_unusable` by this version.
+/// Opens real lines. What the endpoint leaves out (port, rate, parity, stop bits) is the profile's.
 std::function<Result<std::unique_ptr<link::Transport>>(
     const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>
 line_opener(Clock& clock, const Interrupt& interrupt);
 
 /// A variable of the environment; empty when it is not set.
 std::optional<std::string> environment(std::string_view name);
-
-bool file_exists(const std::string& path);
 
 /// The folder of the running executable, without a slash at its end.
 std::string program_folder();

@@ -19,8 +19,8 @@ struct BmOptions {
   std::optional<std::uint32_t> serial =
       std::nullopt;  ///< as printed, in every form of the identity
   std::optional<std::uint16_t> tool_model = std::nullopt;
-  /// Only those that concern the tool: ignore_write, store_other. They count accepted writes
-  /// from 1.
+  /// Only those that concern the tool: ignore_write, store_other, reset_neighbour. They count
+  /// accepted writes from 1.
   FaultPlan faults = {};
   /// An operator who runs down a screw at this interval, beginning one interval after the first
   /// advance(); empty: nobody.

@@ -29,17 +29,20 @@ enum class FaultKind : std::uint8_t {
   wrong_function,       ///< another function code: N (default 0x65)
   garbage,              ///< N (default 16) bytes that are no frame instead of the answer
   noise,                ///< N (default 1) bytes before the answer
-  bad_crc,              ///< RTU: one bit of the checksum flipped
-  exception,            ///< exception response N instead of the answer
+  echo,                 ///< RTU: the adapter hears what the client sends, before any answer
+  foreign,      ///< RTU: just before the answer, one of unit N (default 78) of the same shape
+  bad_crc,      ///< RTU: one bit of the checksum flipped
+  exception,    ///< exception response N instead of the answer
   push_before,  ///< an event frame with transaction id N just before the answer; "pending" = the
                 ///< request's own; neither = the tool's own count
   push_inside,  ///< first half of an event frame, then after 1 ms its rest together with the answer
   push_after,   ///< an event frame just after the answer
   close,        ///< connection closed instead of the answer
-  close_inside,  ///< connection closed in the middle of the answer
-  close_after,   ///< connection closed after the answer
-  ignore_write,  ///< a write is echoed, but nothing is stored
-  store_other,   ///< a write is echoed, but value + N (default 1) is stored
+  close_inside,     ///< connection closed in the middle of the answer
+  close_after,      ///< connection closed after the answer
+  ignore_write,     ///< a write is echoed, but nothing is stored
+  store_other,      ///< a write is echoed, but value + N (default 1) is stored
+  reset_neighbour,  ///< a write is stored, and the register N (default 1) behind it becomes 0
 };
 
 /// One fault: kind, argument, and when. Counts answers of the whole server from 1; with neither

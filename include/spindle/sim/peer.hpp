@@ -7,6 +7,7 @@
 #include "spindle/base/bytes.hpp"
 #include "spindle/modbus/adu.hpp"
 #include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/serial_line.hpp"
 #include "spindle/sim/server.hpp"
 
 namespace spindle::sim {
@@ -23,13 +24,15 @@ class Peer {
  public:
   /// `server`, `faults` and `counter` must outlive the peer.
   Peer(Server& server, ConnectionId connection, modbus::Framing framing, const FaultPlan& faults,
-       AnswerCounter& counter);
+       AnswerCounter& counter, const LineModel& line = {});
   ~Peer();
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
   /// Bytes from the client. Complete requests are answered into the outbox. Bytes that can not be a
-  /// frame close the connection on TCP and are dropped on RTU.
+  /// frame close the connection on TCP; on RTU the server hears of them (`bad_frame`) and nobody
+  /// answers. Where the server wants a gap, a query is complete when the line is silent again, and
+  /// what begins within the gap is not heard.
   void receive(ByteView bytes, TimePoint now);
   /// An event frame for this client (transaction id counts up from 1 as in the manual's example).
   void push(const modbus::Pdu& pdu, TimePoint now);
@@ -53,8 +56,11 @@ class Peer {
     bool begun = false;
   };
 
+  void echo(ByteView bytes, TimePoint now);
   bool take_request(TimePoint now);
-  void answer(const modbus::Adu& request, TimePoint now);
+  void take_burst(TimePoint now);
+  void answer(const modbus::Adu& request, TimePoint heard, TimePoint now);
+  [[nodiscard]] Duration time_on_the_wire(std::size_t bytes) const;
   std::optional<modbus::Pdu> respond(const modbus::Adu& request, const Fault* exception,
                                      TimePoint now);
   Bytes event_bytes(const Fault* fault, modbus::TransactionId pending);
@@ -67,7 +73,10 @@ class Peer {
   modbus::Framing framing_;
   const FaultPlan* faults_;
   AnswerCounter* counter_;
+  Duration character_time_;
+  std::optional<SerialLine> line_ = std::nullopt;  ///< where the server wants a gap
   Bytes inbox_ = {};
+  TimePoint last_byte_ = {};  ///< in the inbox
   std::deque<Message> outbox_ = {};
   TimePoint in_order_from_ = TimePoint::min();
   std::uint16_t push_transaction_ = 1;

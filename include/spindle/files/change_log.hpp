@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "spindle/base/decimal.hpp"
+
+namespace spindle::files {
+
+/// One change that a command made, or tried to make (contract, section 5, Record of changes).
+struct Change {
+  std::string time;  ///< "2026-11-22T10:15:30.123Z"
+  std::string user;
+  std::string command;  ///< "set", "do", "restore", "remote-start"
+  std::string target;   ///< as the user named it
+  std::string serial;   ///< empty: not known
+  std::string name;     ///< parameter or action
+  std::optional<std::uint16_t> register_address = std::nullopt;
+  std::optional<Decimal> old_value = std::nullopt;
+  std::optional<Decimal> new_value = std::nullopt;
+  std::string result;
+};
+
+/// One line of the change log, a JSON object with its line end. What is not known is null.
+std::string render_change(const Change& change);
+
+}  // namespace spindle::files

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "spindle/base/clock.hpp"
+#include "spindle/base/interrupt.hpp"
+#include "spindle/link/serial_settings.hpp"
+#include "spindle/link/transport.hpp"
+
+namespace spindle::posix {
+
+/// Opens a serial line for this process alone and restores its settings at the end. The settings
+/// are read back: what the port does not do is an error, never another rate in silence. send()
+/// returns when the last byte has left. Errors: `port_missing`; `port_busy`, with the holder where
+/// the system tells; `port_unusable` (no permission, no terminal, a setting that the port lacks).
+/// When an adapter is pulled out, sending and receiving fail with `reset`.
+Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
+                                                     const link::SerialSettings& settings,
+                                                     link::LineSwitching switching,
+                                                     const Clock& clock,
+                                                     const Interrupt& interrupt);
+
+}  // namespace spindle::posix

@@ -1,0 +1,321 @@
+#include "spindle/catalogue/snapshot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::catalogue {
+namespace {
+
+template <typename Entries>
+auto find_named(const Entries& entries, std::string_view name) -> decltype(entries.data()) {
+  const auto found = std::find_if(entries.begin(), entries.end(),
+                                  [&](const auto& entry) { return entry.parameter.name == name; });
+  return found == entries.end() ? nullptr : &*found;
+}
+
+/// Which registers of both tables have a parameter already.
+class Claims {
+ public:
+  /// Takes the registers of a parameter, unless another one has some of them.
+  bool take(const Parameter& parameter) {
+    const std::size_t first = key_of(parameter);
+    const std::size_t end = first + register_count(parameter.encoding.kind);
+    for (std::size_t key = first; key < end; ++key) {
+      if (taken_[key]) return false;
+    }
+    for (std::size_t key = first; key < end; ++key) taken_[key] = true;
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t table_size = 0x10000;
+  static std::size_t key_of(const Parameter& parameter) {
+    const bool input = parameter.table == modbus::RegisterTable::input;
+    return (input ? table_size : 0) + parameter.address.value;
+  }
+
+  std::vector<bool> taken_ = std::vector<bool>(2 * table_size + 1);
+};
+
+bool is_numbered(const Parameter& parameter, const NumberedFacts& facts) {
+  return parameter.table == facts.table && parameter.address.value >= facts.from &&
+         parameter.address.value <= facts.to;
+}
+
+/// What is set is stored; what is only shown changes by itself.
+std::vector<Parameter> numbered_space(const Profile& profile) {
+  const NumberedFacts& facts = *profile.numbered;
+  Claims claims;
+  std::vector<Parameter> space;
+  for (const Parameter& parameter : profile.parameters) {
+    const bool stored = is_numbered(parameter, facts) || parameter.access == Access::read_write;
+    if (stored && claims.take(parameter)) space.push_back(parameter);
+  }
+  for (unsigned number = facts.from; number <= facts.to; ++number) {
+    Parameter parameter = profile.numbered_parameter(static_cast<std::uint16_t>(number));
+    if (claims.take(parameter)) space.push_back(std::move(parameter));
+  }
+  std::stable_sort(space.begin(), space.end(), [](const Parameter& a, const Parameter& b) {
+    return std::pair(a.table, a.address.value) < std::pair(b.table, b.address.value);
+  });
+  return space;
+}
+
+/// FNV-1a, 64 bits.
+class Digest {
+ public:
+  void add(std::string_view text) {
+    for (const char c : text) add(static_cast<unsigned char>(c));
+    add(separator);
+  }
+  [[nodiscard]] std::string to_string() const { return fmt::format("{:016x}", state_); }
+
+ private:
+  static constexpr unsigned char separator = 0;
+  void add(unsigned char byte) {
+    constexpr std::uint64_t prime = 0x100000001b3;
+    state_ = (state_ ^ byte) * prime;
+  }
+  std::uint64_t state_ = 0xcbf29ce484222325;
+};
+
+void add(Digest& digest, const Parameter& parameter) {
+  digest.add(parameter.name);
+  digest.add(to_text(parameter.table));
+  digest.add(std::to_string(parameter.address.value));
+  digest.add(to_text(parameter.encoding.kind));
+  digest.add(parameter.encoding.scale.to_string());
+  digest.add(parameter.unit);
+  digest.add(to_text(parameter.access));
+  for (const Label& label : parameter.labels) {
+    digest.add(std::to_string(label.number));
+    digest.add(label.text);
+  }
+}
+
+bool matches_any(const std::vector<std::string>& patterns, const std::string& name) {
+  return std::any_of(patterns.begin(), patterns.end(), [&](const std::string& pattern) {
+    return pattern == name || glob_match(pattern, name);
+  });
+}
+
+/// The names by which users mean what is stored: "p2" stands for the name of register 2.
+Result<std::vector<std::string>> understand(const std::vector<std::string>& patterns,
+                                            const Profile& profile,
+                                            const std::vector<Parameter>& stored) {
+  std::vector<std::string> understood;
+  for (const std::string& pattern : patterns) {
+    const bool matches = std::any_of(stored.begin(), stored.end(), [&](const Parameter& parameter) {
+      return matches_any({pattern}, parameter.name);
+    });
+    if (matches) {
+      understood.push_back(pattern);
+      continue;
+    }
+    auto meant = profile.select({pattern});
+    if (!meant) return tl::unexpected(std::move(meant.error()));
+    const auto same = std::find_if(stored.begin(), stored.end(), [&](const Parameter& parameter) {
+      return parameter.table == meant->front().table && parameter.address == meant->front().address;
+    });
+    if (meant->size() != 1 || same == stored.end()) {
+      return tl::unexpected(Error{.code = Errc::unknown_name,
+                                  .message = "this is no stored parameter, so no backup holds it",
+                                  .name = pattern});
+    }
+    understood.push_back(same->name);
+  }
+  return understood;
+}
+
+std::string unit_of(const SnapshotEntry* a, const SnapshotEntry* b) {
+  if (a != nullptr && !a->unit.empty()) return a->unit;
+  return b == nullptr ? std::string() : b->unit;
+}
+
+/// Whether a side says nothing about a parameter, rather than that it does not exist.
+bool says_nothing(const Snapshot& side, const std::string& name, Lacking lacking) {
+  if (lacking == Lacking::is_not_compared) return true;
+  const MissingEntry* missing = side.find_missing(name);
+  return missing != nullptr && missing->why != Missing::absent;
+}
+
+Result<void> refuse_beyond(const Parameter& parameter, const Decimal& number, std::string_view side,
+                           const Decimal& limit, std::string_view which,
+                           modbus::RegisterAddress address) {
+  return tl::unexpected(Error{
+      .code = Errc::out_of_range,
+      .message = fmt::format("{} is {} {}, the {} that the tool itself reports (register {})",
+                             number.to_string(), side, limit.to_string(), which, address.value),
+      .name = parameter.name,
+      .register_address = parameter.address.value});
+}
+
+/// A value that has to be written must fit the encoding, the profile and the tool.
+Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& present,
+                         const Profile& profile) {
+  const Parameter& parameter = wanted.parameter;
+  const Decimal& number = wanted.value.number;
+  const auto registers = encode(parameter, number);
+  if (!registers) return tl::unexpected(registers.error());
+  if (auto inside = check_range(parameter, number); !inside) return inside;
+  const bool has_limits = profile.limit_registers(parameter).has_value();
+  if (has_limits && (!present.minimum || !present.maximum)) {
+    return tl::unexpected(Error{.code = Errc::out_of_range,
+                                .message = "the tool's own limits could not be read, so it is not "
+                                           "written",
+                                .name = parameter.name,
+                                .register_address = parameter.address.value});
+  }
+  return check_own_limits(parameter, number, present.minimum, present.maximum, profile);
+}
+
+std::optional<Skip> skip_of(const SnapshotEntry& wanted, const SnapshotEntry* present,
+                            Destination destination) {
+  if (present == nullptr) return Skip::absent;
+  if (present->value == wanted.value) return Skip::equal;
+  if (wanted.parameter.access == Access::read_only) return Skip::read_only;
+  const bool belongs_to_one = wanted.parameter.cloning == Cloning::never;
+  if (belongs_to_one && destination == Destination::other_tool) return Skip::not_cloned;
+  return std::nullopt;
+}
+
+}  // namespace
+
+const SnapshotEntry* Snapshot::find(std::string_view name) const {
+  return find_named(entries, name);
+}
+
+const MissingEntry* Snapshot::find_missing(std::string_view name) const {
+  return find_named(missing, name);
+}
+
+std::vector<Parameter> stored_parameters(const Profile& profile) {
+  if (profile.numbered) return numbered_space(profile);
+  Claims claims;
+  std::vector<Parameter> stored;
+  for (const Parameter& parameter : profile.parameters) {
+    const bool stored_there = parameter.table == modbus::RegisterTable::holding;
+    if (stored_there && claims.take(parameter)) stored.push_back(parameter);
+  }
+  return stored;
+}
+
+std::string fingerprint(const std::vector<Parameter>& stored) {
+  Digest digest;
+  for (const Parameter& parameter : stored) add(digest, parameter);
+  return digest.to_string();
+}
+
+Snapshot snapshot_of_defaults(const Profile& profile) {
+  Snapshot snapshot;
+  snapshot.target = "defaults";
+  snapshot.profile = profile.id;
+  for (Parameter& parameter : stored_parameters(profile)) {
+    if (!parameter.default_value) continue;
+    auto raw = encode(parameter, *parameter.default_value);
+    if (!raw) continue;  // the loader of profiles refuses such a default
+    auto value = decode(parameter, *raw);
+    if (!value) continue;
+    snapshot.entries.push_back(
+        {.parameter = std::move(parameter), .raw = std::move(*raw), .value = std::move(*value)});
+  }
+  return snapshot;
+}
+
+Result<Selection> Selection::make(const std::vector<std::string>& wanted,
+                                  const std::vector<std::string>& ignored, const Profile& profile) {
+  const std::vector<Parameter> stored = stored_parameters(profile);
+  Selection selection;
+  auto named = understand(wanted, profile, stored);
+  if (!named) return tl::unexpected(std::move(named.error()));
+  auto left_out = understand(ignored, profile, stored);
+  if (!left_out) return tl::unexpected(std::move(left_out.error()));
+  selection.wanted_ = std::move(*named);
+  selection.ignored_ = std::move(*left_out);
+  return selection;
+}
+
+bool Selection::contains(const Parameter& parameter) const {
+  const bool wanted = wanted_.empty() || matches_any(wanted_, parameter.name);
+  return wanted && !matches_any(ignored_, parameter.name);
+}
+
+Comparison compare(const Snapshot& a, const Snapshot& b, const Selection& selection,
+                   Lacking lacking) {
+  Comparison comparison;
+  for (const SnapshotEntry& entry : a.entries) {
+    if (!selection.contains(entry.parameter)) continue;
+    const SnapshotEntry* other = b.find(entry.parameter.name);
+    if (other == nullptr && says_nothing(b, entry.parameter.name, lacking)) continue;
+    if (other != nullptr && other->value == entry.value) {
+      ++comparison.same;
+      continue;
+    }
+    Difference difference{.parameter = entry.parameter, .a = entry.value};
+    if (other != nullptr) difference.b = other->value;
+    difference.unit = unit_of(&entry, other);
+    comparison.differences.push_back(std::move(difference));
+  }
+  for (const SnapshotEntry& entry : b.entries) {
+    const std::string& name = entry.parameter.name;
+    if (!selection.contains(entry.parameter) || a.find(name) != nullptr) continue;
+    if (says_nothing(a, name, lacking)) continue;
+    comparison.differences.push_back(
+        {.parameter = entry.parameter, .b = entry.value, .unit = entry.unit});
+  }
+  return comparison;
+}
+
+Destination destination_of(const Snapshot& backup, const Snapshot& present) {
+  const bool known = backup.identity && present.identity && !backup.identity->serial.empty();
+  const bool same = known && backup.identity->serial == present.identity->serial;
+  return same ? Destination::same_tool : Destination::other_tool;
+}
+
+std::size_t RestorePlan::count(Skip why) const {
+  return static_cast<std::size_t>(
+      std::count_if(skipped.begin(), skipped.end(),
+                    [why](const SkippedEntry& entry) { return entry.why == why; }));
+}
+
+RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const Profile& profile,
+                         const Selection& selection, Destination destination) {
+  RestorePlan plan;
+  for (const Parameter& parameter : stored_parameters(profile)) {
+    const SnapshotEntry* wanted = backup.find(parameter.name);
+    if (wanted == nullptr || !selection.contains(parameter)) continue;
+    const SnapshotEntry* now = present.find(parameter.name);
+    if (const auto skip = skip_of(*wanted, now, destination)) {
+      plan.skipped.push_back({parameter, *skip});
+      continue;
+    }
+    if (auto allowed = check_write(*wanted, *now, profile); !allowed) {
+      Error finding = std::move(allowed.error());
+      finding.name = parameter.name;
+      finding.register_address = parameter.address.value;
+      plan.findings.push_back(std::move(finding));
+    }
+    plan.writes.push_back({parameter, now->value, wanted->value, now->unit});
+  }
+  return plan;
+}
+
+Result<void> check_own_limits(const Parameter& parameter, const Decimal& number,
+                              const std::optional<Decimal>& minimum,
+                              const std::optional<Decimal>& maximum, const Profile& profile) {
+  const auto own = profile.limit_registers(parameter);
+  if (!own) return {};
+  if (minimum && number < *minimum) {
+    return refuse_beyond(parameter, number, "below", *minimum, "minimum", own->minimum);
+  }
+  if (maximum && number > *maximum) {
+    return refuse_beyond(parameter, number, "above", *maximum, "maximum", own->maximum);
+  }
+  return {};
+}
+
+}  // namespace spindle::catalogue

@@ -1,0 +1,354 @@
+#include "restore_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "records.hpp"
+#include "spindle/files/backup_file.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using catalogue::PlannedWrite;
+using catalogue::Skip;
+using catalogue::Snapshot;
+using catalogue::Value;
+using device::PutBack;
+using report::Align;
+using report::Column;
+
+report::Cell count_cell(std::size_t things) { return number(static_cast<std::int64_t>(things)); }
+
+report::Record write_record(const Parameter& parameter, const Value& before, const Value& now,
+                            std::string_view result, const Target& target, const Clock& clock) {
+  return {.type = result == "planned" ? "plan" : "write",
+          .target = target.shown,
+          .time = clock.wall(),
+          .fields = {{"name", parameter.name},
+                     {"register", number(parameter.address.value)},
+                     {"old", before.number, before.to_string()},
+                     {"new", now.number, now.to_string()},
+                     {"unit", text_or_null(unit_of(parameter, target))},
+                     {"result", std::string(result)}}};
+}
+
+Error about(const Parameter& parameter, std::string message) {
+  return {.code = Errc::mismatch,
+          .message = std::move(message),
+          .name = parameter.name,
+          .register_address = parameter.address.value};
+}
+
+/// A text as one word of a command line.
+std::string shell_word(const std::string& text) {
+  const auto is_harmless = [](char c) {
+    constexpr std::string_view others = "._-/:@=+,";
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           others.find(c) != std::string_view::npos;
+  };
+  if (!text.empty() && std::all_of(text.begin(), text.end(), is_harmless)) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+/// What the tool should hold after the restore: what it held before, with the plan laid over it.
+Snapshot expected_after(const RestoreTask& task) {
+  Snapshot expected = task.present;
+  for (catalogue::SnapshotEntry& entry : expected.entries) {
+    const auto write = std::find_if(task.plan.writes.begin(), task.plan.writes.end(),
+                                    [&](const PlannedWrite& planned) {
+                                      return planned.parameter.name == entry.parameter.name;
+                                    });
+    if (write != task.plan.writes.end()) entry.value = write->after;
+  }
+  return expected;
+}
+
+/// What nobody can set is what the tool measures.
+bool changes_by_itself(const Parameter& parameter) {
+  return parameter.access == catalogue::Access::read_only;
+}
+
+std::string said(const std::optional<Value>& value) {
+  return value ? value->to_string() : std::string("nothing");
+}
+
+std::string without_colons(std::string time) {
+  std::erase(time, ':');
+  return time;
+}
+
+}  // namespace
+
+std::span<const Column> restore_columns() {
+  static const std::array<Column, 5> columns = {{{"NAME", "name"},
+                                                 {"OLD", "old", Align::right},
+                                                 {"NEW", "new", Align::right},
+                                                 {"UNIT", "unit"},
+                                                 {"RESULT", "result"}}};
+  return columns;
+}
+
+report::Record plan_record(const PlannedWrite& write, const Target& target, const Clock& clock) {
+  return write_record(write.parameter, write.before, write.after, "planned", target, clock);
+}
+
+RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
+                       Context& context)
+    : options_(&options),
+      task_(&task),
+      tool_(&tool),
+      context_(&context),
+      calm_context_(calm_context(context)),
+      log_("restore", tool, context),
+      progress_(context) {}
+
+Result<Outcome> RestoreRun::run() {
+  if (auto saved = save_present(); !saved) return tl::unexpected(std::move(saved.error()));
+  listing_.emplace(*context_, restore_columns());
+  write_all();
+  if (errors_.empty()) verify();
+  progress_.clear();
+  return end();
+}
+
+/// Before the first write; without it nothing is written.
+Result<void> RestoreRun::save_present() {
+  if (task_->plan.writes.empty()) return {};
+  if (context_->state_folder.empty()) {
+    return tl::unexpected(Error{.code = Errc::bad_file,
+                                .message = "the tool's present state can not be saved: neither "
+                                           "XDG_STATE_HOME nor HOME is set, so nothing was written",
+                                .hint = "set one of them to a folder"});
+  }
+  const std::string folder = context_->state_folder + "/backups";
+  const std::string path = fmt::format("{}/{}-{}.yaml", folder, file_name_of(task_->present.target),
+                                       without_colons(task_->present.time));
+  auto saved = context_->disk.make_folders(folder, Privacy::own).and_then([&] {
+    return context_->disk.write(path, files::render_backup(task_->present), Overwrite::allow);
+  });
+  if (!saved) {
+    saved.error().hint = "the tool's present state must be saved first, so nothing was written";
+    return saved;
+  }
+  saved_ = path;
+  context_->renderer.note(fmt::format("the tool's present state is saved in {}", path));
+  return {};
+}
+
+void RestoreRun::write_all() {
+  const std::vector<PlannedWrite>& writes = task_->plan.writes;
+  for (const PlannedWrite& write : writes) {
+    if (context_->interrupt.signalled()) {
+      fail(tool_->target.blamed(context_->interrupt.error()));
+    } else if (auto done = write_one(write); !done) {
+      fail(done.error());
+    }
+    if (!errors_.empty()) return roll_back();
+    progress_.show(
+        fmt::format("{}: written, {} of {}", tool_->target.shown, ++written_, writes.size()));
+  }
+}
+
+Result<void> RestoreRun::write_one(const PlannedWrite& write) {
+  tried_.push_back({write.parameter, write.before, write.after});
+  const auto written = tool_->device.write(write.parameter, write.before, write.after);
+  if (!written) {
+    const bool is_refused = written.error().code == Errc::exception_response;
+    if (is_refused) {
+      tried_.pop_back();  // the tool says that it did nothing
+      note(write.parameter, write.before, write.before, "refused");
+    } else {
+      log_.add(logged(write.parameter, write.before, write.after, "unknown"));
+    }
+    return tl::unexpected(written.error());
+  }
+  if (written->result == device::WriteResult::written) {
+    note(write.parameter, write.before, written->now, "written");
+    return {};
+  }
+  const bool kept = written->result == device::WriteResult::mismatch;
+  note(write.parameter, write.before, written->now, kept ? "mismatch" : "coerced");
+  Error error = tool_->target.blamed(
+      about(write.parameter,
+            fmt::format("the tool acknowledged {} but {} holds {}", write.after.to_string(),
+                        kept ? "still" : "now", written->now.to_string())));
+  error.hint = "is the tool running, locked, or set to refuse changes?";
+  return tl::unexpected(std::move(error));
+}
+
+void RestoreRun::verify() {
+  if (!task_->plan.writes.empty()) compare_everything();
+  for (const catalogue::SkippedEntry& skipped : task_->plan.skipped) {
+    if (skipped.why != Skip::absent) continue;
+    fail(tool_->target.blamed(about(
+        skipped.parameter, "the backup has a value for it, but the tool has no such register")));
+  }
+}
+
+/// A tool may change one parameter when another one is written, so everything is read once more.
+void RestoreRun::compare_everything() {
+  const auto now =
+      take_snapshot(*tool_, Secrets::include, *context_, [&](std::size_t done, std::size_t total) {
+        progress_.show(fmt::format("{}: verifying, {} of {}", tool_->target.shown, done, total));
+      });
+  if (!now) {
+    fail(now.error());
+    return roll_back();
+  }
+  for (const Error& error : now->unreadable) fail(error);
+  const auto changed = catalogue::compare(expected_after(*task_), now->snapshot, {});
+  for (const catalogue::Difference& difference : changed.differences) {
+    if (changes_by_itself(difference.parameter)) continue;
+    Error error = about(difference.parameter,
+                        fmt::format("holds {} after the restore, not {}: writing another "
+                                    "parameter changed it",
+                                    said(difference.b), said(difference.a)));
+    error.hint = fmt::format("'{}' writes what is left; what the tool held before is in {}",
+                             command_to_finish(), saved_);
+    fail(tool_->target.blamed(error));
+  }
+}
+
+/// Opens the same tool on a line that signals do not end.
+device::Rollback::Reopen RestoreRun::reopener() {
+  return [this](Duration patience) -> Result<device::Device> {
+    progress_.show("the link is lost; trying to put the tool back");
+    const Duration usual = context_->common.connect_timeout.value_or(tool_->profile->link.connect);
+    calm_context_.common.connect_timeout = std::min(usual, patience);
+    auto opened = connect_device(tool_->target, *tool_->profile, calm_context_);
+    if (!opened) return opened;
+    auto known = opened->require_known_registers().and_then([&] { return same_tool(*opened); });
+    if (!known) return tl::unexpected(std::move(known.error()));
+    return opened;
+  };
+}
+
+/// Another tool may answer at the same address by now.
+Result<void> RestoreRun::same_tool(const device::Device& opened) const {
+  const auto& before = task_->present.identity;
+  const auto& now = opened.identity();
+  if (!before || !now || before->serial == now->serial) return {};
+  return tl::unexpected(
+      Error{.code = Errc::mismatch,
+            .message = fmt::format("another tool answers there now (serial {})", now->serial)});
+}
+
+void RestoreRun::roll_back() {
+  if (tried_.empty() || options_->on_failure == OnFailure::leave) return;
+  progress_.show(fmt::format("{}: putting it back", tool_->target.shown));
+  device::Rollback rollback(tool_->device, reopener(), context_->calm.clock);
+  const auto reports = rollback.run(tried_);
+  const bool complete = std::all_of(reports.begin(), reports.end(), [](const auto& report) {
+    return report.result == PutBack::done || report.result == PutBack::kept;
+  });
+  if (!complete) outcome_ = {};  // what the tool holds matters more than why it came to that
+  for (const device::PutBackReport& report : reports) report_put_back(report);
+  if (complete) check_rolled_back(rollback);
+  progress_.clear();
+}
+
+void RestoreRun::report_put_back(const device::PutBackReport& report) {
+  const auto& [parameter, before, tried] = report.write;
+  if (report.result == PutBack::kept) return;
+  if (report.result == PutBack::done) {
+    ++rolled_back_;
+    note(parameter, report.found.value_or(tried), before, "rolled-back");
+    return;
+  }
+  const std::string holds = report.now ? fmt::format("holds {}", report.now->to_string())
+                                       : fmt::format("holds {} or {}, nobody knows",
+                                                     tried.to_string(), before.to_string());
+  Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
+                                             before.to_string(), holds, report.trouble));
+  if (report.result == PutBack::unknown) error.code = Errc::no_answer;
+  error.hint =
+      fmt::format("'spindle restore {} {}' puts everything back, '{}' finishes the restore",
+                  shell_word(tool_->target.shown), shell_word(saved_), command_to_finish());
+  log_.add(logged(parameter, before, report.now.value_or(tried), "not-rolled-back"));
+  fail(tool_->target.blamed(error));
+}
+
+/// What was not written may have changed all the same.
+void RestoreRun::check_rolled_back(device::Rollback& rollback) {
+  std::vector<Parameter> parameters;
+  for (const auto& entry : task_->present.entries) parameters.push_back(entry.parameter);
+  const auto readings = rollback.read_again(parameters);
+  if (!readings) {
+    fail(tool_->target.blamed(
+        {.code = Errc::no_answer,
+         .message = fmt::format("what was written is put back, but the rest could not be checked: "
+                                "{}",
+                                message_of(readings.error()))}));
+    return;
+  }
+  for (std::size_t index = 0; index < readings->size(); ++index) {
+    const auto& value = (*readings)[index].value;
+    const Value& before = task_->present.entries[index].value;
+    if (!value || *value == before || changes_by_itself(parameters[index])) continue;
+    Error error = about(parameters[index],
+                        fmt::format("holds {} after everything was put back, but held {} before",
+                                    value->to_string(), before.to_string()));
+    error.hint = fmt::format("'spindle restore {} {}' puts everything back",
+                             shell_word(tool_->target.shown), shell_word(saved_));
+    fail(tool_->target.blamed(error));
+  }
+}
+
+void RestoreRun::note(const Parameter& parameter, const Value& before, const Value& now,
+                      std::string_view result) {
+  listing_->add(write_record(parameter, before, now, result, tool_->target, context_->clock));
+  log_.add(logged(parameter, before, now, result));
+}
+
+void RestoreRun::fail(const Error& error) {
+  outcome_.fail(error);
+  errors_.push_back(error);
+}
+
+std::string RestoreRun::command_to_finish() const {
+  std::string command = fmt::format("spindle restore {} {}", shell_word(tool_->target.shown),
+                                    shell_word(options_->file));
+  for (const std::string& pattern : options_->patterns) command += " " + shell_word(pattern);
+  return command;
+}
+
+Result<Outcome> RestoreRun::end() {
+  const std::size_t planned = task_->plan.writes.size();
+  const std::size_t unchanged = task_->plan.count(Skip::equal);
+  const bool left = !errors_.empty() && written_ < planned && rolled_back_ == 0;
+  if (left && options_->on_failure == OnFailure::leave) {
+    Error error = tool_->target.blamed(
+        {.code = errors_.front().code,
+         .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)});
+    error.hint = fmt::format("'{}' writes the rest", command_to_finish());
+    errors_.push_back(error);
+  }
+  const auto listed = listing_->end();
+  for (const Error& error : errors_) {
+    const auto told = context_->renderer.error(error, context_->clock.wall());
+    static_cast<void>(told);  // on stderr it is in any case
+  }
+  if (errors_.empty()) outcome_.succeed();
+  if (!listed && errors_.empty()) return tl::unexpected(listed.error());
+  if (!listed) return outcome_;
+  std::string sentence = fmt::format("{} written, {} unchanged", written_, unchanged);
+  if (!errors_.empty()) sentence += fmt::format(", {} rolled back", rolled_back_);
+  return context_->renderer
+      .summary(summary_record({{"planned", count_cell(planned)},
+                               {"written", count_cell(written_)},
+                               {"unchanged", count_cell(unchanged)},
+                               {"skipped", count_cell(task_->plan.skipped.size() - unchanged)},
+                               {"rolled_back", count_cell(rolled_back_)},
+                               {"saved", text_or_null(saved_)}},
+                              outcome_.status(), tool_->target.shown, context_->clock),
+               sentence)
+      .map([&] { return outcome_; });
+}
+
+}  // namespace spindle::commands

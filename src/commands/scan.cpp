@@ -1,0 +1,125 @@
+#include <fmt/format.h>
+
+#include <array>
+
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+namespace {
+
+const std::array<report::Column, 3> columns = {{{"UNIT", "unit", report::Align::right},
+                                                {"ANSWERED", "answered"},
+                                                {"ROUND TRIP", "round_trip_ms"}}};
+
+/// The line; the unit of a named tool does not matter, but in a URL it would be a misunderstanding.
+Result<Target> resolve_bus(const ScanOptions& options, const Context& context) {
+  auto bus = resolve_target(options.bus, context);
+  if (!bus) return bus;
+  const auto refuse = [&](std::string message, std::string hint) {
+    return tl::unexpected(
+        bus->blamed({.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)}));
+  };
+  if (bus->endpoint.medium == link::Medium::tcp) {
+    return refuse("there are no units to scan for behind Modbus TCP",
+                  "a bus is rtu:///dev/ttyUSB0 or rtu+tcp://HOST:PORT");
+  }
+  if (bus->endpoint.unit && bus->shown == bus->endpoint.text) {
+    return refuse("scan asks many units, and the target names one",
+                  "leave unit out of the target; --units says which are asked");
+  }
+  return bus;
+}
+
+Result<catalogue::Profile> load_bus_profile(const Target& bus, const Context& context) {
+  auto profile = load_profile(bus, context);
+  const bool serial = bus.endpoint.medium != link::Medium::simulated || !profile ||
+                      profile->link.framing == modbus::Framing::rtu;
+  if (serial) return profile;
+  return tl::unexpected(bus.blamed({.code = Errc::usage,
+                                    .message = "this simulated tool is not on a serial line",
+                                    .hint = "'spindle ping' asks it"}));
+}
+
+report::Record unit_record(modbus::UnitId unit, const device::Probe& probe, const Target& bus,
+                           const Clock& clock) {
+  const bool data = probe.answered == device::Answered::data;
+  report::Cell time = milliseconds(probe.round_trip);
+  std::string shown = report::to_text(time) + " ms";
+  return {.type = "unit",
+          .target = bus.shown,
+          .time = clock.wall(),
+          .fields = {{"unit", number(unit.value)},
+                     {"answered", std::string(data ? "data" : "exception")},
+                     {"round_trip_ms", std::move(time), std::move(shown)}}};
+}
+
+/// One line on a terminal that changes while the scan goes on; empty: it is taken away.
+void show_progress(std::string_view text, const Context& context) {
+  const bool ready = !context.io.err_is_ready || context.io.err_is_ready();
+  if (context.io.err_is_terminal && ready) context.io.err(fmt::format("\r\x1b[K{}", text));
+}
+
+/// Nothing came, or only what this side's own adapter said.
+bool is_silence(const Error& error) {
+  return error.code == Errc::no_answer || error.code == Errc::local_echo;
+}
+
+/// Somebody speaks where one unit should, and can not be understood: two units of one address, a
+/// bad line.
+bool is_noise(const Error& error) {
+  return error.code == Errc::bad_checksum || error.code == Errc::incomplete_answer ||
+         error.code == Errc::malformed_answer;
+}
+
+Error with_unit(Error error, modbus::UnitId unit) {
+  error.name = fmt::format("unit {}", unit.value);
+  if (is_noise(error)) error.hint = "do two units have this address? else check wiring and rate";
+  return error;
+}
+
+}  // namespace
+
+Result<Outcome> scan(const ScanOptions& options, Context& context) {
+  const auto bus = resolve_bus(options, context);
+  if (!bus) return tl::unexpected(bus.error());
+  auto profile = load_bus_profile(*bus, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  auto tool = connect(*bus, std::move(*profile), context);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+
+  Outcome outcome;
+  Listing listing(context, columns);
+  std::int64_t asked = 0;
+  for (const modbus::UnitId unit : options.units) {
+    if (!listing.open()) break;
+    show_progress(fmt::format("unit {}: {} of {}, {} found", unit.value, ++asked,
+                              options.units.size(), outcome.succeeded()),
+                  context);
+    const auto probe = tool->device.probe(unit);
+    if (probe) {
+      outcome.succeed();
+      listing.add(unit_record(unit, *probe, *bus, context.clock));
+    } else if (!is_silence(probe.error())) {
+      show_progress({}, context);
+      outcome.fail(probe.error());
+      listing.add(with_unit(probe.error(), unit));
+      if (!is_noise(probe.error())) break;
+    }
+  }
+  show_progress({}, context);
+  if (outcome.succeeded() == 0) outcome.negate();
+  const auto found = static_cast<std::int64_t>(outcome.succeeded());
+  return listing.end()
+      .and_then([&] {
+        return context.renderer.summary(
+            summary_record({{"asked", number(asked)}, {"found", number(found)}}, outcome.status(),
+                           bus->shown, context.clock),
+            fmt::format("{} asked, {} found", asked, found));
+      })
+      .map([&] { return outcome; });
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,99 @@
+#include "snapshots.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "records.hpp"
+#include "spindle/files/backup_file.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Missing;
+
+/// Longer names are cut; file systems end at 255 bytes.
+constexpr std::size_t longest_name = 100;
+
+std::optional<catalogue::SnapshotIdentity> identity_of(const device::Device& device) {
+  const auto& identity = device.identity();
+  if (!identity) return std::nullopt;
+  return catalogue::SnapshotIdentity{.model = identity->tool_model,
+                                     .model_code = identity->tool_model_code,
+                                     .serial = identity->serial,
+                                     .firmware = identity->firmware,
+                                     .raw = identity->raw};
+}
+
+std::optional<Decimal> number_of(const std::optional<catalogue::Value>& value) {
+  return value ? std::optional(value->number) : std::nullopt;
+}
+
+bool is_absent(const Error& error) {
+  return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
+}
+
+/// Sorts one reading into values, holes and troubles.
+void add(const device::Reading& reading, const Target& target, Secrets secrets,
+         ToolSnapshot& taken) {
+  const bool is_secret = reading.parameter.secrecy == catalogue::Secrecy::secret;
+  if (is_secret && secrets == Secrets::leave_out) {
+    taken.snapshot.missing.push_back({reading.parameter, Missing::left_out});
+    return;
+  }
+  if (reading.value) {
+    taken.snapshot.entries.push_back({.parameter = reading.parameter,
+                                      .raw = *reading.registers,
+                                      .value = *reading.value,
+                                      .unit = unit_of(reading.parameter, target),
+                                      .minimum = number_of(reading.minimum),
+                                      .maximum = number_of(reading.maximum)});
+    return;
+  }
+  const bool absent = is_absent(reading.value.error());
+  if (!absent) taken.unreadable.push_back(reading.value.error());
+  taken.snapshot.missing.push_back(
+      {reading.parameter, absent ? Missing::absent : Missing::unreadable});
+}
+
+}  // namespace
+
+Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Context& context,
+                                   const link::Progress& progress) {
+  const catalogue::Profile& profile = tool.device.profile();
+  const auto stored = catalogue::stored_parameters(profile);
+  const auto readings = tool.device.read_each(stored, device::Limits::read, progress);
+  if (!readings) return tl::unexpected(readings.error());
+  ToolSnapshot taken{.snapshot = {.time = report::to_text(context.clock.wall()),
+                                  .version = std::string(context.version),
+                                  .target = tool.target.shown,
+                                  .profile = profile.id,
+                                  .fingerprint = catalogue::fingerprint(stored),
+                                  .identity = identity_of(tool.device)}};
+  taken.snapshot.entries.reserve(readings->size());
+  for (const device::Reading& reading : *readings) add(reading, tool.target, secrets, taken);
+  return taken;
+}
+
+Result<files::BackupFile> read_backup_file(const std::string& path, const Context& context) {
+  auto text = context.disk.read(path);
+  if (!text) return tl::unexpected(std::move(text.error()));
+  return files::read_backup(*text, path);
+}
+
+std::string file_name_of(const std::string& target) {
+  constexpr std::string_view scheme_end = "://";
+  const std::size_t scheme = target.find(scheme_end);
+  std::string name =
+      scheme == std::string::npos ? target : target.substr(scheme + scheme_end.size());
+  const auto is_harmless = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '-' || c == '_';
+  };
+  std::replace_if(
+      name.begin(), name.end(), [&](char c) { return !is_harmless(c); }, '_');
+  name = name.substr(0, longest_name);
+  if (name.empty() || name.front() == '.' || name.front() == '-') name.insert(0, 1, '_');
+  return name;
+}
+
+}  // namespace spindle::commands

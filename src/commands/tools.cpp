@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+#include "findings.hpp"
+#include "listing.hpp"
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "spindle/link/endpoint.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using report::Column;
+using report::Record;
+
+const std::array<Column, 6> tool_columns = {{{"NAME", "name"},
+                                             {"URL", "endpoint"},
+                                             {"PROFILE", "profile"},
+                                             {"TORQUE UNIT", "torque_unit"},
+                                             {"GROUPS", "groups"},
+                                             {"VERIFIED", "verified"}}};
+
+std::vector<std::string> groups_of(const files::Tool& tool, const files::Tools& tools) {
+  std::vector<std::string> groups;
+  for (const auto& [group, members] : tools.groups) {
+    const bool is_member = std::find(members.begin(), members.end(), tool.name) != members.end();
+    if (is_member) groups.push_back(group);
+  }
+  return groups;
+}
+
+Record tool_record(const files::Tool& tool, const files::Tools& tools, const Clock& clock) {
+  return {.type = "tool",
+          .target = tool.name,
+          .time = clock.wall(),
+          .fields = {{"name", tool.name},
+                     {"endpoint", tool.url},
+                     {"profile", text_or_null(tool.profile)},
+                     {"torque_unit", text_or_null(tool.torque_unit)},
+                     {"groups", groups_of(tool, tools)},
+                     {"verified", tool.verified}}};
+}
+
+/// Collects what the file's own rules can not see: whether URLs, profiles and actions exist.
+class ToolsCheck {
+ public:
+  ToolsCheck(files::CheckedTools checked, const Context& context)
+      : checked_(std::move(checked)), context_(&context) {}
+
+  std::vector<files::Finding> run() {
+    for (const files::Tool& tool : checked_.tools.tools) check(tool);
+    auto findings = std::move(checked_.findings);
+    std::stable_sort(findings.begin(), findings.end(), [](const auto& a, const auto& b) {
+      return std::tie(a.line, a.column) < std::tie(b.line, b.column);
+    });
+    return findings;
+  }
+
+ private:
+  void check(const files::Tool& tool) {
+    if (tool.url_at.line > 0) {
+      const auto endpoint = link::parse_endpoint(tool.url);
+      if (!endpoint) add(tool.url_at, endpoint.error());
+    }
+    if (tool.profile.empty()) return;
+    const auto profile = context_->profiles.load(tool.profile);
+    if (!profile) return add(tool.profile_at, profile.error());
+    for (const std::string& action : tool.verified) {
+      const auto known = profile->find_action(action);
+      if (!known) add(tool.verified_at, known.error());
+    }
+  }
+
+  void add(const files::Place& place, const Error& error) {
+    checked_.findings.push_back({.file = checked_.tools.path,
+                                 .line = place.line,
+                                 .column = place.column,
+                                 .message = describe(error)});
+  }
+
+  files::CheckedTools checked_;
+  const Context* context_;
+};
+
+}  // namespace
+
+Result<Outcome> tools(Context& context) {
+  Outcome outcome;
+  outcome.succeed();
+  if (context.tools.path.empty()) {
+    context.renderer.note("no tools file was found; 'man 5 spindle-tools' says where it may be");
+  }
+  Listing listing(context, tool_columns);
+  for (const files::Tool& tool : context.tools.tools) {
+    listing.add(tool_record(tool, context.tools, context.clock));
+  }
+  return finish(listing, outcome);
+}
+
+Result<Outcome> check_tools(Context& context) {
+  const std::string& path = context.tools.path;
+  if (path.empty()) {
+    return tl::unexpected(
+        Error{.code = Errc::bad_file,
+              .message = "no tools file was found",
+              .hint = "name one with --tools; 'man 5 spindle-tools' says where it is looked for"});
+  }
+  auto checked = files::check_tools(path);
+  if (!checked) return tl::unexpected(std::move(checked.error()));
+  return tell_findings(ToolsCheck(std::move(*checked), context).run(), path, "tools file", context);
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,474 @@
+#include "spindle/files/backup_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "files/yaml_map.hpp"
+#include "files/yaml_reader.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::files {
+namespace {
+
+using catalogue::Missing;
+using catalogue::MissingEntry;
+using catalogue::Parameter;
+using catalogue::Profile;
+using catalogue::Snapshot;
+using catalogue::SnapshotEntry;
+using catalogue::SnapshotIdentity;
+using catalogue::Value;
+
+/// The only format there is; a later one gets a number of its own.
+constexpr std::string_view known_format = "1";
+constexpr std::string_view kind = "spindle-backup";
+constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
+/// The longest value that any encoding has.
+constexpr std::size_t most_words = 2;
+
+constexpr std::array<std::pair<std::string_view, modbus::RegisterTable>, 2> table_words = {
+    {{"holding", modbus::RegisterTable::holding}, {"input", modbus::RegisterTable::input}}};
+constexpr std::array<std::pair<std::string_view, Missing>, 3> missing_words = {
+    {{"absent", Missing::absent},
+     {"unreadable", Missing::unreadable},
+     {"left-out", Missing::left_out}}};
+
+// ---- writing ----
+
+bool is_plain(std::string_view text) {
+  const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
+  const auto is_plain_character = [&](char c) {
+    return is_letter(c) || (c >= '0' && c <= '9') || c == '.' || c == '-';
+  };
+  constexpr std::array<std::string_view, 8> other_meaning = {"y",  "n",   "yes",  "no",
+                                                             "on", "off", "true", "null"};
+  return !text.empty() && is_letter(text.front()) && text != "false" &&
+         std::all_of(text.begin(), text.end(), is_plain_character) &&
+         std::find(other_meaning.begin(), other_meaning.end(), text) == other_meaning.end();
+}
+
+/// Quoted where another reader of YAML might take it for something else.
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const bool is_control = static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+    if (is_control) {
+      fmt::format_to(std::back_inserter(out), "\\x{:02x}", static_cast<unsigned char>(c));
+      continue;
+    }
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
+std::string word(std::string_view text) {
+  return is_plain(text) ? std::string(text) : quoted(text);
+}
+
+std::string to_text(const Registers& raw) {
+  if (raw.size() == 1) return std::to_string(raw.front());
+  return fmt::format("[{}]", fmt::join(raw, ", "));
+}
+
+/// Where a parameter is; the usual table needs no word.
+std::string place_of(const Parameter& parameter) {
+  std::string text =
+      fmt::format("name: {}, register: {}", word(parameter.name), parameter.address.value);
+  if (parameter.table != modbus::RegisterTable::holding) {
+    text += fmt::format(", table: {}", catalogue::to_text(parameter.table));
+  }
+  return text;
+}
+
+std::string line_of(const SnapshotEntry& entry) {
+  std::string line = fmt::format(
+      "  - {{{}, raw: {}, value: {}", place_of(entry.parameter), to_text(entry.raw),
+      entry.value.label.empty() ? entry.value.number.to_string() : quoted(entry.value.label));
+  if (!entry.unit.empty()) line += fmt::format(", unit: {}", word(entry.unit));
+  if (entry.minimum) line += fmt::format(", minimum: {}", entry.minimum->to_string());
+  if (entry.maximum) line += fmt::format(", maximum: {}", entry.maximum->to_string());
+  return line + "}\n";
+}
+
+std::string line_of(const SnapshotIdentity& identity) {
+  std::string line = "identity: {";
+  if (!identity.model.empty()) line += fmt::format("model: {}, ", quoted(identity.model));
+  if (identity.model_code) line += fmt::format("model-code: {}, ", *identity.model_code);
+  if (!identity.serial.empty()) line += fmt::format("serial: {}, ", quoted(identity.serial));
+  if (identity.firmware) line += fmt::format("firmware: {}, ", *identity.firmware);
+  return line + fmt::format("raw: {}}}\n", quoted(to_hex(identity.raw)));
+}
+
+std::string lines_of_missing(const Snapshot& snapshot) {
+  if (snapshot.missing.empty()) return {};
+  std::string lines = "missing:\n";
+  for (const MissingEntry& entry : snapshot.missing) {
+    const auto* const why = std::find_if(missing_words.begin(), missing_words.end(),
+                                         [&](const auto& row) { return row.second == entry.why; });
+    lines += fmt::format("  - {{{}, why: {}}}\n", place_of(entry.parameter), why->first);
+  }
+  return lines;
+}
+
+// ---- reading the form ----
+
+Place place_of(const YamlNode& node) { return {node.at.line, node.at.column}; }
+
+std::optional<Registers> read_raw(const YamlNode& node, Findings& findings) {
+  Registers raw;
+  const auto add = [&](const YamlNode& item) {
+    const auto number = to_unsigned(item, last_register, findings);
+    if (number) raw.push_back(static_cast<std::uint16_t>(*number));
+    return number.has_value();
+  };
+  if (node.kind == YamlNode::Kind::scalar) return add(node) ? std::optional(raw) : std::nullopt;
+  if (!expect(node, YamlNode::Kind::sequence, findings)) return std::nullopt;
+  if (node.items.empty() || node.items.size() > most_words) {
+    findings.add(node.at, fmt::format("a value has one or {} registers", most_words));
+    return std::nullopt;
+  }
+  return std::all_of(node.items.begin(), node.items.end(), add) ? std::optional(raw) : std::nullopt;
+}
+
+BackupLine read_place(YamlMap& map) {
+  BackupLine line;
+  line.at = place_of(map.node());
+  line.value_at = line.at;
+  assign(line.name, map.text("name", Need::required));
+  assign(line.address, map.number<std::uint16_t>("register", Need::required));
+  assign(line.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  return line;
+}
+
+void read_entry(const YamlNode& node, BackupFile& file, Findings& findings) {
+  YamlMap map(node, findings);
+  BackupLine line = read_place(map);
+  const YamlNode* raw = map.get("raw");
+  const YamlNode* value = map.get("value");
+  if (raw != nullptr) {
+    line.raw = read_raw(*raw, findings);
+    line.value_at = place_of(*raw);
+  }
+  if (value != nullptr) {
+    line.value = to_text(*value, findings);
+    line.value_at = place_of(*value);
+  }
+  if (raw == nullptr && value == nullptr && node.kind == YamlNode::Kind::map) {
+    findings.add(node.at, "neither 'value' nor 'raw' is given");
+  }
+  assign(line.unit, map.text("unit"));
+  line.minimum = map.decimal("minimum");
+  line.maximum = map.decimal("maximum");
+  map.finish();
+  file.lines.push_back(std::move(line));
+}
+
+void read_missing(const YamlNode& node, BackupFile& file, Findings& findings) {
+  YamlMap map(node, findings);
+  BackupLine line = read_place(map);
+  line.missing = map.word<Missing>("why", "reason", missing_words, Need::required);
+  map.finish();
+  file.lines.push_back(std::move(line));
+}
+
+/// Reads a list line by line; returns how many lines it has.
+template <typename Read>
+std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Findings& findings) {
+  if (list == nullptr || list->kind == YamlNode::Kind::nothing) return 0;
+  if (!expect(*list, YamlNode::Kind::sequence, findings)) return 0;
+  for (const YamlNode& node : list->items) read(node, file, findings);
+  return list->items.size();
+}
+
+/// Bytes in hexadecimal digits, separated by blanks.
+Bytes read_hex(const YamlNode& node, Findings& findings) {
+  constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
+  Bytes bytes;
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
+  for (const std::string_view pair : split(node.text, ' ')) {
+    if (pair.empty()) continue;
+    const auto byte =
+        pair.size() == 2 ? parse_unsigned(fmt::format("0x{}", pair), last_byte) : std::nullopt;
+    if (!byte) {
+      findings.add(node.at, fmt::format("'{}' is not a byte of two hexadecimal digits", pair));
+      return {};
+    }
+    bytes.push_back(static_cast<std::uint8_t>(*byte));
+  }
+  return bytes;
+}
+
+SnapshotIdentity read_identity(const YamlNode& node, Findings& findings) {
+  YamlMap map(node, findings);
+  SnapshotIdentity identity;
+  assign(identity.model, map.text("model"));
+  identity.model_code = map.number<std::uint16_t>("model-code");
+  assign(identity.serial, map.text("serial"));
+  identity.firmware = map.number<std::uint16_t>("firmware");
+  if (const YamlNode* raw = map.get("raw")) identity.raw = read_hex(*raw, findings);
+  map.finish();
+  return identity;
+}
+
+void read_profile_facts(const YamlNode& node, Snapshot& head, Findings& findings) {
+  YamlMap map(node, findings);
+  assign(head.profile, map.text("id", Need::required));
+  assign(head.fingerprint, map.text("fingerprint", Need::required));
+  map.finish();
+}
+
+bool has_form(const YamlNode& document, Findings& findings) {
+  if (!expect(document, YamlNode::Kind::map, findings)) return false;
+  const YamlNode* named = document.find("kind");
+  if (named == nullptr || named->text != kind) {
+    findings.add(named == nullptr ? document.at : named->at,
+                 fmt::format("this is no backup: it does not say 'kind: {}'", kind));
+    return false;
+  }
+  const YamlNode* format = document.find("format");
+  if (format != nullptr && format->text == known_format) return true;
+  findings.add(format == nullptr ? document.at : format->at,
+               fmt::format("this version reads backups of format {}", known_format));
+  return false;
+}
+
+void read_head(YamlMap& map, Snapshot& head) {
+  map.allow("format");
+  map.allow("kind");
+  assign(head.time, map.text("time", Need::required));
+  assign(head.version, map.text("spindle", Need::required));
+  assign(head.target, map.text("target", Need::required));
+  if (const YamlNode* node = map.get("profile", Need::required)) {
+    read_profile_facts(*node, head, map.findings());
+  }
+  if (const YamlNode* node = map.get("identity")) {
+    head.identity = read_identity(*node, map.findings());
+  }
+}
+
+void check_count(YamlMap& end, std::string_view key, std::size_t lines) {
+  const auto count = end.number<std::uint32_t>(key, Need::required);
+  if (!count || *count == lines) return;
+  end.findings().add(
+      end.get(key)->at,
+      fmt::format("{} lines of '{}' were written, but {} are there", *count, key, lines));
+}
+
+Position end_of(std::string_view text, std::size_t file) {
+  const auto lines = std::count(text.begin(), text.end(), '\n');
+  return {file, static_cast<int>(lines) + 1, 1};
+}
+
+void read_document(const YamlNode& document, std::string_view text, BackupFile& file,
+                   Findings& findings) {
+  if (!has_form(document, findings)) return;
+  if (document.find("end") == nullptr) {
+    findings.add(end_of(text, document.at.file), "the end marker is missing: the file is cut off");
+    return;
+  }
+  YamlMap map(document, findings);
+  read_head(map, file.head);
+  const YamlNode* parameters = map.get("parameters", Need::required);
+  const YamlNode* missing = map.get("missing");
+  const YamlNode* end = map.get("end", Need::required);
+  map.finish();
+  const std::size_t values = read_lines(parameters, read_entry, file, findings);
+  const std::size_t others = read_lines(missing, read_missing, file, findings);
+  YamlMap counts(*end, findings);
+  check_count(counts, "parameters", values);
+  check_count(counts, "missing", others);
+  counts.finish();
+}
+
+// ---- reading the meaning ----
+
+/// What a stored parameter's registers are called in a profile.
+class Names {
+ public:
+  explicit Names(const Profile& profile)
+      : profile_(&profile), stored_(catalogue::stored_parameters(profile)) {
+    for (const Parameter& parameter : stored_) {
+      by_name_.emplace(parameter.name, &parameter);
+      by_register_.emplace(std::pair(parameter.table, parameter.address.value), &parameter);
+    }
+  }
+
+  /// The stored parameter that a line means; a finding where there is none.
+  const Parameter* find(const BackupLine& line, const Position& at, Findings& findings) const {
+    if (const auto named = by_name_.find(line.name); named != by_name_.end()) {
+      return at_its_register(*named->second, line, at, findings) ? named->second : nullptr;
+    }
+    const auto meant = profile_->find(line.name);
+    if (!meant || line.name.starts_with('@')) {
+      const std::string hint = meant ? std::string() : hint_of(meant.error());
+      findings.add(at, fmt::format("'{}' is no stored parameter of profile {}{}{}", line.name,
+                                   profile_->id, hint.empty() ? "" : "; ", hint));
+      return nullptr;
+    }
+    if (!at_its_register(*meant, line, at, findings)) return nullptr;
+    // Another version of the profile has a name for what was a number, or the other way round.
+    const auto same = by_register_.find(std::pair(meant->table, meant->address.value));
+    const bool alike =
+        same != by_register_.end() && same->second->encoding.kind == meant->encoding.kind;
+    if (alike) return same->second;
+    findings.add(at, fmt::format("'{}' is part of another parameter in profile {}", line.name,
+                                 profile_->id));
+    return nullptr;
+  }
+
+  /// The parameter under the line's own name, whose scale its value was written with.
+  [[nodiscard]] Parameter as_written(const BackupLine& line, const Parameter& stored) const {
+    return profile_->find(line.name).value_or(stored);
+  }
+
+ private:
+  bool at_its_register(const Parameter& parameter, const BackupLine& line, const Position& at,
+                       Findings& findings) const {
+    if (parameter.address.value == line.address && parameter.table == line.table) return true;
+    findings.add(at, fmt::format("'{}' is register {} ({}) in profile {}, not {} ({})", line.name,
+                                 parameter.address.value, catalogue::to_text(parameter.table),
+                                 profile_->id, line.address, catalogue::to_text(line.table)));
+    return false;
+  }
+
+  const Profile* profile_;
+  std::vector<Parameter> stored_;
+  std::map<std::string_view, const Parameter*> by_name_ = {};
+  std::map<std::pair<modbus::RegisterTable, std::uint16_t>, const Parameter*> by_register_ = {};
+};
+
+/// Whether a text says this value: its label in any case, or the same number.
+bool says(std::string_view text, const Value& value, const Parameter& parameter) {
+  if (!value.label.empty() && text == value.label) return true;
+  if (const auto number = Decimal::parse(text)) return *number == value.number;
+  const auto parsed = catalogue::parse_value(parameter, text);
+  return parsed && *parsed == value;
+}
+
+/// The registers that a line stands for; a finding where it is not clear.
+std::optional<Registers> registers_of(const BackupLine& line, const Parameter& parameter,
+                                      const Position& at, Findings& findings) {
+  if (!line.raw) {
+    auto registers =
+        catalogue::parse_value(parameter, *line.value).and_then([&](const Value& value) {
+          return catalogue::encode(parameter, value.number);
+        });
+    if (registers) return *std::move(registers);
+    const std::string hint = hint_of(registers.error());
+    findings.add(at, fmt::format("{}: {}{}{}", line.name, message_of(registers.error()),
+                                 hint.empty() ? "" : "; ", hint));
+    return std::nullopt;
+  }
+  const auto value = catalogue::decode(parameter, *line.raw);
+  if (!value) {
+    findings.add(at, fmt::format("{}: {} registers, but {} has {}", line.name, line.raw->size(),
+                                 catalogue::to_text(parameter.encoding.kind),
+                                 catalogue::register_count(parameter.encoding.kind)));
+    return std::nullopt;
+  }
+  if (line.value && !says(*line.value, *value, parameter)) {
+    findings.add(at, fmt::format("{}: value '{}' and raw {} ({}) say different things; leave out "
+                                 "the one that is wrong",
+                                 line.name, *line.value, to_text(*line.raw), value->to_string()));
+    return std::nullopt;
+  }
+  return line.raw;
+}
+
+class Understanding {
+ public:
+  Understanding(const BackupFile& file, const Profile& profile)
+      : names_(profile), file_(findings_.add_file(file.path)), snapshot_(file.head) {}
+
+  Result<Snapshot> run(const std::vector<BackupLine>& lines) {
+    for (const BackupLine& line : lines) take(line);
+    if (!findings_.empty()) return tl::unexpected(findings_.error());
+    return std::move(snapshot_);
+  }
+
+ private:
+  [[nodiscard]] Position at(const Place& place) const { return {file_, place.line, place.column}; }
+
+  void take(const BackupLine& line) {
+    const Parameter* parameter = names_.find(line, at(line.at), findings_);
+    if (parameter == nullptr) return;
+    if (!seen_.insert(parameter->name).second) {
+      findings_.add(at(line.at), fmt::format("register {} is here twice", line.address));
+      return;
+    }
+    if (line.missing) {
+      snapshot_.missing.push_back({*parameter, *line.missing});
+      return;
+    }
+    auto raw =
+        registers_of(line, names_.as_written(line, *parameter), at(line.value_at), findings_);
+    if (!raw) return;
+    auto value = catalogue::decode(*parameter, *raw);
+    if (!value) return;  // it has as many registers under both names
+    snapshot_.entries.push_back({.parameter = *parameter,
+                                 .raw = std::move(*raw),
+                                 .value = std::move(*value),
+                                 .unit = line.unit,
+                                 .minimum = line.minimum,
+                                 .maximum = line.maximum});
+  }
+
+  Names names_;
+  Findings findings_ = {};
+  std::size_t file_;
+  Snapshot snapshot_;
+  std::set<std::string> seen_ = {};
+};
+
+}  // namespace
+
+std::string render_backup(const Snapshot& snapshot) {
+  std::string text =
+      "# A backup of one tool, one parameter a line. A value may be edited: change 'value' and\n"
+      "# leave out 'raw', or change both. 'spindle diff' compares it, 'spindle restore' writes "
+      "it.\n";
+  text += fmt::format("format: {}\nkind: {}\n", known_format, kind);
+  text += fmt::format("time: {}\n", quoted(snapshot.time));
+  text += fmt::format("spindle: {}\n", quoted(snapshot.version));
+  text += fmt::format("target: {}\n", quoted(snapshot.target));
+  text += fmt::format("profile: {{id: {}, fingerprint: {}}}\n", word(snapshot.profile),
+                      quoted(snapshot.fingerprint));
+  if (snapshot.identity) text += line_of(*snapshot.identity);
+  text += snapshot.entries.empty() ? "parameters: []\n" : "parameters:\n";
+  for (const SnapshotEntry& entry : snapshot.entries) text += line_of(entry);
+  text += lines_of_missing(snapshot);
+  text += fmt::format("end: {{parameters: {}, missing: {}}}\n", snapshot.entries.size(),
+                      snapshot.missing.size());
+  return text;
+}
+
+Result<BackupFile> read_backup(std::string_view text, const std::string& path) {
+  Findings findings;
+  const std::size_t number = findings.add_file(path);
+  BackupFile file{.path = path};
+  const std::vector<YamlNode> documents = parse_yaml(text, number, Documents::all, findings);
+  if (!findings.empty()) return tl::unexpected(findings.error());
+  if (documents.empty()) {
+    findings.add({number, 1, 1}, "the file is empty");
+  } else if (documents.size() > 1) {
+    findings.add(documents[1].at, "a second document has no meaning here");
+  } else {
+    read_document(documents.front(), text, file, findings);
+  }
+  if (!findings.empty()) return tl::unexpected(findings.error());
+  return file;
+}
+
+Result<Snapshot> understand_backup(const BackupFile& file, const Profile& profile) {
+  return Understanding(file, profile).run(file.lines);
+}
+
+}  // namespace spindle::files

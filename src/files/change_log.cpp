@@ -1,0 +1,41 @@
+#include "spindle/files/change_log.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace spindle::files {
+namespace {
+
+constexpr std::string_view null = "null";
+
+/// Ill-formed text must not keep a change from being recorded.
+std::string quoted(const std::string& text) {
+  constexpr int compact = -1;
+  constexpr char no_indentation = ' ';
+  return nlohmann::json(text).dump(compact, no_indentation, false,
+                                   nlohmann::json::error_handler_t::replace);
+}
+
+std::string text_or_null(const std::string& text) {
+  return text.empty() ? std::string(null) : quoted(text);
+}
+
+std::string number_or_null(const std::optional<Decimal>& number) {
+  return number ? number->to_string() : std::string(null);
+}
+
+}  // namespace
+
+std::string render_change(const Change& change) {
+  return fmt::format(
+      "{{\"schema\":\"spindle/1\",\"type\":\"changed\",\"time\":{},\"user\":{},\"command\":{},"
+      "\"target\":{},\"serial\":{},\"name\":{},\"register\":{},\"old\":{},\"new\":{},"
+      "\"result\":{}}}\n",
+      quoted(change.time), quoted(change.user), quoted(change.command), quoted(change.target),
+      text_or_null(change.serial), quoted(change.name),
+      change.register_address ? std::to_string(*change.register_address) : std::string(null),
+      number_or_null(change.old_value), number_or_null(change.new_value), quoted(change.result));
+}
+
+}  // namespace spindle::files

@@ -1,0 +1,223 @@
+#include "spindle/posix/disk.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "posix/descriptor.hpp"
+#include "spindle/posix/world.hpp"
+
+namespace spindle::posix {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Far above any backup (a hundred kilobytes); keeps a wrong path from filling memory.
+constexpr std::size_t largest_file = std::size_t{1} << 20;
+constexpr std::size_t read_step = 16384;
+constexpr mode_t private_folder = 0700;
+constexpr mode_t usual_folder = 0777;
+constexpr mode_t usual_file = 0666;  // less what the user masks
+/// Names of temporary files that may be taken by what a killed program left.
+constexpr unsigned most_attempts = 100;
+
+Error failed(const std::string& path, std::string_view what, int code) {
+  return {.code = Errc::bad_file,
+          .message = fmt::format("{}: {}", what, std::generic_category().message(code)),
+          .name = path};
+}
+
+Error exists_already(const std::string& path) {
+  return {.code = Errc::usage,
+          .message = "this file exists already",
+          .hint = "choose another name, or add --force to replace it",
+          .name = path};
+}
+
+Error not_a_file(const std::string& path) {
+  return {.code = Errc::bad_file, .message = "this is no ordinary file", .name = path};
+}
+
+/// 0, or the errno of the write that failed.
+int write_all(int descriptor, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written >= 0) {
+      text.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno != EINTR) {
+      return errno;
+    }
+  }
+  return 0;
+}
+
+Result<std::string> read_file(const std::string& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file.valid()) {
+    return tl::unexpected(
+        errno == ENOENT ? Error{.code = Errc::bad_file, .message = "no such file", .name = path}
+                        : failed(path, "cannot be read", errno));
+  }
+  struct stat about = {};
+  if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) {
+    return tl::unexpected(not_a_file(path));
+  }
+  std::string text;
+  std::array<char, read_step> step{};
+  while (text.size() <= largest_file) {
+    const ssize_t got = ::read(file.number(), step.data(), step.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return tl::unexpected(failed(path, "cannot be read", errno));
+    if (got == 0) return text;
+    text.append(step.data(), static_cast<std::size_t>(got));
+  }
+  return tl::unexpected(
+      Error{.code = Errc::bad_file,
+            .message = fmt::format("{}:1:1: larger than {} bytes; this is no file of spindle's",
+                                   path, largest_file)});
+}
+
+/// A file that is removed unless it gets its name.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const fs::path& beside) {
+    for (unsigned attempt = 0; attempt < most_attempts && !exists_; ++attempt) {
+      const std::string name =
+          fmt::format(".{}.{}-{}.tmp", beside.filename().string(), ::gettid(), attempt);
+      path_ = (beside.parent_path() / name).string();
+      file_ =
+          Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, usual_file));
+      exists_ = file_.valid();
+      if (!exists_ && errno != EEXIST) return;
+    }
+  }
+  ~TemporaryFile() {
+    if (exists_) ::unlink(path_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  [[nodiscard]] bool exists() const { return exists_; }
+
+  /// 0 when the text has reached the disk, else the errno.
+  [[nodiscard]] int store(std::string_view text) const {
+    if (const int code = write_all(file_.number(), text); code != 0) return code;
+    return ::fsync(file_.number()) == 0 ? 0 : errno;
+  }
+
+  /// Takes over the rights of the file that will be replaced, where there is one.
+  void look_like(const fs::path& other) const {
+    struct stat about = {};
+    if (::stat(other.c_str(), &about) != 0) return;
+    // Rights that can not be kept are no reason to fail.
+    static_cast<void>(::fchmod(file_.number(), about.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO)));
+  }
+
+  /// 0 when it is the file of this name now, else the errno: EEXIST where one must not be replaced.
+  int rename_to(const std::string& path, Overwrite overwrite) {
+    const int renamed = overwrite == Overwrite::allow ? ::rename(path_.c_str(), path.c_str())
+                                                      : rename_to_free(path);
+    if (renamed != 0) return errno;
+    exists_ = false;
+    return 0;
+  }
+
+ private:
+  /// Some file systems can not rename like this, others have no hard links.
+  int rename_to_free(const std::string& path) {
+    const int renamed =
+        ::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE);
+    if (renamed == 0 || (errno != EINVAL && errno != ENOSYS)) return renamed;
+    const int linked = ::link(path_.c_str(), path.c_str());
+    if (linked == 0) ::unlink(path_.c_str());
+    return linked;
+  }
+
+  std::string path_ = {};
+  Descriptor file_ = Descriptor();
+  bool exists_ = false;
+};
+
+void sync_folder(const fs::path& folder) {
+  const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  // The file is in place; what a file system can not do for its folder is no reason to fail.
+  if (opened.valid()) ::fsync(opened.number());
+}
+
+Result<void> write_file(const std::string& named, std::string_view text, Overwrite overwrite) {
+  std::error_code unknown;
+  const fs::file_status status = fs::status(named, unknown);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    return tl::unexpected(not_a_file(named));
+  }
+  if (fs::exists(status) && overwrite == Overwrite::refuse) {
+    return tl::unexpected(exists_already(named));
+  }
+  // A link stays a link; what it leads to is replaced.
+  fs::path path = fs::exists(status) ? fs::canonical(named, unknown) : fs::absolute(named, unknown);
+  if (path.empty()) path = named;
+  TemporaryFile temporary(path);
+  if (!temporary.exists()) return tl::unexpected(failed(named, "cannot be written", errno));
+  temporary.look_like(path);
+  int code = temporary.store(text);
+  if (code == 0) code = temporary.rename_to(path.string(), overwrite);
+  if (code == EEXIST) return tl::unexpected(exists_already(named));
+  if (code != 0) return tl::unexpected(failed(named, "cannot be written", code));
+  sync_folder(path.parent_path());
+  return {};
+}
+
+Result<void> append_line(const std::string& path, std::string_view line) {
+  const Descriptor file(
+      ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, usual_file));
+  if (!file.valid()) return tl::unexpected(failed(path, "cannot be written", errno));
+  const ssize_t written = ::write(file.number(), line.data(), line.size());
+  if (written == static_cast<ssize_t>(line.size())) return {};
+  return tl::unexpected(failed(path, "cannot be written", written < 0 ? errno : ENOSPC));
+}
+
+Result<void> make_folders(const std::string& folder, Privacy privacy) {
+  const mode_t mode = privacy == Privacy::own ? private_folder : usual_folder;
+  const fs::path path(folder);
+  fs::path made;
+  for (const fs::path& part : path) {
+    made /= part;
+    if (::mkdir(made.c_str(), mode) == 0 || errno == EEXIST) continue;
+    if (fs::is_directory(made)) continue;
+    return tl::unexpected(failed(folder, "the folder cannot be made", errno));
+  }
+  std::error_code unknown;
+  if (fs::is_directory(path, unknown)) return {};
+  return tl::unexpected(failed(folder, "the folder cannot be made", ENOTDIR));
+}
+
+bool file_exists(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
+std::string user_name() {
+  const passwd* entry = ::getpwuid(::geteuid());
+  return entry == nullptr ? std::to_string(::geteuid()) : std::string(entry->pw_name);
+}
+
+}  // namespace
+
+Disk local_disk() {
+  return {.exists = file_exists,
+          .read = read_file,
+          .write = write_file,
+          .append = append_line,
+          .make_folders = make_folders,
+          .user = user_name};
+}
+
+}  // namespace spindle::posix

@@ -1,0 +1,87 @@
+#include "posix/port_holder.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+namespace spindle::posix {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string first_line(const fs::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  return line;
+}
+
+std::string program(long process) {
+  if (process == ::getpid()) return "this program itself";
+  const std::string name = first_line(fmt::format("/proc/{}/comm", process));
+  return name.empty() ? fmt::format("process {}", process)
+                      : fmt::format("{} (process {})", name, process);
+}
+
+/// The process that has flocked the file behind the descriptor. A line of /proc/locks:
+/// "1: FLOCK  ADVISORY  WRITE 4711 00:18:5 0 EOF".
+std::optional<long> lock_holder(int descriptor) {
+  struct stat status = {};
+  if (::fstat(descriptor, &status) != 0) return std::nullopt;
+  const std::string wanted = fmt::format("{:02x}:{:02x}:{}", ::major(status.st_dev),
+                                         ::minor(status.st_dev), status.st_ino);
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    std::istringstream words(line);
+    std::string number;
+    std::string kind;
+    std::string manner;
+    std::string access;
+    long process = 0;
+    std::string file;
+    words >> number >> kind >> manner >> access >> process >> file;
+    if (kind == "FLOCK" && file == wanted && process > 0) return process;
+  }
+  return std::nullopt;
+}
+
+bool has_open(const fs::path& process, const fs::path& port) {
+  std::error_code failed;  // other users' processes show nothing
+  for (fs::directory_iterator file(process / "fd", failed), end; !failed && file != end;
+       file.increment(failed)) {
+    std::error_code unreadable;
+    if (fs::read_symlink(*file, unreadable) == port && !unreadable) return true;
+  }
+  return false;
+}
+
+std::optional<long> opener(const std::string& path) {
+  std::error_code failed;
+  const fs::path port = fs::canonical(path, failed);
+  for (fs::directory_iterator entry("/proc", failed), end; !failed && entry != end;
+       entry.increment(failed)) {
+    const std::string name = entry->path().filename();
+    long process = 0;
+    const auto [rest, error] = std::from_chars(name.data(), name.data() + name.size(), process);
+    const bool is_process = error == std::errc() && rest == name.data() + name.size();
+    if (is_process && process != ::getpid() && has_open(entry->path(), port)) return process;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string port_holder(const std::string& path, int descriptor) {
+  auto holder = descriptor < 0 ? std::nullopt : lock_holder(descriptor);
+  if (!holder) holder = opener(path);
+  return holder ? program(*holder) : std::string();
+}
+
+}  // namespace spindle::posix

@@ -1,0 +1,247 @@
+"""A serial line: the real binary and a bus of units on a pseudo terminal that is as strict about silence
+as a motor driver."""
+
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+
+import support
+
+PROGRAMS = pathlib.Path(os.environ.get("SPINDLE_PEER_PROGRAMS", support.ROOT / "build/dev/tests"))
+BANK = PROGRAMS / "spindle_peer_serial_bank"
+MIX = PROGRAMS / "spindle_peer_serial_mix"
+DRIVE = pathlib.Path(__file__).resolve().parent / "drive.yaml"
+
+BITS = 11  # start, eight data, parity, stop
+
+
+def tearDownModule():
+    support.remove_home()
+
+
+class Bus:
+    """Units on a pseudo terminal (or a port), with a log of all that went over the line."""
+
+    def __init__(self, *options, where="--pty"):
+        self._folder = tempfile.TemporaryDirectory(prefix="spindle-line-")
+        folder = pathlib.Path(self._folder.name)
+        self.path = folder / "line"
+        self._log = folder / "log"
+        place = ["--pty", str(self.path)] if where == "--pty" else [where]
+        self.process = subprocess.Popen(
+            [str(BANK), *place, "--log", str(self._log), *map(str, options)],
+            stdout=subprocess.PIPE, text=True)
+        self.url = self.process.stdout.readline().strip()
+        if not self.url:
+            raise RuntimeError(f"{BANK} does not say where it serves")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.finish()
+        self._folder.cleanup()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait(support.DEADLINE)
+
+    def finish(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait(support.DEADLINE)
+        self.process.stdout.close()
+
+    def heard(self):
+        """Once it has ended: (nanoseconds, '>' or '<', bytes) in order."""
+        found = re.findall(r"^(\d+) ([<>]) (.*)$", self._log.read_text(), re.MULTILINE)
+        return [(int(at), way, bytes.fromhex(text)) for at, way, text in found]
+
+    def bad_frames(self):
+        return int(re.search(r"^bad (\d+)$", self._log.read_text(), re.MULTILINE)[1])
+
+
+def run(*arguments):
+    return support.run(*arguments, "--profile", str(DRIVE), "--json")
+
+
+class DialogueTest(unittest.TestCase):
+    def test_values_on_a_terminal_and_behind_a_device_server(self):
+        for where in ("--pty", "--port"):
+            with self.subTest(where), Bus("--units", 2, where=where) as bus:
+                for unit in (1, 2):
+                    url = f"{bus.url}?unit={unit}"
+                    written = run("set", url, f"operation.3.speed={unit}00")
+                    self.assertEqual(written.status, 0, written)
+                for unit in (1, 2):
+                    finished = run("get", f"{bus.url}?unit={unit}", "operation.3.speed", "@holding:7")
+                    self.assertEqual(finished.status, 0, finished)
+                    self.assertEqual([r["value"] for r in finished.records("value")], [unit * 100, 7])
+
+    def test_scan_finds_who_is_there_in_time(self):
+        with Bus("--units", 1) as bus:
+            finished = run("scan", bus.url, "--timeout", "50ms")
+            self.assertEqual(finished.status, 0, finished)
+            self.assertEqual([(r["unit"], r["answered"]) for r in finished.records("unit")], [(1, "data")])
+            summary = finished.records("summary")[0]
+            self.assertEqual((summary["asked"], summary["found"]), (31, 1))
+            request = 8 * BITS / 9600
+            self.assertLess(finished.seconds, 31 * (request + 0.0055 + 0.050) + 0.1)
+            bus.finish()
+            loopbacks = [data[0] for _, way, data in bus.heard() if way == ">" and data[1] == 8]
+            self.assertEqual(loopbacks, list(range(1, 32)))
+            self.assertEqual(bus.bad_frames(), 0)
+
+    def test_scan_that_finds_nobody(self):
+        with Bus() as bus:
+            finished = run("scan", bus.url, "--units", "5-7", "--timeout", "20ms")
+            self.assertEqual(finished.status, 1, finished)
+            self.assertEqual(finished.records("summary")[0]["found"], 0)
+
+    def test_another_rate_is_no_answer_and_a_rate_without_name_an_error(self):
+        with Bus("--baud", 9600) as bus:
+            wrong = run("get", f"{bus.url}?unit=1&baud=19200", "@holding:7", "--timeout", "100ms", "--retries", "0")
+            self.assertEqual(wrong.status, 5, wrong)
+            nameless = run("get", f"{bus.url}?unit=1&baud=14400", "@holding:7")
+            self.assertEqual(nameless.status, 4, nameless)
+            self.assertIn("14400 baud", nameless.stderr)
+            right = run("get", f"{bus.url}?unit=1", "@holding:7")
+            self.assertEqual(right.status, 0, right)
+
+    def test_a_late_answer_is_never_the_next_value(self):
+        with Bus("--fault", "late=300ms@every:3") as bus:
+            for start in range(20, 32):
+                names = [f"@holding:{start + 40 * step}" for step in range(4)]
+                finished = run("get", f"{bus.url}?unit=1", *names, "--timeout", "200ms", "--retries", "2")
+                for record in finished.records("value"):
+                    self.assertEqual(record["value"], record["register"], finished)
+
+    def test_trouble_on_the_line_never_gives_a_wrong_value(self):
+        for fault in ("noise@every:2", "bad-crc@every:2", "foreign", "half@every:2", "split=3", "echo", "repeated",
+                      "garbage@every:2", "wrong-unit@every:2", "wrong-length@every:2", "lost@every:2"):
+            with self.subTest(fault), Bus("--baud", 115200, "--gap", 3500, "--fault", fault) as bus:
+                url = f"{bus.url}?unit=1&baud=115200"
+                finished = run("get", url, "@holding:7", "@holding:99", "--timeout", "100ms", "--retries", "3")
+                for record in finished.records("value"):
+                    self.assertEqual(record["value"], record["register"], finished)
+                self.assertIn(finished.status, (0, 5, 7), finished)
+                if "@" not in fault:
+                    self.assertEqual(finished.status, 0, finished)
+                if finished.status:
+                    self.assertEqual(len(finished.records("error")), 1, finished)
+
+
+class PortTest(unittest.TestCase):
+    def test_a_port_in_use_names_its_holder(self):
+        with Bus() as bus:
+            holder = support.Running("watch", f"{bus.url}?unit=1", "@holding:7", "--profile", str(DRIVE), "--json")
+            with holder:
+                support.wait_until(lambda: holder.line(), "the first record of watch")
+                second = run("ping", f"{bus.url}?unit=1", "-c", "1")
+                self.assertEqual(second.status, 4, second)
+                self.assertRegex(second.stderr, rf"in use by spindle \(process {holder.process.pid}\)")
+                holder.process.send_signal(signal.SIGINT)
+                self.assertEqual(holder.process.wait(support.DEADLINE), 130)
+            free = run("ping", f"{bus.url}?unit=1", "-c", "1")
+            self.assertEqual(free.status, 0, free)
+
+    def test_an_adapter_that_is_pulled_out(self):
+        with Bus("--fault", "close@2") as bus:
+            finished = run("ping", f"{bus.url}?unit=1&echo=false", "-c", "5", "--interval", "10ms")
+            self.assertEqual(finished.status, 9, finished)
+            self.assertIn("the serial port is gone", finished.stderr)
+            again = run("ping", f"{bus.url}?unit=1", "-c", "1")
+            self.assertEqual(again.status, 4, again)
+            self.assertIn("there is no", again.stderr)
+
+    def test_an_adapter_that_vanishes_while_an_answer_is_waited_for(self):
+        with Bus("--fault", "lost") as bus:
+            timer = threading.Timer(0.3, bus.kill)
+            timer.start()
+            finished = run("get", f"{bus.url}?unit=1", "@holding:7", "--timeout", "10s")
+            timer.join()
+            self.assertEqual(finished.status, 5, finished)
+            self.assertIn("the serial port is gone", finished.stderr)
+            self.assertLess(finished.seconds, 5)
+
+    def test_ctrl_c_ends_a_wait_at_once(self):
+        with Bus("--fault", "lost") as bus:
+            with support.Running("get", f"{bus.url}?unit=1", "@holding:7", "--profile", str(DRIVE), "--timeout",
+                                 "20s") as waiting:
+                time.sleep(0.3)
+                began = time.monotonic()
+                waiting.process.send_signal(signal.SIGINT)
+                self.assertEqual(waiting.process.wait(support.DEADLINE), 130)
+                self.assertLess(time.monotonic() - began, 2)
+
+    def test_a_killed_client_leaves_a_line_that_the_next_can_open(self):
+        with Bus() as bus:
+            for _ in range(3):
+                with support.Running("watch", f"{bus.url}?unit=1", "@holding:7", "--profile", str(DRIVE),
+                                     "--json") as killed:
+                    support.wait_until(lambda: killed.line(), "the first record of watch")
+                    killed.process.kill()
+                    killed.process.wait(support.DEADLINE)
+                finished = run("get", f"{bus.url}?unit=1", "@holding:7")
+                self.assertEqual(finished.status, 0, finished)
+
+    def test_units_of_one_line_take_turns(self):
+        with Bus("--units", 3) as bus:
+            tools = bus.path.parent / "tools.yaml"
+            names = "".join(f'  d{unit}: {{url: "{bus.url}?unit={unit}", profile: {DRIVE}}}\n' for unit in (1, 2, 3))
+            tools.write_text(f"tools:\n{names}groups:\n  all: [d1, d2, d3]\n", encoding="ascii")
+            finished = support.run("identify", "@all", "--tools", str(tools), "--json")
+            self.assertNotIn("in use", finished.stderr)
+            asked = {record["target"] for record in finished.records() if "target" in record}
+            self.assertEqual(asked, {"d1", "d2", "d3"}, finished)
+            bus.finish()
+            self.assertEqual(bus.bad_frames(), 0)
+
+
+class GapTest(unittest.TestCase):
+    """A thousand requests of every kind, judged by the log of a server that is deaf to short gaps."""
+
+    COUNT = 1000
+
+    def judge(self, baud, gap):
+        with Bus("--baud", baud, "--gap", round(gap * 1e6), "--delay", 1000) as bus:
+            mixed = subprocess.run(
+                [str(MIX), str(bus.path), str(baud), str(round(gap * 1e6)), str(self.COUNT)],
+                capture_output=True, text=True, timeout=200, check=False)
+            bus.finish()
+            self.assertEqual(mixed.stdout.strip(), f"{self.COUNT} answered", f"{baud} baud")
+            self.assertEqual(bus.bad_frames(), 0)
+            heard = bus.heard()
+        self.assertEqual(sum(way == ">" for _, way, _ in heard), self.COUNT)
+        gaps = [(at - before) / 1e9 for (before, _, _), (at, way, _) in zip(heard, heard[1:]) if way == ">"]
+        self.assertGreaterEqual(min(gaps), gap, f"{baud} baud")
+        # A busy machine lets either side sleep now and then; the slowest tenth is its doing.
+        usual = sorted(gaps)[:len(gaps) * 9 // 10]
+        self.assertLessEqual(sum(usual) / len(usual), gap + 0.001, f"{baud} baud")
+
+    def test_at_both_rates(self):
+        failures = []
+
+        def judge(*line):
+            try:
+                self.judge(*line)
+            except Exception as failure:  # told by the thread that waits
+                failures.append(failure)
+
+        lines = [threading.Thread(target=judge, args=line) for line in ((9600, 0.0055), (115200, 0.0035))]
+        for line in lines:
+            line.start()
+        for line in lines:
+            line.join()
+        if failures:
+            raise failures[0]
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "spindle/base/disk.hpp"
+
+namespace spindle::test {
+
+/// A disk in memory, which can be full.
+class MemoryDisk {
+ public:
+  /// What the program sees of it; the disk must outlive them.
+  Disk functions() {
+    return {.exists = [this](const std::string& path) { return files_.contains(plain(path)); },
+            .read = [this](const std::string& path) { return read(path); },
+            .write = [this](const std::string& path, std::string_view text,
+                            Overwrite overwrite) { return write(path, text, overwrite); },
+            .append = [this](const std::string& path, std::string_view line) -> Result<void> {
+          const std::lock_guard lock(mutex_);
+              if (full_) return tl::unexpected(no_room(path));
+              files_[plain(path)] += line;
+              return {};
+            },
+            .make_folders = [this](const std::string& folder, Privacy) -> Result<void> {
+              if (full_) return tl::unexpected(no_room(folder));
+              return {};
+            },
+            .user = [] { return std::string("anna"); }};
+  }
+
+  void put(const std::string& path, std::string text) { files_[plain(path)] = std::move(text); }
+  void fill() { full_ = true; }
+  void make_room() { full_ = false; }
+  [[nodiscard]] const std::map<std::string, std::string>& files() const { return files_; }
+  [[nodiscard]] std::string text(const std::string& path) const {
+    const auto found = files_.find(plain(path));
+    return found == files_.end() ? std::string() : found->second;
+  }
+
+ private:
+  static std::string plain(const std::string& path) {
+    return path.starts_with("./") ? path.substr(2) : path;
+  }
+  static Error no_room(const std::string& path) {
+    return {.code = Errc::bad_file,
+            .message = "cannot be written: No space left on device",
+            .name = path};
+  }
+  Result<std::string> read(const std::string& path) {
+    const auto found = files_.find(plain(path));
+    if (found != files_.end()) return found->second;
+    return tl::unexpected(Error{.code = Errc::bad_file, .message = "no such file", .name = path});
+  }
+  Result<void> write(const std::string& path, std::string_view text, Overwrite overwrite) {
+    const std::lock_guard lock(mutex_);
+    if (full_) return tl::unexpected(no_room(path));
+    if (overwrite == Overwrite::refuse && files_.contains(plain(path))) {
+      return tl::unexpected(Error{.code = Errc::usage, .message = "this file exists already"});
+    }
+    files_[plain(path)] = std::string(text);
+    return {};
+  }
+
+  std::map<std::string, std::string> files_ = {};
+  bool full_ = false;
+  std::mutex mutex_ = {};  // several tools are backed up side by side
+};
+
+}  // namespace spindle::test

@@ -1,0 +1,174 @@
+#include <doctest/doctest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "spindle/posix/disk.hpp"
+
+using namespace spindle;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder of its own, removed at the end.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "spindle-disk-XXXXXX").string();
+    REQUIRE(::mkdtemp(name.data()) != nullptr);
+    path_ = name;
+  }
+  ~Folder() { fs::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] std::size_t count() const {
+    std::size_t files = 0;
+    for (const auto& entry : fs::directory_iterator(path_)) files += entry.exists() ? 1U : 0U;
+    return files;
+  }
+
+ private:
+  fs::path path_;
+};
+
+std::string text_of(const std::string& path) { return posix::local_disk().read(path).value(); }
+
+unsigned rights_of(const std::string& path) {
+  return static_cast<unsigned>(fs::status(path).permissions()) & 0777U;
+}
+
+}  // namespace
+
+TEST_CASE("a text is written whole, and read again") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  const std::string path = folder / "a.yaml";
+  CHECK_FALSE(disk.exists(path));
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse));
+  CHECK(disk.exists(path));
+  CHECK(text_of(path) == "one\n");
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("a file is replaced only when that is allowed, and keeps its rights") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  const std::string path = folder / "a.yaml";
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse));
+  ::chmod(path.c_str(), 0640);
+  const auto refused = disk.write(path, "two\n", Overwrite::refuse);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::usage);
+  CHECK(text_of(path) == "one\n");
+  REQUIRE(disk.write(path, "two\n", Overwrite::allow));
+  CHECK(text_of(path) == "two\n");
+  CHECK(rights_of(path) == 0640U);
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("of several writers of one name exactly one wins") {
+  const Folder folder;
+  const std::string path = folder / "a.yaml";
+  std::vector<int> won(8, 0);
+  {
+    std::vector<std::jthread> writers;
+    for (std::size_t i = 0; i < won.size(); ++i) {
+      writers.emplace_back([&, i] {
+        const auto written = posix::local_disk().write(path, std::to_string(i), Overwrite::refuse);
+        won[i] = written ? 1 : 0;
+      });
+    }
+  }
+  std::size_t winners = 0;
+  for (std::size_t i = 0; i < won.size(); ++i) {
+    if (won[i] == 0) continue;
+    ++winners;
+    CHECK(text_of(path) == std::to_string(i));
+  }
+  CHECK(winners == 1);
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("what is no ordinary file is left alone") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  REQUIRE(disk.make_folders(folder / "sub", Privacy::usual));
+  for (const std::string& path : {std::string("/dev/null"), folder / "sub"}) {
+    const auto written = disk.write(path, "text", Overwrite::allow);
+    REQUIRE_FALSE(written);
+    CHECK(written.error().code == Errc::bad_file);
+  }
+  CHECK(fs::is_character_file("/dev/null"));
+  CHECK_FALSE(disk.write(folder / "none/a.yaml", "text", Overwrite::allow));
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("a link leads to the file that is replaced") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  REQUIRE(disk.write(folder / "real", "one", Overwrite::refuse));
+  fs::create_symlink("real", folder / "link");
+  REQUIRE(disk.write(folder / "link", "two", Overwrite::allow));
+  CHECK(fs::is_symlink(folder / "link"));
+  CHECK(text_of(folder / "real") == "two");
+}
+
+TEST_CASE("what can not be read says why") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  CHECK(disk.read(folder / "none").error().message == "no such file");
+  CHECK_FALSE(disk.read("/tmp"));
+  std::ofstream(folder / "large") << std::string(2U << 20U, 'x');
+  const auto large = disk.read(folder / "large");
+  REQUIRE_FALSE(large);
+  CHECK(large.error().message.find("large:1:1: larger than") != std::string::npos);
+  REQUIRE_FALSE(disk.read("/dev/zero"));
+}
+
+TEST_CASE("lines of several threads never mix") {
+  const Folder folder;
+  const std::string path = folder / "log";
+  const std::string line(500, 'x');
+  {
+    std::vector<std::jthread> writers;
+    for (int i = 0; i < 4; ++i) {
+      writers.emplace_back([&] {
+        for (int n = 0; n < 50; ++n) {
+          static_cast<void>(posix::local_disk().append(path, line + "\n"));
+        }
+      });
+    }
+  }
+  std::ifstream log(path);
+  std::size_t lines = 0;
+  for (std::string read; std::getline(log, read); ++lines) CHECK(read == line);
+  CHECK(lines == 200);
+}
+
+TEST_CASE("a full disk is an error of the append") {
+  const auto appended = posix::local_disk().append("/dev/full", "line\n");
+  REQUIRE_FALSE(appended);
+  CHECK(appended.error().message.find("No space left") != std::string::npos);
+}
+
+TEST_CASE("folders are made with those above them, for whom it may concern") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  REQUIRE(disk.make_folders(folder / "a/b/c", Privacy::own));
+  CHECK(rights_of(folder / "a/b/c") == 0700U);
+  REQUIRE(disk.make_folders(folder / "a/b/c", Privacy::own));
+  REQUIRE(disk.write(folder / "file", "text", Overwrite::refuse));
+  CHECK_FALSE(disk.make_folders(folder / "file", Privacy::own));
+  CHECK_FALSE(disk.make_folders(folder / "file/below", Privacy::own));
+}
+
+TEST_CASE("whoever runs the program has a name") {
+  CHECK_FALSE(posix::local_disk().user().empty());
+}

@@ -1,0 +1,160 @@
+#include "spindle/device/rollback.hpp"
+
+#include <doctest/doctest.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "spindle/modbus/pdu.hpp"
+#include "support/guarded_tool.hpp"
+
+namespace {
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using device::Device;
+using device::PutBack;
+using device::PutBackReport;
+using device::Rollback;
+using device::TriedWrite;
+using test::Fate;
+using test::GuardedTool;
+
+/// A tool on which p301 and p302 were written, and the third write went wrong.
+struct Bench {
+  explicit Bench(GuardedTool& guarded) : tool(guarded), device(guarded.open()) {
+    for (std::uint16_t number = 301; number <= 303; ++number) {
+      writes.push_back({tool.profile.find("p" + std::to_string(number)).value(),
+                        {Decimal(0), {}},
+                        {Decimal(50), {}}});
+    }
+    tool.write_past(301, 50);
+    tool.write_past(302, 50);
+  }
+
+  std::vector<PutBackReport> run() { return rollback.run(writes); }
+  std::vector<PutBack> results() {
+    std::vector<PutBack> all;
+    for (const PutBackReport& report : run()) all.push_back(report.result);
+    return all;
+  }
+  std::vector<std::uint16_t> values() {
+    const auto answer = tool.bm->answer(
+        {99}, {}, modbus::read_request(modbus::RegisterTable::holding, {301}, 3), tool.clock.now());
+    return modbus::registers_of(answer.value());
+  }
+
+  GuardedTool& tool;
+  Device device;
+  std::vector<TriedWrite> writes = {};
+  unsigned reopened = 0;
+  Rollback rollback = Rollback(
+      device,
+      [this](Duration) {
+        ++reopened;
+        return tool.open(tool.calm, tool.never);
+      },
+      tool.calm);
+};
+
+const std::vector<std::uint16_t> zeros = {0, 0, 0};
+const std::vector<PutBack> all_put_back = {PutBack::kept, PutBack::done, PutBack::done};
+
+/// Writes of one register meet this fate, so often.
+std::function<Fate(const modbus::Pdu&)> fate_of_writes(std::uint16_t address, Fate fate,
+                                                       unsigned times = 1'000'000) {
+  return [=, left = times](const modbus::Pdu& request) mutable {
+    const auto parsed = modbus::parse_request(request);
+    const auto* write = parsed ? std::get_if<modbus::WriteSingleRequest>(&*parsed) : nullptr;
+    if (write == nullptr || write->address.value != address || left == 0) return Fate::passes;
+    --left;
+    return fate;
+  };
+}
+
+TEST_CASE("what was written is put back, the last first, and what was not is left alone") {
+  GuardedTool tool;
+  Bench bench(tool);
+  const auto reports = bench.run();
+  REQUIRE(reports.size() == 3);
+  CHECK(reports[0].write.parameter.name == "p303");
+  CHECK(reports[0].result == PutBack::kept);
+  CHECK(reports[1].found->to_string() == "50");
+  CHECK(reports[1].now->to_string() == "0");
+  CHECK(bench.values() == zeros);
+  CHECK(tool.writes == std::vector<GuardedTool::Write>{{302, 0}, {301, 0}});
+  CHECK(bench.reopened == 0);
+}
+
+TEST_CASE("an interrupt does not end it") {
+  GuardedTool tool;
+  Bench bench(tool);
+  tool.interrupt.raise(2);
+  CHECK(bench.results() == all_put_back);
+  CHECK(bench.values() == zeros);
+}
+
+TEST_CASE("a lost link is opened anew") {
+  for (const Fate fate :
+       {Fate::closes_heard, Fate::closes_unheard, Fate::has_no_answer, Fate::is_lost}) {
+    CAPTURE(static_cast<int>(fate));
+    GuardedTool tool;
+    Bench bench(tool);
+    tool.fate = fate_of_writes(302, fate, 3);
+    CHECK(bench.results() == all_put_back);
+    CHECK(bench.values() == zeros);
+    CHECK(tool.most_open_connections == 1);
+  }
+}
+
+TEST_CASE("a tool that refuses its old value is told with what it holds") {
+  GuardedTool tool;
+  Bench bench(tool);
+  tool.fate = fate_of_writes(302, Fate::is_refused);
+  const auto reports = bench.run();
+  CHECK(reports[1].result == PutBack::refused);
+  CHECK(reports[1].now->to_string() == "50");
+  CHECK(reports[1].trouble.find("exception 02") != std::string::npos);
+  CHECK(reports[2].result == PutBack::done);
+  CHECK(bench.values() == std::vector<std::uint16_t>{0, 50, 0});
+}
+
+TEST_CASE("a tool that only echoes its old value is told as well") {
+  GuardedTool tool;
+  Bench bench(tool);
+  tool.fate = fate_of_writes(302, Fate::is_only_echoed);
+  const auto reports = bench.run();
+  CHECK(reports[1].result == PutBack::refused);
+  CHECK(reports[1].now->to_string() == "50");
+}
+
+TEST_CASE("a tool that is gone is given up after about ten seconds, and nothing is claimed") {
+  GuardedTool tool;
+  Bench bench(tool);
+  tool.reachable = false;
+  tool.fate = [](const modbus::Pdu&) { return Fate::closes_unheard; };
+  const TimePoint began = tool.clock.now();
+  const auto reports = bench.run();
+  REQUIRE(reports.size() == 3);
+  for (const PutBackReport& report : reports) {
+    CHECK(report.result == PutBack::unknown);
+    CHECK_FALSE(report.now.has_value());
+    CHECK_FALSE(report.trouble.empty());
+  }
+  const Duration took = tool.clock.now() - began;
+  CHECK(took > 9s);
+  CHECK(took < 15s);
+  CHECK_FALSE(bench.rollback.read_again({bench.writes[0].parameter}).has_value());
+}
+
+TEST_CASE("everything can be read once more afterwards") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.run();
+  const auto readings = bench.rollback.read_again({bench.writes[0].parameter});
+  REQUIRE(readings.has_value());
+  CHECK(readings->front().value->to_string() == "0");
+}
+
+}  // namespace

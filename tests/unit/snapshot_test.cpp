@@ -1,0 +1,274 @@
+#include "spindle/catalogue/snapshot.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/bm_profile.hpp"
+
+using namespace spindle;
+using namespace spindle::catalogue;
+
+namespace {
+
+Parameter parameter(std::string name, std::uint16_t address, Access access = Access::read_write) {
+  Parameter made;
+  made.name = std::move(name);
+  made.address = {address};
+  made.access = access;
+  return made;
+}
+
+/// Four numbered parameters, the second of which has a name and a scale; the tool reports limits.
+Profile small_profile() {
+  Profile profile;
+  profile.id = "small";
+  profile.limits = LimitFacts{.minimum_offset = 100, .maximum_offset = 200, .from = 1, .to = 3};
+  profile.numbered =
+      NumberedFacts{.prefix = "p", .from = 1, .to = 4, .access = Access::read_write, .source = "x"};
+  Parameter torque = parameter("torque", 2);
+  torque.encoding.scale = Decimal(1, -2);
+  torque.unit = "torque";
+  torque.range = {Decimal(0), Decimal(5)};
+  torque.default_value = Decimal(100, -2);
+  profile.parameters = {torque};
+  return profile;
+}
+
+SnapshotEntry entry(const Profile& profile, const std::string& name, std::uint16_t raw) {
+  const Parameter found = profile.find(name).value();
+  return {.parameter = found,
+          .raw = {raw},
+          .value = decode(found, Registers{raw}).value(),
+          .minimum = decode(found, Registers{0}).value().number,
+          .maximum = decode(found, Registers{1000}).value().number};
+}
+
+Snapshot snapshot(const Profile& profile,
+                  const std::vector<std::pair<std::string, std::uint16_t>>& values) {
+  Snapshot made;
+  for (const auto& [name, raw] : values) made.entries.push_back(entry(profile, name, raw));
+  return made;
+}
+
+Snapshot of_serial(Snapshot made, const std::string& serial) {
+  made.identity = SnapshotIdentity{.serial = serial};
+  return made;
+}
+
+std::vector<std::string> names_of(const std::vector<Parameter>& parameters) {
+  std::vector<std::string> names;
+  for (const Parameter& one : parameters) names.push_back(one.name);
+  return names;
+}
+
+/// "name: a -> b", with "-" for what a side does not have.
+std::vector<std::string> shown(const Comparison& comparison) {
+  const auto side = [](const std::optional<Value>& value) {
+    return value ? value->to_string() : std::string("-");
+  };
+  std::vector<std::string> lines;
+  for (const Difference& one : comparison.differences) {
+    lines.push_back(one.parameter.name + ": " + side(one.a) + " -> " + side(one.b));
+  }
+  return lines;
+}
+
+std::vector<std::string> shown(const RestorePlan& plan) {
+  std::vector<std::string> lines;
+  for (const PlannedWrite& write : plan.writes) {
+    lines.push_back(write.parameter.name + ": " + write.before.to_string() + " -> " +
+                    write.after.to_string());
+  }
+  return lines;
+}
+
+using Lines = std::vector<std::string>;
+
+Selection select(const Lines& wanted, const Lines& ignored, const Profile& profile) {
+  auto selection = Selection::make(wanted, ignored, profile);
+  REQUIRE(selection.has_value());
+  return *selection;
+}
+
+}  // namespace
+
+TEST_CASE("the stored parameters of a numbered profile are its registers, each once, by name") {
+  CHECK(names_of(stored_parameters(small_profile())) == Lines{"p1", "torque", "p3", "p4"});
+  const Profile bm = test::bm_profile();
+  const auto stored = stored_parameters(bm);
+  REQUIRE(stored.size() == 725);
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    REQUIRE(stored[i].address.value == i + 1);
+    REQUIRE(stored[i].table == modbus::RegisterTable::holding);
+  }
+  CHECK(stored[1].name == "preset.1.target-torque");
+  CHECK(stored[724].name == "p725");
+}
+
+TEST_CASE("a pair of registers takes both numbers, and what overlaps is stored once") {
+  Profile profile = small_profile();
+  Parameter pair = parameter("pair", 3);
+  pair.encoding.kind = Kind::u32;
+  profile.parameters.push_back(pair);
+  profile.parameters.push_back(parameter("torque.raw", 2));
+  profile.parameters.push_back(parameter("elsewhere", 900));
+  profile.parameters.push_back(parameter("shown.elsewhere", 901, Access::read_only));
+  CHECK(names_of(stored_parameters(profile)) == Lines{"p1", "torque", "pair", "elsewhere"});
+}
+
+TEST_CASE("without numbers all holding registers are stored in the order of the catalogue") {
+  Profile profile;
+  profile.parameters = {parameter("b", 20), parameter("a", 10, Access::read_only)};
+  Parameter input = parameter("input", 5, Access::read_only);
+  input.table = modbus::RegisterTable::input;
+  profile.parameters.push_back(input);
+  CHECK(names_of(stored_parameters(profile)) == Lines{"b", "a"});
+}
+
+TEST_CASE("the fingerprint depends on what is stored and not on where the file is") {
+  Profile profile = small_profile();
+  const std::string first = fingerprint(stored_parameters(profile));
+  CHECK(first.size() == 16);
+  profile.path = "/somewhere/else.yaml";
+  profile.title = "another title";
+  CHECK(fingerprint(stored_parameters(profile)) == first);
+  profile.parameters[0].encoding.scale = Decimal(1, -1);
+  CHECK(fingerprint(stored_parameters(profile)) != first);
+}
+
+TEST_CASE("defaults are those that the profile knows") {
+  const Snapshot defaults = snapshot_of_defaults(small_profile());
+  REQUIRE(defaults.entries.size() == 1);
+  CHECK(defaults.entries[0].parameter.name == "torque");
+  CHECK(defaults.entries[0].raw == Registers{100});
+}
+
+TEST_CASE("a selection takes names, numbers and patterns, and refuses what does not exist") {
+  const Profile profile = small_profile();
+  const auto picked = [&](const Lines& wanted, const Lines& ignored) {
+    const Selection selection = select(wanted, ignored, profile);
+    Lines names;
+    for (const Parameter& one : stored_parameters(profile)) {
+      if (selection.contains(one)) names.push_back(one.name);
+    }
+    return names;
+  };
+  CHECK(picked({}, {}) == Lines{"p1", "torque", "p3", "p4"});
+  CHECK(picked({"p*"}, {}) == Lines{"p1", "p3", "p4"});
+  CHECK(picked({"p2"}, {}) == Lines{"torque"});
+  CHECK(picked({}, {"p2", "p3"}) == Lines{"p1", "p4"});
+  CHECK(picked({"torque", "p1"}, {"t*"}) == Lines{"p1"});
+  for (const char* wrong : {"p9", "torqe", "x*", "@input:3"}) {
+    CAPTURE(wrong);
+    const auto selection = Selection::make({wrong}, {}, profile);
+    REQUIRE_FALSE(selection.has_value());
+    CHECK(selection.error().status() == ExitStatus::usage);
+    CHECK_FALSE(Selection::make({}, {wrong}, profile).has_value());
+  }
+}
+
+TEST_CASE("a comparison tells what differs and what only one side has") {
+  const Profile profile = small_profile();
+  const Snapshot a = snapshot(profile, {{"p1", 1}, {"torque", 271}, {"p3", 3}});
+  Snapshot b = snapshot(profile, {{"p1", 1}, {"torque", 310}, {"p4", 4}});
+  const Comparison comparison = compare(a, b, {});
+  CHECK(comparison.same == 1);
+  CHECK(shown(comparison) == Lines{"torque: 2.71 -> 3.10", "p3: 3 -> -", "p4: - -> 4"});
+  CHECK(shown(compare(a, b, select({"p*"}, {"p3"}, profile))) == Lines{"p4: - -> 4"});
+  CHECK(shown(compare(a, b, {}, Lacking::is_not_compared)) == Lines{"torque: 2.71 -> 3.10"});
+  for (const auto& [why, count] :
+       {std::pair(Missing::absent, 3), {Missing::unreadable, 2}, {Missing::left_out, 2}}) {
+    b.missing = {{profile.find("p3").value(), why}};
+    CHECK(compare(a, b, {}).differences.size() == static_cast<std::size_t>(count));
+  }
+}
+
+TEST_CASE("a plan writes what differs in the order of the catalogue") {
+  const Profile profile = small_profile();
+  const Snapshot backup = snapshot(profile, {{"p3", 30}, {"torque", 200}, {"p1", 1}, {"p4", 9}});
+  const Snapshot present = snapshot(profile, {{"p1", 1}, {"torque", 271}, {"p3", 3}});
+  const RestorePlan plan = plan_restore(backup, present, profile, {}, Destination::same_tool);
+  CHECK(shown(plan) == Lines{"torque: 2.71 -> 2.00", "p3: 3 -> 30"});
+  CHECK(plan.count(Skip::equal) == 1);
+  CHECK(plan.count(Skip::absent) == 1);
+  CHECK(plan.findings.empty());
+  CHECK(shown(plan_restore(backup, present, profile, select({"p3"}, {}, profile),
+                           Destination::same_tool)) == Lines{"p3: 3 -> 30"});
+}
+
+TEST_CASE("what is read-only or belongs to one tool is skipped") {
+  Profile profile = small_profile();
+  Parameter shown_only = parameter("shown", 3, Access::read_only);
+  Parameter address = parameter("address", 4);
+  address.cloning = Cloning::never;
+  profile.parameters.push_back(shown_only);
+  profile.parameters.push_back(address);
+  const Snapshot backup = snapshot(profile, {{"shown", 1}, {"address", 1}});
+  const Snapshot present = snapshot(profile, {{"shown", 2}, {"address", 2}});
+  const auto to_other = plan_restore(backup, present, profile, {}, Destination::other_tool);
+  CHECK(to_other.writes.empty());
+  CHECK(to_other.count(Skip::read_only) == 1);
+  CHECK(to_other.count(Skip::not_cloned) == 1);
+  const auto to_same = plan_restore(backup, present, profile, {}, Destination::same_tool);
+  CHECK(shown(to_same) == Lines{"address: 2 -> 1"});
+}
+
+TEST_CASE("the same tool is one whose serial is known and the same") {
+  const Profile profile = small_profile();
+  const Snapshot plain = snapshot(profile, {});
+  CHECK(destination_of(of_serial(plain, "7"), of_serial(plain, "7")) == Destination::same_tool);
+  CHECK(destination_of(of_serial(plain, "7"), of_serial(plain, "8")) == Destination::other_tool);
+  CHECK(destination_of(of_serial(plain, ""), of_serial(plain, "")) == Destination::other_tool);
+  CHECK(destination_of(plain, plain) == Destination::other_tool);
+}
+
+TEST_CASE("every value that would be written is checked, and the limit that refuses is named") {
+  const Profile profile = small_profile();
+  const Snapshot present = snapshot(profile, {{"p1", 1}, {"torque", 271}, {"p3", 3}, {"p4", 4}});
+  struct Row {
+    const char* name;
+    std::uint16_t raw;
+    std::string message;
+  };
+  const Row rows[] = {
+      {"p1", 1001, "1001 is above 1000, the maximum that the tool itself reports (register 201)"},
+      {"torque", 600, "6.00 is above 5, the maximum of the profile"},
+      {"p4", 65535, ""},  // the tool reports no limits of this one
+      {"p3", 1000, ""},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.name);
+    const auto plan = plan_restore(snapshot(profile, {{row.name, row.raw}}), present, profile, {},
+                                   Destination::same_tool);
+    REQUIRE(plan.findings.size() == (row.message.empty() ? 0U : 1U));
+    if (row.message.empty()) continue;
+    CHECK(message_of(plan.findings[0]) == row.message);
+    CHECK(plan.findings[0].name == row.name);
+    CHECK(plan.findings[0].status() == ExitStatus::usage);
+  }
+}
+
+TEST_CASE("a value that the tool holds already is not refused") {
+  const Profile profile = small_profile();
+  Snapshot present = snapshot(profile, {{"torque", 600}});
+  present.entries[0].maximum = Decimal(5);
+  const auto plan = plan_restore(snapshot(profile, {{"torque", 600}}), present, profile, {},
+                                 Destination::same_tool);
+  CHECK(plan.findings.empty());
+  CHECK(plan.writes.empty());
+}
+
+TEST_CASE("without the tool's own limits nothing is written where it should have them") {
+  const Profile profile = small_profile();
+  Snapshot present = snapshot(profile, {{"p1", 1}, {"p4", 4}});
+  for (SnapshotEntry& one : present.entries) one.minimum.reset();
+  const auto plan = plan_restore(snapshot(profile, {{"p1", 2}, {"p4", 5}}), present, profile, {},
+                                 Destination::same_tool);
+  REQUIRE(plan.findings.size() == 1);
+  CHECK(plan.findings[0].name == "p1");
+}
