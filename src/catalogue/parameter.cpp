@@ -29,6 +29,9 @@ const KindInfo& info(Kind kind) { return kinds.at(static_cast<std::size_t>(kind)
 constexpr std::array<std::string_view, 4> evidence_texts = {"manual", "transcribed", "sibling",
                                                             "inferred"};
 
+constexpr std::array<std::string_view, 5> effect_texts = {
+    "at-once", "after-stop", "after-configuration", "after-power-cycle", "unknown"};
+
 }  // namespace
 
 std::uint16_t register_count(Kind kind) { return info(kind).registers; }
@@ -41,6 +44,18 @@ std::optional<Kind> parse_kind(std::string_view text) {
     if (candidate.text == text) return candidate.kind;
   }
   return std::nullopt;
+}
+
+Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) {
+  std::erase_if(parameter.bits,
+                [&](const BitName& name) { return name.when && name.when != value; });
+  for (BitName& name : parameter.bits) name.when.reset();
+  parameter.bits_by.clear();
+  return parameter;
+}
+
+std::string_view to_text(Effect effect) {
+  return effect_texts.at(static_cast<std::size_t>(effect));
 }
 
 std::string_view to_text(Evidence evidence) {

@@ -163,6 +163,10 @@ Result<Parameter> parse_raw(std::string_view text) {
 
 }  // namespace
 
+bool RefusalFacts::is_busy(std::int64_t code) const {
+  return std::find(busy.begin(), busy.end(), code) != busy.end();
+}
+
 Result<Parameter> Profile::find(std::string_view name) const {
   if (auto raw = parse_raw_register(name)) return find_raw(*this, std::move(*raw));
   for (const Parameter& parameter : parameters) {

@@ -198,8 +198,11 @@ std::vector<Parameter> stored_parameters(const Profile& profile) {
   Claims claims;
   std::vector<Parameter> stored;
   for (const Parameter& parameter : profile.parameters) {
-    const bool stored_there = parameter.table == modbus::RegisterTable::holding;
-    if (stored_there && claims.take(parameter)) stored.push_back(parameter);
+    // A command word must never come out of a file: it would start a motor.
+    const bool commands = profile.run && parameter.name == profile.run->command;
+    const bool is_setting = parameter.table == modbus::RegisterTable::holding &&
+                            parameter.access == Access::read_write && !commands;
+    if (is_setting && claims.take(parameter)) stored.push_back(parameter);
   }
   return stored;
 }

@@ -1,6 +1,7 @@
 #include "spindle/catalogue/value.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -72,6 +73,56 @@ Error not_a_label(const Parameter& parameter, std::string_view text) {
                suggestion(text, names));
 }
 
+bool is_set(std::int64_t integer, unsigned bit) {
+  return ((static_cast<std::uint64_t>(integer) >> bit) & 1U) != 0;
+}
+
+/// The names of the bits that are set, the lowest first; those without a name by their number.
+std::string bit_names(const Parameter& parameter, std::int64_t integer) {
+  std::string names;
+  const unsigned bits = register_count(parameter.encoding.kind) * bits_per_register;
+  for (unsigned bit = 0; bit < bits; ++bit) {
+    if (!is_set(integer, bit)) continue;
+    const auto name =
+        std::find_if(parameter.bits.begin(), parameter.bits.end(),
+                     [bit](const BitName& known) { return known.bit == bit && !known.when; });
+    if (!names.empty()) names += ' ';
+    names += name == parameter.bits.end() ? fmt::format("bit{}", bit) : name->text;
+  }
+  return names;
+}
+
+/// What stands beside the number: its label, the names of its bits, or its other notation.
+std::string words_for(const Parameter& parameter, std::int64_t integer) {
+  if (const Label* label = label_of(parameter, integer)) return label->text;
+  if (!parameter.bits.empty()) return bit_names(parameter, integer);
+  const bool is_code = parameter.notation == Notation::hexadecimal && integer != 0;
+  return is_code ? fmt::format("{:02X}h", integer) : std::string();
+}
+
+Error not_a_bit(const Parameter& parameter, std::string_view text) {
+  std::vector<std::string> names;
+  for (const BitName& name : parameter.bits) names.push_back(name.text);
+  return fault(Errc::bad_value, parameter,
+               fmt::format("'{}' is none of its bits; it has {}", text, fmt::join(names, ", ")),
+               suggestion(text, names));
+}
+
+/// "M1+FWD" or "M1,FWD" to its number.
+Result<Decimal> parse_bits(const Parameter& parameter, std::string_view text) {
+  std::string joined(text);
+  std::replace(joined.begin(), joined.end(), ',', '+');
+  std::int64_t word = 0;
+  for (const std::string_view part : split(joined, '+')) {
+    const auto name =
+        std::find_if(parameter.bits.begin(), parameter.bits.end(),
+                     [part](const BitName& known) { return same_ignoring_case(known.text, part); });
+    if (name == parameter.bits.end()) return tl::unexpected(not_a_bit(parameter, part));
+    word |= std::int64_t{1} << name->bit;
+  }
+  return Decimal(word);
+}
+
 /// Hexadecimal only makes sense for what is stored as it is typed.
 std::optional<Decimal> parse_number(const Parameter& parameter, std::string_view text) {
   if (auto number = Decimal::parse(text)) return number;
@@ -130,8 +181,7 @@ Result<Value> decode(const Parameter& parameter, RegisterView registers) {
   if (!number) {
     return tl::unexpected(fault(Errc::internal, parameter, "its scale does not fit its encoding"));
   }
-  const Label* label = label_of(parameter, integer);
-  return Value{*number, label != nullptr ? label->text : std::string()};
+  return Value{*number, words_for(parameter, integer)};
 }
 
 Result<Registers> encode(const Parameter& parameter, const Decimal& number) {
@@ -152,7 +202,13 @@ Result<void> check_range(const Parameter& parameter, const Decimal& number) {
   };
   if (range.minimum && number < *range.minimum) return refuse("below", *range.minimum, "minimum");
   if (range.maximum && number > *range.maximum) return refuse("above", *range.maximum, "maximum");
-  return {};
+  const bool excepted = parameter.except && number >= *parameter.except->minimum &&
+                        number <= *parameter.except->maximum;
+  if (!excepted) return {};
+  return tl::unexpected(fault(
+      Errc::out_of_range, parameter,
+      fmt::format("{} is between {} and {}, which the profile rules out", number.to_string(),
+                  parameter.except->minimum->to_string(), parameter.except->maximum->to_string())));
 }
 
 Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
@@ -162,6 +218,10 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
     number = scaled.value_or(Decimal(label->number));
   } else if (const auto typed = parse_number(parameter, text)) {
     number = *typed;
+  } else if (!parameter.bits.empty()) {
+    const auto bits = parse_bits(parameter, text);
+    if (!bits) return tl::unexpected(bits.error());
+    number = *bits;
   } else if (!parameter.labels.empty()) {
     return tl::unexpected(not_a_label(parameter, text));
   } else {

@@ -171,6 +171,8 @@ struct TypedPing {
 struct TypedSet {
   commands::SetOptions options;
   bool dry_run = false;
+  bool save = false;
+  bool broadcast = false;
 };
 struct TypedGet {
   commands::GetOptions options;
@@ -179,11 +181,21 @@ struct TypedGet {
 struct TypedDo {
   commands::DoOptions options;
   bool accept_unverified = false;
+  bool broadcast = false;
 };
 struct TypedRemoteStart {
   commands::RemoteStartOptions options;
   std::string limit;
+  std::string operation;
+  std::string watchdog;
+  std::string stop;
+  bool reverse = false;
   bool accept_unverified = false;
+};
+struct TypedRemoteStop {
+  commands::RemoteStopOptions options;
+  std::string stop;
+  bool broadcast = false;
 };
 struct TypedAlarms {
   commands::AlarmsOptions options;
@@ -219,6 +231,7 @@ struct TypedRestore {
   bool dry_run = false;
   bool force = false;
   bool no_rollback = false;
+  bool save = false;
 };
 struct TypedSimulate {
   commands::SimulateOptions options;
@@ -245,7 +258,7 @@ struct TypedCommands {
   TypedScan scan;
   TypedWatch watch;
   TypedRemoteStart remote_start;
-  commands::RemoteStopOptions remote_stop;
+  TypedRemoteStop remote_stop;
   TypedAlarms alarms;
   TypedBackup backup;
   commands::DiffOptions diff;
@@ -302,24 +315,35 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
   flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
 }
 
+constexpr std::string_view save_words =
+    "store it in the tool's non-volatile memory afterwards (BLV); asks";
+
+constexpr std::string_view broadcast_words =
+    "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
+
 void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"set", "TARGET NAME=VALUE...",
                            "check everything, show old and new, write only what differs, read back",
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
                            "spindle set station3 preset.1.mode=TC/AM preset.1.speed=900\n"
-                           "spindle set station3 preset.2.target-torque=3.10 --dry-run"};
+                           "spindle set station3 preset.2.target-torque=3.10 --dry-run\n"
+                           "spindle set sim:orientalmotor-blv operation.2.speed=1200"};
   const auto run = [](TypedSet set, Context& context) {
     if (set.options.target.empty())
       return Result<Outcome>(tl::unexpected(missing("set", "TARGET")));
     if (set.options.assignments.empty())
       return Result<Outcome>(tl::unexpected(missing("set", "NAME=VALUE")));
     if (set.dry_run) set.options.execution = commands::Execution::dry_run;
+    if (set.save) set.options.storing = commands::Storing::yes;
+    if (set.broadcast) set.options.reach = commands::Reach::everybody;
     return commands::set(set.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.set, run);
   command->add_option("TARGET", typed.set.options.target, "tool name or URL");
   command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
   flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
+  flag(command, "--save", typed.set.save, std::string(save_words));
+  flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
 }
 
 void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -331,6 +355,7 @@ void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
   const auto run = [](TypedDo perform, Context& context) {
     if (perform.options.target.empty())
       return Result<Outcome>(tl::unexpected(missing("do", "TARGET")));
+    if (perform.broadcast) perform.options.reach = commands::Reach::everybody;
     if (perform.accept_unverified) perform.options.acceptance = commands::Acceptance::unverified;
     return commands::perform(perform.options, context);
   };
@@ -340,6 +365,7 @@ void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
                       "actions, with =VALUE where they take one");
   flag(command, "--accept-unverified", typed.perform.accept_unverified,
        "send what may move or lock the tool although its register is not certain");
+  flag(command, "--broadcast", typed.perform.broadcast, std::string(broadcast_words));
 }
 
 Result<Outcome> run_ping(TypedPing ping, Context& context) {
@@ -497,7 +523,7 @@ Result<void> understand_watch(const TypedWatch& typed, commands::WatchOptions& o
     if (!count) return tl::unexpected(count.error());
     options.count = *count;
   }
-  options.interval = interval->value_or(options.interval);
+  options.interval = *interval;
   options.duration = *duration;
   options.idle_timeout = *idle_timeout;
   if (typed.initial) options.samples = device::Samples::changes_and_first;
@@ -512,11 +538,6 @@ Result<Outcome> run_watch(TypedWatch typed, Context& context) {
   part_arguments(typed, typed.options, context);
   if (auto understood = understand_watch(typed, typed.options); !understood) {
     return tl::unexpected(std::move(understood.error()));
-  }
-  const bool polls = typed.all || typed.initial || !typed.interval.empty();
-  if (polls && typed.options.names.empty() && !typed.no_push) {
-    return tl::unexpected(usage("--all, --initial and --interval are about polled values",
-                                "name some behind the tool, such as 'status.*'"));
   }
   return commands::watch(typed.options, context);
 }
@@ -543,11 +564,33 @@ void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
 }
 
+constexpr std::array<std::pair<std::string_view, catalogue::StopMode>, 2> stop_modes = {
+    {{"decelerate", catalogue::StopMode::decelerate}, {"instant", catalogue::StopMode::instant}}};
+
+Result<std::optional<catalogue::StopMode>> to_stop_mode(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const auto mode = to_choice("--stop", text, stop_modes);
+  if (!mode) return tl::unexpected(mode.error());
+  return *mode;
+}
+
+Result<void> understand_motor(TypedRemoteStart& typed) {
+  const auto watchdog = to_duration("--watchdog", typed.watchdog);
+  if (!watchdog) return tl::unexpected(watchdog.error());
+  const auto stop = to_stop_mode(typed.stop);
+  if (!stop) return tl::unexpected(stop.error());
+  typed.options.watchdog = *watchdog;
+  typed.options.stop = *stop;
+  if (typed.reverse) typed.options.direction_of_motor = catalogue::Direction::reverse;
+  return fill_number("--operation", typed.operation, 0xFFFF, typed.options.operation);
+}
+
 Result<Outcome> run_remote_start(TypedRemoteStart typed, Context& context) {
   if (typed.options.target.empty()) return tl::unexpected(missing("remote-start", "TARGET"));
   const auto limit = to_duration("--for", typed.limit);
   if (!limit) return tl::unexpected(limit.error());
   typed.options.limit = *limit;
+  if (auto motor = understand_motor(typed); !motor) return tl::unexpected(motor.error());
   if (typed.accept_unverified) typed.options.acceptance = commands::Acceptance::unverified;
   return commands::remote_start(typed.options, context);
 }
@@ -557,17 +600,27 @@ constexpr std::string_view accept_unverified_words =
 
 void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {
-      "remote-start", "TARGET [--preset N] [--direction D] [--for DURATION]",
+      "remote-start", "TARGET [--preset N] [--direction D] [--speed RPM] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
       "spindle remote-start station3 --preset 2\n"
       "spindle remote-start station3 --for 2s --yes --json\n"
-      "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes"};
+      "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
+      "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
   CLI::App* command = add_command(app, draft, words, typed.remote_start, run_remote_start);
   auto& options = typed.remote_start.options;
   command->add_option("TARGET", options.target, "tool name or URL");
   option(command, "--preset", options.preset, "N", "select this preset first");
   option(command, "--direction", options.direction, "D", "select this direction first");
   option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
+  option(command, "--speed", options.speed, "RPM", "speed of a motor (BLV)");
+  flag(command, "--reverse", typed.remote_start.reverse, "turn a motor the other way round");
+  option(command, "--operation", typed.remote_start.operation, "N",
+         "operation data to set and run (default: 2 on BLV)");
+  option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed");
+  option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still");
+  option(command, "--watchdog", typed.remote_start.watchdog, "DURATION",
+         "let the driver itself stop when it hears nothing for so long");
+  option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant");
   command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
                     std::string(accept_unverified_words));
 }
@@ -575,15 +628,25 @@ void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
 void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"remote-stop", "TARGET...", "stop now; never asks",
                            "spindle remote-stop station3\n"
-                           "spindle remote-stop @line1"};
-  const auto run = [](const commands::RemoteStopOptions& options, Context& context) {
-    if (options.targets.empty()) {
+                           "spindle remote-stop @line1\n"
+                           "spindle remote-stop 'rtu:///dev/ttyUSB0?unit=0' --profile "
+                           "orientalmotor-blv --broadcast"};
+  const auto run = [](TypedRemoteStop stop, Context& context) {
+    if (stop.options.targets.empty()) {
       return Result<Outcome>(tl::unexpected(missing("remote-stop", "TARGET")));
     }
-    return commands::remote_stop(options, context);
+    const auto mode = to_stop_mode(stop.stop);
+    if (!mode) return Result<Outcome>(tl::unexpected(mode.error()));
+    stop.options.stop = *mode;
+    if (stop.broadcast) stop.options.reach = commands::Reach::everybody;
+    return commands::remote_stop(stop.options, context);
   };
-  add_command(app, draft, words, typed.remote_stop, run)
-      ->add_option("TARGET", typed.remote_stop.targets, "tool name, @group or URL");
+  CLI::App* command = add_command(app, draft, words, typed.remote_stop, run);
+  command->add_option("TARGET", typed.remote_stop.options.targets, "tool name, @group or URL");
+  option(command, "--stop", typed.remote_stop.stop, "HOW",
+         "how a motor stops: decelerate (default) or instant");
+  flag(command, "--broadcast", typed.remote_stop.broadcast,
+       "everybody on the serial line (unit=0): sent, not acknowledged");
 }
 
 void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -659,6 +722,7 @@ Result<Outcome> run_restore(TypedRestore typed, Context& context) {
   if (typed.dry_run) typed.options.execution = commands::Execution::dry_run;
   if (typed.force) typed.options.model = commands::ModelCheck::off;
   if (typed.no_rollback) typed.options.on_failure = commands::OnFailure::leave;
+  if (typed.save) typed.options.storing = commands::Storing::yes;
   return commands::restore(typed.options, context);
 }
 
@@ -677,6 +741,7 @@ void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
   command->add_flag("--force", typed.restore.force, "also to a tool of another model");
   command->add_flag("--no-rollback", typed.restore.no_rollback,
                     "leave what was written when something fails");
+  command->add_flag("--save", typed.restore.save, std::string(save_words));
 }
 
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {

@@ -19,8 +19,15 @@ constexpr std::string_view present_list = "present";
 /// Registers whose meaning is not known: their numbers are shown, not explained.
 constexpr std::string_view data_list = "alarm-data";
 
+/// One parameter that holds a code.
+struct Source {
+  std::string list;
+  Parameter parameter;
+  catalogue::CodeTable table = catalogue::CodeTable::error;
+};
+
 struct AlarmPlan {
-  std::vector<std::pair<std::string, Parameter>> sources;  ///< list name and parameter
+  std::vector<Source> sources;
   std::optional<Deed> reset;
 };
 
@@ -30,28 +37,43 @@ const std::array<Column, 5> columns = {{{"LIST", "list"},
                                         {"TEXT", "text"},
                                         {"REMEDY", "remedy"}}};
 
+/// The lists that the profile names.
+Result<AlarmPlan> plan_lists(const Profile& profile) {
+  AlarmPlan plan;
+  for (const catalogue::AlarmList& list : profile.alarm_lists) {
+    auto parameters = profile.select(list.parameters);
+    if (!parameters) return tl::unexpected(std::move(parameters.error()));
+    for (Parameter& parameter : *parameters) {
+      plan.sources.push_back({list.name, std::move(parameter), list.codes});
+    }
+  }
+  return plan;
+}
+
 /// The present alarm is what proves a reset; the last event's error and the raw alarm data stand
 /// beside it.
 Result<AlarmPlan> plan_alarms(const Profile& profile) {
+  if (!profile.alarm_lists.empty()) return plan_lists(profile);
   AlarmPlan plan;
   const auto reset = profile.find_action("alarm-reset");
   if (!reset) return tl::unexpected(reset.error());
   auto present = profile.find(reset->confirm);
   if (!present) return tl::unexpected(std::move(present.error()));
-  plan.sources.emplace_back(std::string(present_list), std::move(*present));
+  plan.sources.push_back({std::string(present_list), std::move(*present)});
   if (auto error = profile.find("event.error")) {
-    plan.sources.emplace_back("last-event", std::move(*error));
+    plan.sources.push_back({"last-event", std::move(*error)});
   }
   if (auto data = profile.select({"alarm.*"})) {
     for (Parameter& parameter : *data)
-      plan.sources.emplace_back(std::string(data_list), std::move(parameter));
+      plan.sources.push_back({std::string(data_list), std::move(parameter)});
   }
   return plan;
 }
 
-report::Record alarm_record(const std::string& list, std::size_t index, std::int64_t code,
-                            const catalogue::CodeText* text, const Target& target,
-                            const Clock& clock) {
+report::Record alarm_record(const std::string& list, std::size_t index,
+                            const catalogue::Value& value, const catalogue::CodeText* text,
+                            const Target& target, const Clock& clock) {
+  const std::int64_t code = value.number.mantissa();
   const bool is_free = code == 0 && list != data_list;
   const std::string meaning = text != nullptr ? text->text : is_free ? "none" : "";
   return {.type = "alarm",
@@ -59,7 +81,7 @@ report::Record alarm_record(const std::string& list, std::size_t index, std::int
           .time = clock.wall(),
           .fields = {{"list", list},
                      {"index", number(static_cast<std::int64_t>(index))},
-                     {"code", number(code)},
+                     {"code", number(code), value.to_string()},
                      {"text", text_or_null(meaning)},
                      {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
 }
@@ -67,41 +89,79 @@ report::Record alarm_record(const std::string& list, std::size_t index, std::int
 /// What was found, and what became of the reset.
 struct Findings {
   Outcome outcome = {};
-  std::int64_t present = 0;  ///< the present alarm; 0: none
+  catalogue::Value present = {};  ///< the present alarm; 0: none
+  catalogue::Resettable resettable = catalogue::Resettable::unknown;
   enum class Reset : std::uint8_t { none, done, failed } reset = Reset::none;
 };
 
+/// The meaning of a code by the table of its list; null when it is not known.
+const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table,
+                                   const catalogue::CodeTables& tables, const OpenTool& tool) {
+  const auto& refusals = tool.profile->refusals;
+  const catalogue::CodeTexts* texts = &tables.error;
+  if (table == catalogue::CodeTable::warning) texts = &tables.warning;
+  if (table == catalogue::CodeTable::refusal && refusals) texts = &refusals->codes;
+  const auto known = texts->find(code);
+  return known == texts->end() ? nullptr : &known->second;
+}
+
+/// One code of a list, told and remembered.
+void tell(const Source& source, std::size_t index, const device::Reading& reading,
+          const catalogue::CodeTables& tables, const OpenTool& tool, Findings& findings,
+          Listing& listing, const Clock& clock) {
+  if (!reading.value) {
+    findings.outcome.fail(reading.value.error());
+    listing.add(reading.value.error());
+    return;
+  }
+  findings.outcome.succeed();
+  // The rest of a history that is not full says nothing.
+  const bool unused = index > 1 && reading.value->number == Decimal(0);
+  if (unused && !tool.profile->alarm_lists.empty()) return;
+  const catalogue::CodeText* text = nullptr;
+  if (source.list != data_list) {
+    text = text_of(reading.value->number.mantissa(), source.table, tables, tool);
+  }
+  if (source.list == present_list) {
+    findings.present = *reading.value;
+    if (text != nullptr) findings.resettable = text->resettable;
+  }
+  listing.add(alarm_record(source.list, index, *reading.value, text, tool.target, clock));
+}
+
 Result<void> show(const AlarmPlan& plan, OpenTool& tool, Findings& findings, Context& context) {
-  const auto texts = context.profiles.load_error_codes(tool.profile->id);
-  if (!texts) return tl::unexpected(texts.error());
+  const auto tables = context.profiles.load_code_tables(tool.profile->path);
+  if (!tables) return tl::unexpected(tables.error());
   std::vector<Parameter> parameters;
   parameters.reserve(plan.sources.size());
-  for (const auto& [list, parameter] : plan.sources) parameters.push_back(parameter);
+  for (const Source& source : plan.sources) parameters.push_back(source.parameter);
   const auto readings = tool.device.read_each(parameters, device::Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
   Listing listing(context, columns);
   std::size_t index = 0;
   for (std::size_t at = 0; at < readings->size(); ++at) {
-    const std::string& list = plan.sources[at].first;
-    index = at > 0 && plan.sources[at - 1].first == list ? index + 1 : 1;
-    const device::Reading& reading = (*readings)[at];
-    if (!reading.value) {
-      findings.outcome.fail(reading.value.error());
-      listing.add(reading.value.error());
-      continue;
-    }
-    findings.outcome.succeed();
-    const std::int64_t code = reading.value->number.mantissa();
-    if (list == present_list) findings.present = code;
-    const auto known = list == data_list ? texts->end() : texts->find(code);
-    listing.add(alarm_record(list, index, code, known == texts->end() ? nullptr : &known->second,
-                             tool.target, context.clock));
+    const Source& source = plan.sources[at];
+    index = at > 0 && plan.sources[at - 1].list == source.list ? index + 1 : 1;
+    tell(source, index, (*readings)[at], *tables, tool, findings, listing, context.clock);
   }
   return listing.end();
 }
 
+/// Nothing that is sent ends such an alarm, and its cause has to be dealt with first.
+Error not_resettable(const Findings& findings, const Target& target) {
+  return target.blamed(
+      {.code = Errc::negative,
+       .message = fmt::format("alarm {} can not be reset by command, nothing was sent",
+                              findings.present.to_string()),
+       .hint = "remove its cause, then switch the tool off and on"});
+}
+
 Result<void> reset(const Deed& deed, OpenTool& tool, Findings& findings, Context& context) {
-  const auto result = tool.device.perform(deed.action, deed.value);
+  const bool present = findings.present.number != Decimal(0);
+  if (present && findings.resettable == catalogue::Resettable::no) {
+    return tl::unexpected(not_resettable(findings, tool.target));
+  }
+  const auto result = perform_deed(deed, tool, context);
   if (!result) return tl::unexpected(result.error());
   Listing listing(context, deed_columns());
   listing.add(deed_record(deed, *result, tool.target, context.clock));
@@ -125,8 +185,8 @@ std::string sentence_of(const Findings& findings) {
     case Findings::Reset::none:
       break;
   }
-  if (findings.present == 0) return "no alarm present";
-  return fmt::format("alarm {} is present", findings.present);
+  if (findings.present.number == Decimal(0)) return "no alarm present";
+  return fmt::format("alarm {} is present", findings.present.to_string());
 }
 
 }  // namespace
@@ -154,7 +214,7 @@ Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
   if (!done) return tl::unexpected(std::move(done.error()));
   const Outcome& outcome = findings.outcome;
   return context.renderer
-      .summary(summary_record({{"present", number(findings.present == 0 ? 0 : 1)},
+      .summary(summary_record({{"present", number(findings.present.number == Decimal(0) ? 0 : 1)},
                                {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
                               outcome.status(), target->shown, context.clock),
                sentence_of(findings))

@@ -10,4 +10,8 @@ namespace spindle::commands {
 /// refused with `not_confirmed`, and the flag is named. `what` completes "… changes nothing yet:".
 Result<void> ask_consent(std::string_view what, const Context& context);
 
+/// The same for what can hardly be undone: on a terminal `word` has to be typed.
+Result<void> ask_typed_consent(std::string_view what, std::string_view word,
+                               const Context& context);
+
 }  // namespace spindle::commands

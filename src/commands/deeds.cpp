@@ -9,6 +9,7 @@
 #include "consent.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
+#include "stops.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -26,23 +27,25 @@ Error bad_action_value(const Action& action, std::string message, std::string hi
           .name = action.name};
 }
 
-Result<std::uint16_t> parse_label(const Action& action, std::string_view text) {
+Result<std::int64_t> parse_label(const Action& action, std::string_view text) {
   std::vector<std::string> known;
   for (const catalogue::Label& label : action.labels) {
     const bool same = label.text == text || std::to_string(label.number) == text;
-    if (same) return static_cast<std::uint16_t>(label.number);
+    if (same) return label.number;
     known.push_back(fmt::format("{} ({})", label.text, label.number));
   }
+  if (action.has_range) known.push_back(fmt::format("{} to {}", action.minimum, action.maximum));
   return tl::unexpected(bad_action_value(action, fmt::format("'{}' is none of its values", text),
                                          fmt::format("it takes {}", fmt::join(known, ", "))));
 }
 
-Result<std::uint16_t> parse_action_value(const Action& action, std::string_view text) {
-  if (!action.labels.empty()) return parse_label(action, text);
+Result<std::int64_t> parse_action_value(const Action& action, std::string_view text) {
   const auto value = parse_unsigned(text, 0xFFFF);
-  if (value && *value >= action.minimum && *value <= action.maximum) {
-    return static_cast<std::uint16_t>(*value);
+  const bool ranged = action.labels.empty() || action.has_range;
+  if (ranged && value && *value >= action.minimum && *value <= action.maximum) {
+    return static_cast<std::int64_t>(*value);
   }
+  if (!action.labels.empty()) return parse_label(action, text);
   return tl::unexpected(bad_action_value(
       action,
       fmt::format("'{}' is not a number from {} to {}", text, action.minimum, action.maximum)));
@@ -50,6 +53,18 @@ Result<std::uint16_t> parse_action_value(const Action& action, std::string_view 
 
 bool is_weak(Evidence evidence) {
   return evidence == Evidence::sibling || evidence == Evidence::inferred;
+}
+
+device::ActionResult in_words_of_actions(device::StopResult result) {
+  switch (result) {
+    case device::StopResult::confirmed:
+      return device::ActionResult::confirmed;
+    case device::StopResult::sent:
+      return device::ActionResult::sent;
+    case device::StopResult::unconfirmed:
+      break;
+  }
+  return device::ActionResult::not_confirmed;
 }
 
 const std::array<Column, 3> columns = {
@@ -62,8 +77,8 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
   auto action = profile.find_action(text.substr(0, equals));
   if (!action) return tl::unexpected(std::move(action.error()));
   const bool given = equals != std::string::npos;
-  if (action->value) {
-    if (!given) return Deed{*action, *action->value};
+  if (action->value || action->motion != catalogue::Motion::none) {
+    if (!given) return Deed{*action, action->value.value_or(0)};
     return tl::unexpected(bad_action_value(*action, "it takes no value",
                                            fmt::format("write '{}' alone", action->name)));
   }
@@ -72,7 +87,7 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
                                            fmt::format("write {}=VALUE", action->name)));
   }
   return parse_action_value(*action, std::string_view(text).substr(equals + 1))
-      .map([&](std::uint16_t value) {
+      .map([&](std::int64_t value) {
         return Deed{*action, value};
       });
 }
@@ -100,7 +115,13 @@ Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& targe
                              const Context& context) {
   std::vector<std::string> hazardous;
   for (const Deed& deed : deeds) {
-    if (deed.action.hazard != Hazard::none) hazardous.push_back(deed.action.name);
+    if (deed.action.hazard == Hazard::link) {
+      const std::string what =
+          fmt::format("{} on {}: {}", deed.action.name, target.shown, deed.action.note);
+      if (auto given = ask_typed_consent(what, deed.action.name, context); !given) return given;
+    } else if (deed.action.hazard != Hazard::none || target.reach == Reach::everybody) {
+      hazardous.push_back(deed.action.name);
+    }
   }
   if (hazardous.empty()) return {};
   return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
@@ -112,10 +133,30 @@ std::string_view to_text(device::ActionResult result) {
       return "confirmed";
     case device::ActionResult::sent:
       return "sent";
+    case device::ActionResult::finished:
+      return "finished";
     case device::ActionResult::not_confirmed:
       return "not-confirmed";
   }
   return "";
+}
+
+Result<device::ActionResult> perform_deed(const Deed& deed, OpenTool& tool,
+                                          const Context& context) {
+  const Action& action = deed.action;
+  if (!action.note.empty()) {
+    context.renderer.note(fmt::format("{}: {}: {}", tool.target.shown, action.name, action.note));
+  }
+  const bool everybody = tool.target.reach == Reach::everybody;
+  if (everybody && action.prepare) {
+    context.renderer.note(fmt::format("{}: {}: every motor on the line is stopped for it",
+                                      tool.target.shown, action.name));
+  }
+  if (action.motion == catalogue::Motion::stop) {
+    return stop_motor(tool, catalogue::StopMode::decelerate, context).map(in_words_of_actions);
+  }
+  if (!everybody) return tool.device.perform(action, deed.value);
+  return tool.device.broadcast(action, deed.value).map([] { return device::ActionResult::sent; });
 }
 
 report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,
@@ -129,10 +170,12 @@ report::Record deed_record(const Deed& deed, device::ActionResult result, const 
 }
 
 Error not_confirmed(const Deed& deed, const Target& target) {
+  const bool busy = deed.action.confirm.empty();
   return target.blamed(
       {.code = Errc::mismatch,
-       .message = fmt::format("the tool acknowledged it, but {} does not show the effect",
-                              deed.action.confirm),
+       .message = busy ? "the tool acknowledged it, but does not show that it is done"
+                       : fmt::format("the tool acknowledged it, but {} does not show the effect",
+                                     deed.action.confirm),
        .hint = "is the tool running or locked? its register may also mean something else here",
        .name = deed.action.name,
        .register_address = deed.action.address.value});

@@ -15,7 +15,7 @@ namespace spindle::commands {
 /// An action of the catalogue with the value to send.
 struct Deed {
   catalogue::Action action;
-  std::uint16_t value;
+  std::int64_t value;
 };
 
 /// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`.
@@ -32,6 +32,10 @@ Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& targe
                              const Context& context);
 
 std::string_view to_text(device::ActionResult result);
+
+/// Carries out one deed on its tool, or sends it to everybody where the target says so. Tells what
+/// its note says beforehand.
+Result<device::ActionResult> perform_deed(const Deed& deed, OpenTool& tool, const Context& context);
 
 report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,
                            const Clock& clock);

@@ -19,7 +19,8 @@ using catalogue::Profile;
 
 /// A started motion needs somebody who stops it again, and this command ends at once.
 Result<void> check_guard(const Deed& deed) {
-  const bool starts = deed.action.stop_value && deed.value != *deed.action.stop_value;
+  const bool starts = deed.action.motion == catalogue::Motion::start ||
+                      (deed.action.stop_value && deed.value != *deed.action.stop_value);
   if (deed.action.hazard != Hazard::moves || !starts) return {};
   return tl::unexpected(
       Error{.code = Errc::usage,
@@ -73,7 +74,7 @@ Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Contex
   Listing listing(context, deed_columns());
   ChangeLog log("do", tool, context);
   for (const Deed& deed : deeds) {
-    const auto result = tool.device.perform(deed.action, deed.value);
+    const auto result = perform_deed(deed, tool, context);
     log.add(logged(deed, result));
     if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
     std::optional<Error> error;
@@ -90,10 +91,13 @@ Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Contex
   return listing.end()
       .and_then([&] {
         return context.renderer.summary(
-            summary_record({{"done", number(static_cast<std::int64_t>(outcome.succeeded()))},
+            summary_record({{tool.target.reach == Reach::everybody ? "sent" : "done",
+                             number(static_cast<std::int64_t>(outcome.succeeded()))},
                             {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
                            outcome.status(), tool.target.shown, context.clock),
-            fmt::format("{} done, {} failed", outcome.succeeded(), outcome.failed()));
+            fmt::format("{} {}, {} failed", outcome.succeeded(),
+                        tool.target.reach == Reach::everybody ? "sent, not acknowledged" : "done",
+                        outcome.failed()));
       })
       .map([&] { return outcome; });
 }
@@ -101,8 +105,9 @@ Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Contex
 }  // namespace
 
 Result<Outcome> perform(const DoOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
+  auto target = resolve_target(options.target, context);
   if (!target) return tl::unexpected(target.error());
+  target->reach = options.reach;
   if (options.actions.empty()) return list_actions(*target, context);
   auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
     return check_deeds(options, profile, *target).and_then([&](std::vector<Deed> deeds) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "motor_records.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/value.hpp"
@@ -71,8 +72,8 @@ std::string missed_text(std::optional<std::uint32_t> missed) {
 }  // namespace
 
 NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile,
-                         catalogue::CodeTexts errors)
-    : target_(&target), profile_(&profile), errors_(std::move(errors)) {
+                         catalogue::CodeTables tables)
+    : target_(&target), profile_(&profile), tables_(std::move(tables)) {
   if (!profile.events) return;
   const catalogue::EventFacts& events = *profile.events;
   const auto table =
@@ -99,8 +100,8 @@ std::string NewsRecords::kind_of(const Registers& block) const {
 
 std::string NewsRecords::error_text(std::int64_t code) const {
   if (code == 0) return {};
-  const auto known = errors_.find(code);
-  return known == errors_.end() ? std::string() : known->second.text;
+  const auto known = tables_.error.find(code);
+  return known == tables_.error.end() ? std::string() : known->second.text;
 }
 
 Record NewsRecords::event(const device::EventNews& news) const {
@@ -148,6 +149,10 @@ Record NewsRecords::change(const device::ValueNews& news, WallTime time) const {
       only_shown("text", fmt::format("{}: {}{}{}{}", parameter.name, before, news.value.to_string(),
                                      unit.empty() ? "" : " ", unit)));
   return record;
+}
+
+Record NewsRecords::motor(const device::MotorNews& news) const {
+  return motor_record(news, *target_, tables_);
 }
 
 Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {

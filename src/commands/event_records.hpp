@@ -17,10 +17,12 @@ namespace spindle::commands {
 class NewsRecords {
  public:
   /// `target` and `profile` must outlive it.
-  NewsRecords(const Target& target, const catalogue::Profile& profile, catalogue::CodeTexts errors);
+  NewsRecords(const Target& target, const catalogue::Profile& profile,
+              catalogue::CodeTables tables);
 
   [[nodiscard]] report::Record event(const device::EventNews& news) const;
   [[nodiscard]] report::Record change(const device::ValueNews& news, WallTime time) const;
+  [[nodiscard]] report::Record motor(const device::MotorNews& news) const;
   [[nodiscard]] report::Record gap(const device::GapNews& news, WallTime time) const;
   [[nodiscard]] report::Record link(const device::LinkNews& news, WallTime time) const;
 
@@ -41,7 +43,7 @@ class NewsRecords {
 
   const Target* target_;
   const catalogue::Profile* profile_;
-  catalogue::CodeTexts errors_;
+  catalogue::CodeTables tables_;
   std::vector<EventField> fields_ = {};
   std::size_t kind_at_ = 0;
 };

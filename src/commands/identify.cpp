@@ -8,6 +8,7 @@
 #include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
+#include "spindle/device/motor.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -76,12 +77,47 @@ void tell_notes(const Identified& identified, const Context& context) {
   }
 }
 
+/// What can be read of a product that has no identity: whether it runs, its alarm, its input mode.
+std::string state_words(OpenTool& tool) {
+  const auto motor = device::Motor::of(*tool.profile);
+  const auto mode = tool.profile->select({tool.profile->run->mode});
+  if (!motor || !mode) return {};
+  const auto state = motor->look(tool.device);
+  const auto modes = tool.device.read_each(*mode, device::Limits::skip);
+  if (!state || !modes || !modes->front().value) return "its registers could not be read";
+  const std::string alarm =
+      state->alarm == 0 ? "no alarm" : fmt::format("alarm {:02X}h", state->alarm);
+  return fmt::format("it says: {}, {}, {} {}", state->running ? "motor runs" : "motor stands still",
+                     alarm, mode->front().name, modes->front().value->to_string());
+}
+
+/// A product without an identity can only be met, not proven.
+Result<Identified> meet(OpenTool& tool, const Clock& clock) {
+  const auto round_trip = tool.device.ping();
+  if (!round_trip) return tl::unexpected(round_trip.error());
+  Identification found;
+  found.profile = tool.profile->id;
+  found.candidates = {tool.profile->id};
+  found.maker = tool.profile->maker;
+  found.series = tool.profile->series;
+  found.identity.notes.push_back(
+      fmt::format("answers a loop-back, but a {} can not prove what it is: profile {} is what the "
+                  "user named",
+                  tool.profile->series, tool.profile->id));
+  if (tool.profile->run) found.identity.notes.push_back(state_words(tool));
+  return Identified{identity_record(tool, found, *round_trip, clock), std::nullopt};
+}
+
 Result<Identified> identify_one(const Target& target, const Context& context) {
   auto profile = load_profile(target, context);
   if (!profile) return tl::unexpected(std::move(profile.error()));
   const std::string only = profile->id;
   auto tool = connect(target, std::move(*profile), context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (!tool->profile->identity && tool->profile->link.loopback) return meet(*tool, context.clock);
+  if (target.profile.empty() && target.endpoint.medium != link::Medium::tcp) {
+    return tl::unexpected(unproven(tool->target));
+  }
   const auto answer = tool->device.report_server_id();
   if (!answer) return tl::unexpected(answer.error());
   const Duration round_trip = tool->device.session().last_round_trip();

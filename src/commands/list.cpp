@@ -65,7 +65,8 @@ Result<Outcome> list(const ListOptions& options, Context& context) {
   const auto parameters = subject->profile.select(subject->patterns);
   if (!parameters) return tl::unexpected(parameters.error());
   Outcome outcome;
-  Listing listing(context, parameter_columns());
+  const auto columns = parameter_columns(*parameters);
+  Listing listing(context, columns);
   for (const catalogue::Parameter& parameter : *parameters) {
     listing.add(parameter_record(parameter, subject->target, context.clock));
     outcome.succeed();

@@ -7,11 +7,29 @@
 #include <utility>
 
 #include "spindle/link/serial_settings.hpp"
+#include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 
 namespace spindle::commands {
 namespace {
+
+/// Whom a broadcast inside the program reaches.
+const std::vector<modbus::UnitId> simulated_bus = {{1}, {2}, {3}};
+
+std::vector<modbus::UnitId> units_for(const link::Endpoint& endpoint,
+                                      const catalogue::LinkFacts& facts) {
+  const modbus::UnitId unit = endpoint.unit.value_or(modbus::UnitId{facts.unit});
+  return unit.value == 0 ? simulated_bus : std::vector<modbus::UnitId>{unit};
+}
+
+sim::BlvOptions bus_options(const SimulatedToolOptions& options) {
+  sim::BlvOptions bus{.baud = options.baud.value_or(0)};
+  if (options.units.empty()) return bus;
+  bus.units.clear();
+  for (const modbus::UnitId unit : options.units) bus.units.push_back(unit.value);
+  return bus;
+}
 
 /// The identity has one of the lengths at which the profile says that something more begins.
 Result<void> check_identity_bytes(const catalogue::Profile& profile,
@@ -32,9 +50,11 @@ Result<void> check_identity_bytes(const catalogue::Profile& profile,
 Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profile,
                                                  const catalogue::SimulationFacts& start,
                                                  const SimulatedToolOptions& options) {
-  if (profile.link.framing == modbus::Framing::rtu) {
+  if (profile.run) return sim::make_blv_bus(profile, start, bus_options(options));
+  if (!profile.events) {
     return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "serial tools can not be simulated by this version",
+                                .message = "this product can not be simulated",
+                                .hint = "its profile has neither 'run' nor 'events'",
                                 .name = profile.id});
   }
   if (auto known = check_identity_bytes(profile, options.identity_bytes); !known) {
@@ -81,6 +101,7 @@ device::OpenTransport with_simulated_tools(const Context& context, SimulatedTool
     }
     SimulatedToolOptions wanted = options;
     wanted.baud = endpoint.baud;
+    wanted.units = units_for(endpoint, facts);
     auto tool = make_simulated_tool(endpoint.profile, wanted, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     return sim::make_sim_transport(

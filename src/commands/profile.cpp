@@ -56,7 +56,8 @@ Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context
   Listing head(context, profile_columns);
   head.add(profile_record(*profile, context.clock));
   if (auto ended = head.end(); !ended) return tl::unexpected(std::move(ended.error()));
-  Listing parameters(context, parameter_columns());
+  const auto columns = parameter_columns(profile->parameters);
+  Listing parameters(context, columns);
   for (const catalogue::Parameter& parameter : profile->parameters) {
     parameters.add(parameter_record(parameter, {}, context.clock));
   }

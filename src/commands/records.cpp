@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -22,27 +23,54 @@ Cell number_or_null(const std::optional<catalogue::Value>& value) {
   return value ? Cell(value->number) : Cell(std::monostate());
 }
 
-/// What it means, with the labels of an enumeration behind it.
+/// "bit 3 FWD (while motor.input-mode is 0)"; the condition only where there is one.
+std::string bit_text(const catalogue::BitName& bit, const Parameter& parameter) {
+  if (!bit.when) return fmt::format("bit {} {}", bit.bit, bit.text);
+  return fmt::format("bit {} {} while {} is {}", bit.bit, bit.text, parameter.bits_by, *bit.when);
+}
+
+/// What it means, with the labels of an enumeration or the bits of a bit field behind it.
 std::string meaning_of(const Parameter& parameter) {
-  if (parameter.labels.empty()) return parameter.title;
+  if (parameter.labels.empty() && parameter.bits.empty()) return parameter.title;
   std::vector<std::string> texts;
+  for (const auto& bit : parameter.bits) texts.push_back(bit_text(bit, parameter));
   for (const auto& label : parameter.labels) {
     texts.push_back(fmt::format("{} {}", label.number, label.text));
   }
   return fmt::format("{} ({})", parameter.title, fmt::join(texts, ", "));
 }
 
+/// What only some products say of their parameters.
+void add_drive_fields(const Parameter& parameter, report::Record& record) {
+  if (!parameter.bits.empty()) {
+    report::Texts bits;
+    for (const auto& bit : parameter.bits) bits.push_back(bit_text(bit, parameter));
+    record.fields.push_back({"bits", bits});
+  }
+  if (parameter.except) {
+    record.fields.push_back({"except_minimum", number_or_null(parameter.except->minimum)});
+    record.fields.push_back({"except_maximum", number_or_null(parameter.except->maximum)});
+  }
+  if (parameter.effect) {
+    record.fields.push_back({"effect", std::string(catalogue::to_text(*parameter.effect))});
+  }
+  if (!parameter.risk.empty()) record.fields.push_back({"risk", parameter.risk});
+}
+
 /// What may be given: nothing (a fixed value), labels, or a range.
 std::string values_of(const catalogue::Action& action) {
-  if (!action.labels.empty()) {
-    std::vector<std::string> texts;
-    for (const auto& label : action.labels) {
-      texts.push_back(fmt::format("{} {}", label.number, label.text));
-    }
-    return fmt::format("{}", fmt::join(texts, ", "));
+  if (action.motion != catalogue::Motion::none) return {};
+  std::vector<std::string> texts;
+  for (const auto& label : action.labels) {
+    texts.push_back(fmt::format("{} {}", label.number, label.text));
   }
-  if (action.value) return std::to_string(*action.value);
-  return fmt::format("{}..{}", action.minimum, action.maximum);
+  const bool ranged = action.labels.empty() || action.has_range;
+  if (action.value) {
+    if (texts.empty()) texts.push_back(std::to_string(*action.value));
+  } else if (ranged) {
+    texts.push_back(fmt::format("{}..{}", action.minimum, action.maximum));
+  }
+  return fmt::format("{}", fmt::join(texts, ", "));
 }
 
 /// The type as people read it: "u16", "u16 * 0.01".
@@ -103,38 +131,44 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   for (const auto& label : parameter.labels) {
     labels.emplace_back(std::to_string(label.number), label.text);
   }
-  return {.type = "parameter",
-          .target = target,
-          .time = clock.wall(),
-          .fields = {{"name", parameter.name},
-                     {"title", parameter.title, meaning_of(parameter)},
-                     {"table", std::string(catalogue::to_text(parameter.table))},
-                     {"register", number(parameter.address.value)},
-                     {"encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
-                      type_of(parameter.encoding)},
-                     {"scale", parameter.encoding.scale},
-                     {"unit", text_or_null(parameter.unit)},
-                     {"minimum", number_or_null(parameter.range.minimum)},
-                     {"maximum", number_or_null(parameter.range.maximum)},
-                     {"default", number_or_null(parameter.default_value)},
-                     {"labels", labels},
-                     {"access", std::string(catalogue::to_text(parameter.access))},
-                     {"evidence", std::string(catalogue::to_text(parameter.evidence))},
-                     {"source", parameter.source},
-                     {"note", text_or_null(parameter.note)}}};
+  report::Record record{
+      .type = "parameter",
+      .target = target,
+      .time = clock.wall(),
+      .fields = {{"name", parameter.name},
+                 {"title", parameter.title, meaning_of(parameter)},
+                 {"table", std::string(catalogue::to_text(parameter.table))},
+                 {"register", number(parameter.address.value)},
+                 {"encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
+                  type_of(parameter.encoding)},
+                 {"scale", parameter.encoding.scale},
+                 {"unit", text_or_null(parameter.unit)},
+                 {"minimum", number_or_null(parameter.range.minimum)},
+                 {"maximum", number_or_null(parameter.range.maximum)},
+                 {"default", number_or_null(parameter.default_value)},
+                 {"labels", labels},
+                 {"access", std::string(catalogue::to_text(parameter.access))},
+                 {"evidence", std::string(catalogue::to_text(parameter.evidence))},
+                 {"source", parameter.source},
+                 {"note", text_or_null(parameter.note)}}};
+  add_drive_fields(parameter, record);
+  return record;
 }
 
-std::span<const Column> parameter_columns() {
-  static const std::array<Column, 10> columns = {{{"NAME", "name"},
-                                                  {"TABLE", "table"},
-                                                  {"REGISTER", "register", Align::right},
-                                                  {"TYPE", "encoding"},
-                                                  {"MINIMUM", "minimum", Align::right},
-                                                  {"MAXIMUM", "maximum", Align::right},
-                                                  {"UNIT", "unit"},
-                                                  {"ACCESS", "access"},
-                                                  {"EVIDENCE", "evidence"},
-                                                  {"MEANING", "title"}}};
+std::vector<Column> parameter_columns(const std::vector<Parameter>& parameters) {
+  std::vector<Column> columns = {{{"NAME", "name"},
+                                  {"TABLE", "table"},
+                                  {"REGISTER", "register", Align::right},
+                                  {"TYPE", "encoding"},
+                                  {"MINIMUM", "minimum", Align::right},
+                                  {"MAXIMUM", "maximum", Align::right},
+                                  {"UNIT", "unit"},
+                                  {"ACCESS", "access"},
+                                  {"EVIDENCE", "evidence"},
+                                  {"MEANING", "title"}}};
+  const bool any = std::any_of(parameters.begin(), parameters.end(),
+                               [](const Parameter& one) { return one.effect.has_value(); });
+  if (any) columns.insert(columns.end() - 1, {"TAKES EFFECT", "effect"});
   return columns;
 }
 
@@ -150,24 +184,28 @@ std::string_view hazard_text(catalogue::Hazard hazard) {
       return "unclear";
     case catalogue::Hazard::erases:
       return "erases";
+    case catalogue::Hazard::link:
+      return "link";
   }
   return "";
 }
 
 report::Record action_record(const catalogue::Action& action, const std::string& target,
                              const Clock& clock) {
-  return {.type = "action",
-          .target = target,
-          .time = clock.wall(),
-          .fields = {{"action", action.name},
-                     {"title", action.title},
-                     {"register", number(action.address.value)},
-                     {"values", values_of(action)},
-                     {"hazard", std::string(hazard_text(action.hazard))},
-                     {"evidence", std::string(catalogue::to_text(action.evidence))},
-                     {"source", action.source},
-                     {"check", text_or_null(action.check)},
-                     {"confirm", text_or_null(action.confirm)}}};
+  report::Record record{.type = "action",
+                        .target = target,
+                        .time = clock.wall(),
+                        .fields = {{"action", action.name},
+                                   {"title", action.title},
+                                   {"register", number(action.address.value)},
+                                   {"values", values_of(action)},
+                                   {"hazard", std::string(hazard_text(action.hazard))},
+                                   {"evidence", std::string(catalogue::to_text(action.evidence))},
+                                   {"source", action.source},
+                                   {"check", text_or_null(action.check)},
+                                   {"confirm", text_or_null(action.confirm)}}};
+  if (!action.note.empty()) record.fields.push_back({"note", action.note});
+  return record;
 }
 
 std::span<const Column> action_columns() {

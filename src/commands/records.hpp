@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "spindle/commands/context.hpp"
 #include "spindle/commands/target.hpp"
@@ -23,7 +24,8 @@ std::span<const report::Column> value_columns(device::Limits limits);
 
 report::Record parameter_record(const catalogue::Parameter& parameter, const std::string& target,
                                 const Clock& clock);
-std::span<const report::Column> parameter_columns();
+/// When a value takes effect is a column only where a parameter says it.
+std::vector<report::Column> parameter_columns(const std::vector<catalogue::Parameter>& parameters);
 
 /// An action as a catalogue entry, for lists.
 report::Record action_record(const catalogue::Action& action, const std::string& target,

@@ -5,8 +5,10 @@
 #include "change_log.hpp"
 #include "deeds.hpp"
 #include "event_records.hpp"
+#include "guarded_run.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "run_motor.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_follower.hpp"
@@ -100,7 +102,7 @@ class RemoteRun {
         plan_(&plan),
         tool_(&tool),
         context_(&context),
-        calm_context_(calm_context(context)),
+        guarded_(tool, context),
         log_("remote-start", tool, context) {}
 
   Result<Outcome> run() {
@@ -111,11 +113,11 @@ class RemoteRun {
       return tl::unexpected(std::move(prepared.error()));
     }
     if (context_->calm.stay_awake) context_->calm.stay_awake();
-    device::RunGuard guard(tool_->device, plan_->start, reopener(), context_->calm.clock);
+    device::RunGuard guard(tool_->device, plan_->start, guarded_.reopener(), context_->calm.clock);
     const device::FollowOptions following = limit_run();
     auto followed = guard.start().and_then([&] { return follower.follow(following); });
     const device::StopReport stop = guard.stop();
-    show_state("");  // not before the stop: a terminal may keep its writer waiting
+    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);
@@ -134,17 +136,6 @@ class RemoteRun {
     return {};
   }
 
-  /// A line that signals do not end, for a stop after the first one broke.
-  device::RunGuard::Reopen reopener() {
-    return [this](Duration patience) {
-      show_state("the link is lost; trying to stop the tool");
-      const Duration usual =
-          context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-      calm_context_.common.connect_timeout = std::min(usual, patience);
-      return connect_device(tool_->target, *tool_->profile, calm_context_);
-    };
-  }
-
   /// The time allowed begins before the start is sent, and its echo is not waited for any longer.
   device::FollowOptions limit_run() {
     device::FollowOptions following;
@@ -157,24 +148,9 @@ class RemoteRun {
   }
 
   Result<void> go_on(Duration elapsed) {
-    if (context_->io.out_is_open && !context_->io.out_is_open()) {
-      return tl::unexpected(Error{.code = Errc::closed_pipe});
-    }
-    show_progress(elapsed);
-    return {};
-  }
-
-  void show_progress(Duration elapsed) {
-    const auto tenths =
-        std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count() / 100;
-    show_state(fmt::format("running {}.{} s", tenths / 10, tenths % 10));
-  }
-
-  /// The one line on a terminal that changes while something goes on.
-  void show_state(std::string_view text) {
-    const report::Streams& io = context_->io;
-    const bool ready = !io.err_is_ready || io.err_is_ready();
-    if (io.err_is_terminal && ready) io.err(fmt::format("\r\x1b[K{}", text));
+    auto read = guarded_.check_reader();
+    if (read) guarded_.show_running(elapsed);
+    return read;
   }
 
   /// The event of the run: the one that ended it, or the one that our stop caused.
@@ -190,9 +166,9 @@ class RemoteRun {
   Result<Outcome> report(const Result<device::FollowedRun>& followed,
                          const std::optional<device::EventNews>& event,
                          const device::StopReport& stop) {
-    const auto codes = context_->profiles.load_error_codes(tool_->profile->id);
+    const auto tables = context_->profiles.load_code_tables(tool_->profile->path);
     const NewsRecords records(tool_->target, *tool_->profile,
-                              codes.value_or(catalogue::CodeTexts()));
+                              tables.value_or(catalogue::CodeTables()));
     Listing listing(*context_, news_columns(Tools::one));
     std::string kind;
     if (event) {
@@ -201,15 +177,13 @@ class RemoteRun {
     }
     log_run(followed, kind, stop);
     judge(followed, kind);
-    if (stop.result == device::StopResult::unconfirmed) {
-      outcome_ = {};  // nothing else matters as much
-      fail(unconfirmed_stop(stop));
-    }
+    if (stop.result == device::StopResult::unconfirmed) guarded_.fail(stop);
     const auto listed = listing.end();
-    const auto told = tell_errors();
-    if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
-    if (!listed || !told) return outcome_;
-    return summarise(kind, stop).map([&] { return outcome_; });
+    const auto told = guarded_.tell_errors();
+    const Outcome& outcome = guarded_.outcome();
+    if (outcome.failed() == 0 && !listed) return tl::unexpected(listed.error());
+    if (!listed || !told) return outcome;
+    return summarise(kind, stop).map([&] { return outcome; });
   }
 
   void log_run(const Result<device::FollowedRun>& followed, const std::string& kind,
@@ -226,57 +200,34 @@ class RemoteRun {
 
   void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
     if (!followed) {
-      if (followed.error().code != Errc::closed_pipe) fail(tool_->target.blamed(followed.error()));
+      if (followed.error().code != Errc::closed_pipe)
+        guarded_.fail(tool_->target.blamed(followed.error()));
       return;
     }
     if (followed->ending == RunEnding::ignored && kind.empty()) {
-      fail(tool_->target.blamed({.code = Errc::mismatch,
-                                 .message = "the tool acknowledged the start, but does not run",
-                                 .hint = "is it locked, or without a battery charge?",
-                                 .name = plan_->start.name}));
+      guarded_.fail(
+          tool_->target.blamed({.code = Errc::mismatch,
+                                .message = "the tool acknowledged the start, but does not run",
+                                .hint = "is it locked, or without a battery charge?",
+                                .name = plan_->start.name}));
       return;
     }
     if (followed->ending == RunEnding::ended && kind.empty()) {
-      fail(tool_->target.blamed({.code = Errc::no_answer,
-                                 .message = "the tool ran, but never sent a result",
-                                 .hint = "'spindle get' with 'event.*' shows its last event"}));
+      guarded_.fail(
+          tool_->target.blamed({.code = Errc::no_answer,
+                                .message = "the tool ran, but never sent a result",
+                                .hint = "'spindle get' with 'event.*' shows its last event"}));
       return;
     }
-    outcome_.succeed();
-    if (kind == "fastening-ng" || kind == "error") outcome_.negate();
-  }
-
-  /// Each on its own: they reach people even where nobody reads the records any more.
-  Result<void> tell_errors() {
-    Result<void> told;
-    for (const Error& error : errors_) {
-      auto written = context_->renderer.error(error, context_->clock.wall());
-      if (told) told = std::move(written);
-    }
-    return told;
-  }
-
-  void fail(const Error& error) {
-    outcome_.fail(error);
-    errors_.push_back(error);
-  }
-
-  Error unconfirmed_stop(const device::StopReport& stop) const {
-    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(stop.tried).count();
-    return tool_->target.blamed(
-        {.code = Errc::no_answer,
-         .message =
-             fmt::format("THE TOOL MAY STILL RUN: the stop was tried for {} s ({} times) and "
-                         "could not be confirmed: {}",
-                         seconds, stop.attempts, stop.trouble),
-         .hint = "stop it at the tool"});
+    guarded_.outcome().succeed();
+    if (kind == "fastening-ng" || kind == "error") guarded_.outcome().negate();
   }
 
   Result<void> summarise(const std::string& kind, const device::StopReport& stop) {
     const bool stopped = stop.result == device::StopResult::confirmed;
     return context_->renderer.summary(
         summary_record({{"result", text_or_null(kind)}, {"stop_confirmed", stopped}},
-                       outcome_.status(), tool_->target.shown, context_->clock),
+                       guarded_.outcome().status(), tool_->target.shown, context_->clock),
         fmt::format("{}; the tool {}", words_of(kind),
                     stopped ? "stands still" : "may still run: the stop could not be confirmed"));
   }
@@ -285,17 +236,38 @@ class RemoteRun {
   const RunPlan* plan_;
   OpenTool* tool_;
   Context* context_;
-  Context calm_context_;  ///< lines that are opened on it refer to it
+  GuardedRun guarded_;
   ChangeLog log_;
-  Outcome outcome_ = {};
-  std::vector<Error> errors_ = {};
 };
+
+/// What only motors have is a mistake on a tool that runs by itself.
+Result<void> check_tool_options(const RemoteStartOptions& options) {
+  const std::pair<std::string_view, bool> given[] = {
+      {"--speed", !options.speed.empty()},
+      {"--reverse", options.direction_of_motor == catalogue::Direction::reverse},
+      {"--operation", options.operation.has_value()},
+      {"--acceleration", !options.acceleration.empty()},
+      {"--deceleration", !options.deceleration.empty()},
+      {"--watchdog", options.watchdog.has_value()},
+      {"--stop", options.stop.has_value()}};
+  for (const auto& [option, is_given] : given) {
+    if (!is_given) continue;
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "this tool has no motor that is run by speed",
+                                .hint = "it takes --preset, --direction and --for",
+                                .name = std::string(option)});
+  }
+  return {};
+}
 
 }  // namespace
 
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context) {
   const auto target = resolve_target(options.target, context);
   if (!target) return tl::unexpected(target.error());
+  const auto known = load_profile(*target, context);
+  if (known && known->run) return run_motor(options, *target, context);
+  if (auto fits = check_tool_options(options); !fits) return tl::unexpected(fits.error());
   auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
     return plan_run(options, profile, *target).and_then([&](RunPlan plan) {
       return ask_to_start(plan, *target, context).map([&] { return std::move(plan); });

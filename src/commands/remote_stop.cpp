@@ -6,26 +6,22 @@
 #include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
+#include "spindle/device/motor.hpp"
 #include "spindle/device/run_guard.hpp"
 #include "stops.hpp"
 
 namespace spindle::commands {
 namespace {
 
-constexpr int most_stops = 3;
-
-/// Whether the tool may still run although it can be reached.
-bool leaves_open(const Result<device::StopResult>& stopped) {
-  if (stopped) return *stopped == device::StopResult::unconfirmed;
-  return stopped.error().code == Errc::no_answer;
-}
-
 /// Neither asks nor waits for anything but the proof: somebody wants this tool to stand still.
-Result<device::StopResult> stop_one(const Target& target, const Context& context) {
+Result<device::StopResult> stop_one(const Target& target, const RemoteStopOptions& options,
+                                    const Context& context) {
   auto profile = load_profile(target, context);
   if (!profile) return tl::unexpected(std::move(profile.error()));
   auto tool = open_tool(target, std::move(*profile), Need::named_registers, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (tool->profile->run)
+    return stop_motor(*tool, options.stop.value_or(catalogue::StopMode::decelerate), context);
   const auto start = find_start(*tool->profile);
   if (!start) return tl::unexpected(start.error());
   // A stop may be repeated without harm, and one lost answer must not leave a motor running.
@@ -39,10 +35,11 @@ Result<device::StopResult> stop_one(const Target& target, const Context& context
 }  // namespace
 
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
-  const auto targets = resolve_targets(options.targets, context);
+  auto targets = resolve_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
-  const auto results =
-      side_by_side(*targets, [&](const Target& target) { return stop_one(target, context); });
+  for (Target& target : *targets) target.reach = options.reach;
+  const auto results = side_by_side(
+      *targets, [&](const Target& target) { return stop_one(target, options, context); });
   Outcome outcome;
   Listing listing(context, stop_columns());
   for (std::size_t index = 0; index < results.size(); ++index) {
@@ -62,10 +59,13 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   return listing.end()
       .and_then([&] {
         return context.renderer.summary(
-            summary_record({{"stopped", number(static_cast<std::int64_t>(outcome.succeeded()))},
+            summary_record({{options.reach == Reach::everybody ? "sent" : "stopped",
+                             number(static_cast<std::int64_t>(outcome.succeeded()))},
                             {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
                            outcome.status(), {}, context.clock),
-            fmt::format("{} stopped, {} failed{}", outcome.succeeded(), outcome.failed(),
+            fmt::format("{} {}, {} failed{}", outcome.succeeded(),
+                        options.reach == Reach::everybody ? "sent, not acknowledged" : "stopped",
+                        outcome.failed(),
                         outcome.failed() == 0
                             ? ""
                             : "; what could not be stopped may still run: stop it at the tool"));

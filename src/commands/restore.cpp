@@ -5,7 +5,9 @@
 #include "consent.hpp"
 #include "records.hpp"
 #include "restore_run.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/files/backup_file.hpp"
+#include "storing.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -80,6 +82,10 @@ std::vector<std::string> warnings_for(const RestoreTask& task) {
                                    other->parameter.name,
                                    task.backup.find(other->parameter.name)->unit, other->unit));
   }
+  for (const auto& write : task.plan.writes) {
+    if (write.parameter.risk.empty()) continue;
+    warnings.push_back(fmt::format("{}: {}", write.parameter.name, write.parameter.risk));
+  }
   for (const auto& [parameter, why] : task.plan.skipped) {
     if (why == Skip::read_only || why == Skip::equal) continue;
     warnings.push_back(fmt::format("{} is skipped: {}", parameter.name,
@@ -134,16 +140,18 @@ Result<Outcome> end_dry_run(const RestoreTask& task, const Target& target, Conte
 }
 
 /// Whoever is asked sees first what it is about.
-Result<void> ask(const RestoreTask& task, const Target& target, Context& context) {
-  if (task.plan.writes.empty()) return {};
+Result<void> ask(const RestoreTask& task, const RestoreOptions& options, const Target& target,
+                 Context& context) {
+  const bool stores = options.storing == Storing::yes;
+  if (task.plan.writes.empty() && !stores) return {};
   context.renderer.note(fmt::format("{}: {}", target.shown, counts_of(task)));
   const bool is_asked = context.common.consent == Consent::ask && context.io.in_is_terminal &&
                         context.io.err_is_terminal;
   if (is_asked) {
     if (auto shown = show_plan(task, target, context); !shown) return shown;
   }
-  return ask_consent(fmt::format("write {} parameter{} to {}", task.plan.writes.size(),
-                                 task.plan.writes.size() == 1 ? "" : "s", target.shown),
+  return ask_consent(fmt::format("write {} to {}{}", counted(task.plan.writes.size(), "parameter"),
+                                 target.shown, stores ? ", and save" : ""),
                      context);
 }
 
@@ -155,6 +163,9 @@ struct Wanted {
 
 Result<Wanted> understand(const files::BackupFile& file, const RestoreOptions& options,
                           const Profile& profile) {
+  if (auto storing = check_storing(options.storing, profile); !storing) {
+    return tl::unexpected(std::move(storing.error()));
+  }
   auto backup = files::understand_backup(file, profile);
   if (!backup) return tl::unexpected(std::move(backup.error()));
   auto selection = catalogue::Selection::make(options.patterns, {}, profile);
@@ -207,7 +218,7 @@ Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   }
   if (!task->plan.findings.empty()) return refuse(*task, tool.target, context);
   if (options.execution == Execution::dry_run) return end_dry_run(*task, tool.target, context);
-  if (auto agreed = ask(*task, tool.target, context); !agreed) {
+  if (auto agreed = ask(*task, options, tool.target, context); !agreed) {
     return tl::unexpected(std::move(agreed.error()));
   }
   return RestoreRun(options, *task, tool, context).run();

@@ -8,6 +8,7 @@
 
 #include "records.hpp"
 #include "spindle/files/backup_file.hpp"
+#include "storing.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -329,12 +330,15 @@ Result<Outcome> RestoreRun::end() {
     error.hint = fmt::format("'{}' writes the rest", command_to_finish());
     errors_.push_back(error);
   }
-  const auto listed = listing_->end();
+  auto listed = listing_->end();
+  if (listed && errors_.empty() && options_->storing == Storing::yes) {
+    listed = store(*tool_, log_, outcome_, *context_);
+  }
   for (const Error& error : errors_) {
     const auto told = context_->renderer.error(error, context_->clock.wall());
     static_cast<void>(told);  // on stderr it is in any case
   }
-  if (errors_.empty()) outcome_.succeed();
+  if (errors_.empty() && outcome_.failed() == 0) outcome_.succeed();
   if (!listed && errors_.empty()) return tl::unexpected(listed.error());
   if (!listed) return outcome_;
   std::string sentence = fmt::format("{} written, {} unchanged", written_, unchanged);

@@ -1,16 +1,20 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <optional>
 #include <utility>
 
 #include "change_log.hpp"
+#include "consent.hpp"
+#include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/catalogue/snapshot.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
+#include "storing.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -24,10 +28,11 @@ using report::Column;
 struct Assignment {
   Parameter parameter;
   Value value;
+  std::string text;  ///< as typed: names of bits may mean others once the tool was read
 };
 
 /// How one assignment ended, as in the contract's record `write`.
-enum class Ending : std::uint8_t { planned, written, unchanged, coerced, mismatch, refused };
+enum class Ending : std::uint8_t { planned, written, unchanged, coerced, mismatch, refused, sent };
 
 std::string_view to_text(Ending ending) {
   switch (ending) {
@@ -43,6 +48,8 @@ std::string_view to_text(Ending ending) {
       return "mismatch";
     case Ending::refused:
       return "refused";
+    case Ending::sent:
+      return "sent";
   }
   return "";
 }
@@ -82,7 +89,7 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
     value.error().register_address = parameter->address.value;
     return tl::unexpected(std::move(value.error()));
   }
-  return Assignment{std::move(*parameter), std::move(*value)};
+  return Assignment{std::move(*parameter), std::move(*value), text.substr(equals + 1)};
 }
 
 bool overlap(const Parameter& a, const Parameter& b) {
@@ -92,12 +99,35 @@ bool overlap(const Parameter& a, const Parameter& b) {
   return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
 }
 
+/// A motor that this would start needs somebody who stays to stop it.
+Result<void> check_motion(const Assignment& assignment, const Profile& profile) {
+  if (!profile.run) return {};
+  const auto command = profile.find(profile.run->command);
+  if (!command || !overlap(*command, assignment.parameter)) return {};
+  const auto registers = catalogue::encode(assignment.parameter, assignment.value.number);
+  if (!registers) return tl::unexpected(registers.error());
+  const unsigned end = assignment.parameter.address.value + unsigned(registers->size());
+  const unsigned low_word =
+      command->address.value + catalogue::register_count(command->encoding.kind) - 1U;
+  const bool starts = end > low_word && (registers->back() & profile.run->starting) != 0;
+  if (!starts) return {};
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = "it may start the motor, and 'set' does not stay to stop it",
+            .hint = "'spindle remote-start' starts it under a guard that always ends in a stop",
+            .name = assignment.parameter.name,
+            .register_address = assignment.parameter.address.value});
+}
+
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const Profile& profile) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
     auto assignment = parse_assignment(text, profile);
     if (!assignment) return tl::unexpected(std::move(assignment.error()));
+    if (auto calm = check_motion(*assignment, profile); !calm) {
+      return tl::unexpected(std::move(calm.error()));
+    }
     for (const Assignment& earlier : assignments) {
       if (!overlap(earlier.parameter, assignment->parameter)) continue;
       return tl::unexpected(Error{.code = Errc::usage,
@@ -126,12 +156,23 @@ Result<void> check_own_limits(const Assignment& assignment, const device::Readin
 /// One assignment with what the tool holds now.
 struct Step {
   const Assignment* assignment;
-  Value before;
+  std::optional<Value> before;  ///< empty: it can not be asked
 
-  [[nodiscard]] bool changes() const { return !(before == assignment->value); }
+  [[nodiscard]] bool changes() const { return before != assignment->value; }
 };
 
-Result<std::vector<Step>> check_against_tool(const std::vector<Assignment>& assignments,
+/// Names of bits as they count on this tool.
+Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading,
+                          const Profile& profile) {
+  if (assignment.parameter.bits_by.empty()) return {};
+  assignment.parameter = reading.parameter;
+  auto value = catalogue::parse_value(assignment.parameter, assignment.text);
+  if (!value) return tl::unexpected(std::move(value.error()));
+  assignment.value = std::move(*value);
+  return check_motion(assignment, profile);
+}
+
+Result<std::vector<Step>> check_against_tool(std::vector<Assignment>& assignments,
                                              device::Device& device) {
   std::vector<Parameter> parameters;
   parameters.reserve(assignments.size());
@@ -142,6 +183,9 @@ Result<std::vector<Step>> check_against_tool(const std::vector<Assignment>& assi
   for (std::size_t index = 0; index < assignments.size(); ++index) {
     const device::Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(reading.value.error());
+    if (auto known = resolve_bits(assignments[index], reading, device.profile()); !known) {
+      return tl::unexpected(std::move(known.error()));
+    }
     auto allowed = check_own_limits(assignments[index], reading, device.profile());
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
     steps.push_back({&assignments[index], *reading.value});
@@ -170,7 +214,8 @@ report::Record step_record(const Step& step, Ending ending, const Value& now, co
                         .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"register", number(parameter.address.value)},
-                   {"old", step.before.number, step.before.to_string()},
+                   {"old", step.before ? report::Cell(step.before->number) : report::Cell(),
+                    step.before ? step.before->to_string() : std::string()},
                    {"new", now.number, now.to_string()},
                    {"unit", text_or_null(unit_of(parameter, target))}};
   if (ending == Ending::planned) {
@@ -193,13 +238,44 @@ Error not_stored(const Step& step, const device::Written& written, const Target&
        .register_address = step.assignment->parameter.address.value});
 }
 
+/// When a value acts; empty where there is nothing to say.
+std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
+  if (!effect) return "";
+  switch (*effect) {
+    case catalogue::Effect::at_once:
+      return "";
+    case catalogue::Effect::after_stop:
+      return "takes effect when the motor stands still";
+    case catalogue::Effect::after_configuration:
+      return "takes effect after 'do configure'";
+    case catalogue::Effect::after_power_cycle:
+      return "takes effect after 'do save' and switching off and on";
+    case catalogue::Effect::unknown:
+      return "takes effect at a moment that is not known; at the latest after 'do save' and "
+             "switching off and on";
+  }
+  return "";
+}
+
+/// What has to be asked before anything is written.
+Result<void> ask_first(const SetOptions& options, const Profile& profile, const Target& target,
+                       const Context& context) {
+  std::vector<std::string> what;
+  if (options.reach == Reach::everybody) what.emplace_back("set");
+  if (auto storing = check_storing(options.storing, profile); !storing) return storing;
+  if (options.storing == Storing::yes) what.emplace_back(store_action);
+  if (what.empty() || options.execution == Execution::dry_run) return {};
+  return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), target.shown), context);
+}
+
 /// Carries out one plan, and stops at the first write that fails.
 class Writer {
  public:
-  Writer(OpenTool& tool, Execution execution, Context& context)
+  Writer(OpenTool& tool, const SetOptions& options, Context& context)
       : tool_(&tool),
+        options_(&options),
         context_(&context),
-        listing_(context, execution == Execution::dry_run ? plan_columns : write_columns),
+        listing_(context, options.execution == Execution::dry_run ? plan_columns : write_columns),
         log_("set", tool, context) {}
 
   Result<Outcome> plan(const std::vector<Step>& steps) {
@@ -213,12 +289,34 @@ class Writer {
                            unchanged_));
   }
 
+  /// Nobody says what they hold now.
+  Result<Outcome> send(const std::vector<Step>& steps) {
+    tell_risks(steps);
+    for (const Step& step : steps) {
+      const Assignment& assignment = *step.assignment;
+      const auto sent = tool_->device.broadcast(assignment.parameter, assignment.value);
+      if (!sent) {
+        fail(sent.error());
+        break;
+      }
+      note(step, Ending::sent, assignment.value);
+      log(step, to_text(Ending::sent), assignment.value);
+      ++changed_;
+      outcome_.succeed();
+    }
+    tell_effects(steps);
+    return end({{"sent", count(changed_)}, {"failed", count(outcome_.failed())}},
+               fmt::format("{} sent, not acknowledged", changed_));
+  }
+
   Result<Outcome> write(const std::vector<Step>& steps) {
+    tell_risks(steps);
     for (const Step& step : steps) {
       if (outcome_.failed() > 0) break;
       step.changes() ? write_one(step) : keep(step);
     }
     const std::size_t left = steps.size() - outcome_.succeeded() - outcome_.failed();
+    tell_effects(steps);
     std::string sentence = fmt::format("{} written, {} unchanged", changed_, unchanged_);
     if (outcome_.failed() > 0) {
       sentence += fmt::format(", {} failed, {} not tried", outcome_.failed(), left);
@@ -240,7 +338,7 @@ class Writer {
   }
 
   void keep(const Step& step) {
-    note(step, Ending::unchanged, step.before);
+    note(step, Ending::unchanged, *step.before);
     ++unchanged_;
     outcome_.succeed();
   }
@@ -251,16 +349,19 @@ class Writer {
   }
 
   void log(const Step& step, std::string_view result, const Value& now) {
-    log_.add(logged(step.assignment->parameter, step.before, now, result));
+    LoggedChange change =
+        logged(step.assignment->parameter, step.before.value_or(now), now, result);
+    if (!step.before) change.old_value.reset();
+    log_.add(change);
   }
 
   void write_one(const Step& step) {
     const Value& wanted = step.assignment->value;
-    const auto written = tool_->device.write(step.assignment->parameter, step.before, wanted);
+    const auto written = tool_->device.write(step.assignment->parameter, *step.before, wanted);
     if (!written) {
       const bool refused = written.error().code == Errc::exception_response;
-      if (refused) note(step, Ending::refused, step.before);
-      log(step, refused ? to_text(Ending::refused) : "unknown", refused ? step.before : wanted);
+      if (refused) note(step, Ending::refused, *step.before);
+      log(step, refused ? to_text(Ending::refused) : "unknown", refused ? *step.before : wanted);
       fail(written.error());
       return;
     }
@@ -278,8 +379,32 @@ class Writer {
     fail(not_stored(step, *written, tool_->target));
   }
 
+  /// What a change may cost, before it is made.
+  void tell_risks(const std::vector<Step>& steps) {
+    for (const Step& step : steps) {
+      const Parameter& parameter = step.assignment->parameter;
+      if (parameter.risk.empty() || !step.changes()) continue;
+      context_->renderer.note(
+          fmt::format("{}: {}: {}", tool_->target.shown, parameter.name, parameter.risk));
+    }
+  }
+
+  /// When what was written acts, where that is not at once.
+  void tell_effects(const std::vector<Step>& steps) {
+    for (const Step& step : steps) {
+      const Parameter& parameter = step.assignment->parameter;
+      const std::string_view words = effect_words(parameter.effect);
+      if (words.empty() || !step.changes()) continue;
+      context_->renderer.note(fmt::format("{}: {} {}", tool_->target.shown, parameter.name, words));
+    }
+  }
+
   Result<Outcome> end(std::vector<report::Field> counts, const std::string& sentence) {
     auto drawn = listing_.end();
+    const bool stores = options_->storing == Storing::yes && outcome_.failed() == 0;
+    if (drawn && stores && options_->execution == Execution::real) {
+      drawn = store(*tool_, log_, outcome_, *context_);
+    }
     if (drawn) {
       drawn = context_->renderer.summary(summary_record(std::move(counts), outcome_.status(),
                                                         tool_->target.shown, context_->clock),
@@ -289,6 +414,7 @@ class Writer {
   }
 
   OpenTool* tool_;
+  const SetOptions* options_;
   Context* context_;
   Listing listing_;
   ChangeLog log_;
@@ -297,18 +423,41 @@ class Writer {
   std::size_t unchanged_ = 0;
 };
 
+/// Everybody may have another setting, so only names that always count can be sent.
+Result<Outcome> send_to_all(std::vector<Assignment>& assignments, Writer& writer,
+                            const SetOptions& options) {
+  std::vector<Step> steps;
+  for (Assignment& assignment : assignments) {
+    if (!assignment.parameter.bits_by.empty()) {
+      assignment.parameter = catalogue::with_bits_for(assignment.parameter, std::nullopt);
+      auto value = catalogue::parse_value(assignment.parameter, assignment.text);
+      if (!value) return tl::unexpected(std::move(value.error()));
+      assignment.value = std::move(*value);
+    }
+    steps.push_back({&assignment, std::nullopt});
+  }
+  return options.execution == Execution::dry_run ? writer.plan(steps) : writer.send(steps);
+}
+
 }  // namespace
 
 Result<Outcome> set(const SetOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
+  auto target = resolve_target(options.target, context);
   if (!target) return tl::unexpected(target.error());
+  target->reach = options.reach;
   auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
-    return parse_assignments(options.assignments, profile);
+    return parse_assignments(options.assignments, profile)
+        .and_then([&](std::vector<Assignment> assignments) {
+          return ask_first(options, profile, *target, context).map([&] {
+            return std::move(assignments);
+          });
+        });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
+  Writer writer(opened->tool, options, context);
+  if (options.reach == Reach::everybody) return send_to_all(opened->prepared, writer, options);
   const auto steps = check_against_tool(opened->prepared, opened->tool.device);
   if (!steps) return tl::unexpected(steps.error());
-  Writer writer(opened->tool, options.execution, context);
   return options.execution == Execution::dry_run ? writer.plan(*steps) : writer.write(*steps);
 }
 

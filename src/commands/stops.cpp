@@ -3,6 +3,7 @@
 #include <array>
 
 #include "records.hpp"
+#include "spindle/device/motor.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -19,7 +20,40 @@ std::string_view to_text(device::StopResult result) {
   return "";
 }
 
+/// Nobody acknowledges it, so it is sent more than once.
+Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+                            catalogue::StopMode mode) {
+  const catalogue::RunFacts& facts = motor.facts();
+  const std::uint16_t word =
+      mode == catalogue::StopMode::decelerate ? facts.decelerate_always : facts.instant_always;
+  Result<void> sent;
+  for (int again = 0; again < most_stops && sent; ++again) sent = motor.broadcast(device, word);
+  return sent;
+}
+
 }  // namespace
+
+bool leaves_open(const Result<device::StopResult>& stopped) {
+  if (stopped) return *stopped == device::StopResult::unconfirmed;
+  return stopped.error().code == Errc::no_answer;
+}
+
+Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
+                                      const Context& context) {
+  const auto motor = device::Motor::of(*tool.profile);
+  if (!motor) return tl::unexpected(motor.error());
+  if (tool.target.reach == Reach::everybody) {
+    return broadcast_stop(tool.device, *motor, mode).map([] { return device::StopResult::sent; });
+  }
+  device::MotorStopper stopper(*motor, mode);
+  tool.device.set_retries(0);  // it is better to send the stop soon, and again
+  stopper.observe(tool.device);
+  auto stopped = stopper.stop(tool.device, context.clock);
+  for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {
+    stopped = stopper.stop(tool.device, context.clock);
+  }
+  return stopped;
+}
 
 Result<catalogue::Action> find_start(const catalogue::Profile& profile) {
   auto start = profile.find_action("start");

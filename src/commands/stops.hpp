@@ -8,6 +8,18 @@
 
 namespace spindle::commands {
 
+/// How often a stop is sent that stays without an answer or an effect.
+inline constexpr int most_stops = 3;
+
+/// Whether the tool may still run although it can be reached.
+bool leaves_open(const Result<device::StopResult>& stopped);
+
+/// Stops the motor of a product that is run by a command word, or all on the line where the target
+/// says so. Whatever can be read helps to stop gently; whatever can not be read does not keep it
+/// from being stopped.
+Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
+                                      const Context& context);
+
 /// The catalogue's action that starts a motion and can end it again. Error `usage` where a product
 /// has none.
 Result<catalogue::Action> find_start(const catalogue::Profile& profile);

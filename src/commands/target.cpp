@@ -92,11 +92,7 @@ Error unknown_product(Errc code, std::string why) {
 /// The bytes with which a tool whose profile was not named says what it is.
 Result<Bytes> ask_identity(OpenTool& tool) {
   if (tool.target.endpoint.medium != link::Medium::tcp) {
-    return tl::unexpected(tool.target.blamed(
-        {.code = Errc::usage,
-         .message = "a tool on a serial line can not prove what it is",
-         .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
-                 "shows all"}));
+    return tl::unexpected(unproven(tool.target));
   }
   auto answer = tool.device.report_server_id();
   if (answer || answer.error().code != Errc::exception_response) return answer;
@@ -213,6 +209,14 @@ std::string shared_line(const link::Endpoint& endpoint) {
   return unreadable ? endpoint.device : port.string();
 }
 
+Error unproven(const Target& target) {
+  return target.blamed(
+      {.code = Errc::usage,
+       .message = "a tool on a serial line can not prove what it is",
+       .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
+               "shows all"});
+}
+
 bool is_target(std::string_view text, const Context& context) {
   if (link::looks_like_url(text) || find_tool(context.tools, text) != nullptr) return true;
   return text.starts_with('@') && context.tools.groups.contains(std::string(text.substr(1)));
@@ -253,6 +257,26 @@ Result<catalogue::Profile> load_profile(const Target& target, const Context& con
   return context.profiles.load(target.profile);
 }
 
+/// Unit 0 on a serial line is everybody, and nobody answers.
+Result<void> check_reach(const Target& target, const catalogue::Profile& profile) {
+  const bool serial_line = target.endpoint.medium == link::Medium::serial ||
+                           target.endpoint.medium == link::Medium::rtu_over_tcp;
+  const bool serial_product = profile.link.framing == modbus::Framing::rtu;
+  const std::uint8_t unit = target.endpoint.unit.value_or(modbus::UnitId{profile.link.unit}).value;
+  const bool meant = serial_product || (serial_line && target.endpoint.unit);
+  const bool everybody = meant && unit == 0;
+  if (everybody == (target.reach == Reach::everybody)) return {};
+  Error error{.code = Errc::usage};
+  if (everybody) {
+    error.message = "unit 0 is everybody on the line, and nobody answers";
+    error.hint = "name one unit, or add --broadcast to 'set', 'do' or 'remote-stop'";
+  } else {
+    error.message = "--broadcast is for everybody on a serial line, but this is one tool";
+    error.hint = "give unit=0 in the URL, as in rtu:///dev/ttyUSB0?unit=0";
+  }
+  return tl::unexpected(target.blamed(std::move(error)));
+}
+
 link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& profile) {
   if (endpoint.medium != link::Medium::tcp || endpoint.port) return endpoint;
   endpoint.port = profile.link.port;
@@ -263,6 +287,9 @@ link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& prof
 Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
                                       const Context& context,
                                       SimulatedOperator simulated_operator) {
+  if (auto meant = check_reach(target, profile); !meant) {
+    return tl::unexpected(std::move(meant.error()));
+  }
   auto device = device::Device::open(
       with_port(target.endpoint, profile), profile, link_options(target, context),
       with_simulated_tools(context, simulated_options(simulated_operator)), context.clock);

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <utility>
 #include <variant>
 
 #include "event_records.hpp"
 #include "listing.hpp"
+#include "motor_records.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
@@ -23,10 +25,10 @@ using device::Heed;
 /// thing that several threads touch.
 class Stage {
  public:
-  Stage(const WatchOptions& options, Tools tools, Context& context)
+  Stage(const WatchOptions& options, const std::vector<report::Column>& columns, Context& context)
       : options_(&options),
         context_(&context),
-        listing_(context, news_columns(tools)),
+        listing_(context, columns),
         started_(context.clock.now()),
         last_event_(started_) {}
 
@@ -85,6 +87,11 @@ class Stage {
     last_event_ = context_->clock.now();
     return record;
   }
+  report::Record record_of(const device::MotorNews& news, const NewsRecords& records) {
+    ++events_;
+    last_event_ = context_->clock.now();
+    return records.motor(news);
+  }
   report::Record record_of(const device::ValueNews& news, const NewsRecords& records) {
     ++changes_;
     last_event_ = context_->clock.now();
@@ -140,19 +147,33 @@ class Stage {
 };
 
 Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::Profile& profile) {
-  device::WatchPlan plan{
-      .events = options.events, .interval = options.interval, .samples = options.samples};
+  device::WatchPlan plan{.events = options.events, .samples = options.samples};
+  plan.interval = options.interval.value_or(plan.interval);
   if (!profile.events) plan.events = device::EventMode::none;
-  if (!options.names.empty()) {
-    auto values = profile.select(options.names);
+  if (profile.run) {
+    auto motor = device::Motor::of(profile);
+    if (!motor) return tl::unexpected(std::move(motor.error()));
+    plan.motor = std::move(*motor);
+  }
+  const std::vector<std::string>& names = options.names.empty() ? profile.watched : options.names;
+  if (!names.empty()) {
+    auto values = profile.select(names);
     if (!values) return tl::unexpected(std::move(values.error()));
     plan.values = std::move(*values);
   }
-  if (plan.events == device::EventMode::none && plan.values.empty()) {
+  if (plan.events == device::EventMode::none && !plan.motor && plan.values.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "this tool sends no events, so name what to watch",
                                 .hint = "such as 'status.*'",
                                 .name = profile.id});
+  }
+  const bool polls = plan.events == device::EventMode::poll || plan.motor || !plan.values.empty();
+  const bool says_how = options.interval || options.samples != device::Samples::changes;
+  if (says_how && !polls) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "--all, --initial and --interval are about polled values",
+              .hint = "name some behind the tool, such as 'status.*'"});
   }
   return plan;
 }
@@ -163,7 +184,8 @@ Result<void> check_for_any_profile(const WatchOptions& options, ProfileShelf& sh
   Result<void> checked;
   for (const files::ProfileEntry& entry : context.profiles.list()) {
     const auto known = shelf.take(entry.id);
-    if (!known) continue;  // another one's broken file
+    if (!known) continue;                       // another one's broken file
+    if (!(*known)->profile.identity) continue;  // found by nobody, always named
     auto plan = plan_of(options, (*known)->profile);
     if (plan) return {};
     checked = tl::unexpected(std::move(plan.error()));
@@ -181,16 +203,25 @@ Result<void> check(const WatchOptions& options, const WatchedTool& tool, Profile
   return plan_of(options, tool.known()->profile).map([](const device::WatchPlan&) {});
 }
 
+/// Motors have other columns than tools that count their results.
+std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools) {
+  const Tools shown = tools.size() == 1 ? Tools::one : Tools::several;
+  const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
+    return tool.known() != nullptr && tool.known()->profile.run && !tool.known()->profile.events;
+  });
+  return motors ? motor_columns(shown) : news_columns(shown);
+}
+
 Result<void> watch_one(WatchedTool& tool, Stage& stage, const WatchOptions& options,
                        const Context& context) {
   const catalogue::Profile unknown;
   std::optional<NewsRecords> records;
-  records.emplace(tool.target(), unknown, catalogue::CodeTexts());
+  records.emplace(tool.target(), unknown, catalogue::CodeTables());
   const auto open = [&] {
     const TimePoint until = stage.until();
     const TimePoint now = context.clock.now();
     auto link = tool.open(until > now ? until - now : Duration::zero());
-    if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->errors);
+    if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
     return link;
   };
   const auto plan = [&](const catalogue::Profile& profile) { return plan_of(options, profile); };
@@ -210,7 +241,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
       return tl::unexpected(std::move(checked.error()));
     }
   }
-  Stage stage(options, tools->size() == 1 ? Tools::one : Tools::several, context);
+  Stage stage(options, columns_for(*tools), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, stage, options, context);
     stage.leave(watched);

@@ -15,11 +15,11 @@ Result<const KnownProfile*> ProfileShelf::take(const std::string& id) {
   if (known != profiles_.end()) return known->second.get();
   auto profile = store_->load(id);
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto errors = store_->load_error_codes(id);
-  if (!errors) return tl::unexpected(std::move(errors.error()));
+  auto tables = store_->load_code_tables(id);
+  if (!tables) return tl::unexpected(std::move(tables.error()));
   auto& place = profiles_[id];
   place =
-      std::make_unique<const KnownProfile>(KnownProfile{std::move(*profile), std::move(*errors)});
+      std::make_unique<const KnownProfile>(KnownProfile{std::move(*profile), std::move(*tables)});
   return place.get();
 }
 

@@ -15,7 +15,7 @@ namespace spindle::commands {
 /// A profile with the texts of its tools' error codes.
 struct KnownProfile {
   catalogue::Profile profile;
-  catalogue::CodeTexts errors;
+  catalogue::CodeTables tables;
 };
 
 /// Profiles, each loaded once however many tools have it. Several threads may ask.

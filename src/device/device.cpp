@@ -16,6 +16,14 @@ constexpr Duration confirm_interval = std::chrono::milliseconds(20);
 /// How often the last event is read before giving up on one that stands still meanwhile.
 constexpr int max_event_reads = 5;
 
+/// How often the status is read while the tool works by itself.
+constexpr Duration busy_interval = std::chrono::milliseconds(50);
+
+/// What keeps a serial line silent is not what keeps a network silent.
+constexpr std::string_view silent_line_hint =
+    "check power, unit address, wiring and termination, and that rate, parity and stop bits are "
+    "those of the device";
+
 using catalogue::Area;
 using catalogue::Parameter;
 using catalogue::Value;
@@ -28,6 +36,15 @@ RegisterRange range_of(const Parameter& parameter) {
 
 RegisterRange range_at(const Parameter& parameter, modbus::RegisterAddress address) {
   return {parameter.table, address.value, catalogue::register_count(parameter.encoding.kind)};
+}
+
+/// What an action writes, as a parameter that can be encoded.
+Parameter as_parameter(const catalogue::Action& action) {
+  Parameter parameter;
+  parameter.name = action.name;
+  parameter.address = action.address;
+  parameter.encoding.kind = action.kind;
+  return parameter;
 }
 
 /// The parts of an area that are left when the registers said to be absent are taken out.
@@ -81,6 +98,11 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
     limits.forbidden_shape =
         RegisterRange{input ? modbus::RegisterTable::input : modbus::RegisterTable::holding, 0,
                       profile.events->count};
+  }
+  if (profile.refusals) {
+    if (const auto code = profile.find(profile.refusals->parameter)) {
+      limits.refusal = range_of(*code);
+    }
   }
   return limits;
 }
@@ -221,9 +243,8 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
   const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
-  if (serial && error.code == Errc::no_answer && error.hint.empty()) {
-    error.hint = "check unit, rate, parity and wiring; 'spindle scan' shows which units answer";
-  }
+  const bool silent = error.code == Errc::no_answer && error.hint.empty();
+  if (serial && silent) error.hint = silent_line_hint;
   error.target = target_;
   error.endpoint = endpoint_;
   return error;
@@ -233,10 +254,26 @@ Error Device::located(Error error) const {
 Error Device::with_exception_text(Error error) const {
   if (!error.exception) return error;
   const auto text = profile_->exceptions.find(*error.exception);
-  if (text == profile_->exceptions.end()) return error;
-  error.message = fmt::format("the tool refused '{}' with exception {:02X} ({})", error.tried,
-                              *error.exception, text->second.text);
-  if (error.hint.empty()) error.hint = text->second.remedy;
+  if (text != profile_->exceptions.end()) {
+    error.message = fmt::format("the tool refused '{}' with exception {:02X} ({})", error.tried,
+                                *error.exception, text->second.text);
+    if (error.hint.empty()) error.hint = text->second.remedy;
+  }
+  return with_device_code(std::move(error));
+}
+
+/// Why it refused, as far as the tool says it in a register of its own.
+Error Device::with_device_code(Error error) const {
+  if (!error.device_code || !profile_->refusals) return error;
+  const auto& codes = profile_->refusals->codes;
+  const auto known = codes.find(*error.device_code);
+  if (known == codes.end()) {
+    error.message += fmt::format("; its own code {:02X}h is not known", *error.device_code);
+    return error;
+  }
+  error.message +=
+      fmt::format("; its own code {:02X}h: {}", *error.device_code, known->second.text);
+  error.hint = known->second.remedy;
   return error;
 }
 
@@ -296,7 +333,10 @@ Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& par
                                                Limits limits, const link::Progress& progress) {
   std::vector<RegisterRange> wanted;
   wanted.reserve(parameters.size());
-  for (const Parameter& parameter : parameters) wanted.push_back(range_of(parameter));
+  for (const Parameter& parameter : parameters) {
+    wanted.push_back(range_of(parameter));
+    if (const auto decider = decider_of(parameter)) wanted.push_back(range_of(*decider));
+  }
   std::vector<RegisterRange> wanted_limits;
   if (limits == Limits::read) wanted_limits = limit_ranges(parameters, nullptr);
   const std::size_t first_part = progress ? client_.count_requests(wanted) : 0;
@@ -340,6 +380,26 @@ std::vector<RegisterRange> Device::limit_ranges(const std::vector<Parameter>& pa
   return ranges;
 }
 
+/// The parameter that decides what the bits of another one are called.
+std::optional<Parameter> Device::decider_of(const Parameter& parameter) const {
+  if (parameter.bits_by.empty()) return std::nullopt;
+  auto decider = profile_->find(parameter.bits_by);
+  if (!decider) return std::nullopt;
+  return std::move(*decider);
+}
+
+/// The parameter with the names of bits that count by what was read along.
+Parameter Device::meant_by(const Parameter& parameter, const link::RegisterImage& image) const {
+  const auto decider = decider_of(parameter);
+  if (!decider) return parameter;
+  std::optional<std::int64_t> value;
+  const auto registers = image.get(range_of(*decider));
+  if (registers) {
+    if (const auto decoded = decode(*decider, *registers)) value = decoded->number.mantissa();
+  }
+  return catalogue::with_bits_for(parameter, value);
+}
+
 Reading Device::reading_of(const Parameter& parameter, Limits limits,
                            const link::RegisterImage& values,
                            const link::RegisterImage& limit_values) const {
@@ -348,12 +408,13 @@ Reading Device::reading_of(const Parameter& parameter, Limits limits,
     error.name = parameter.name;
     return error;
   };
+  const Parameter meant = meant_by(parameter, values);
   const auto value_at = [&](const RegisterRange& range, const link::RegisterImage& image) {
     return image.get(range)
-        .and_then([&](const Registers& registers) { return decode(parameter, registers); })
+        .and_then([&](const Registers& registers) { return decode(meant, registers); })
         .map_error(with_name);
   };
-  Reading reading{.parameter = parameter,
+  Reading reading{.parameter = meant,
                   .registers = values.get(range_of(parameter)).map_error(with_name),
                   .value = value_at(range_of(parameter), values)};
   const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
@@ -377,22 +438,59 @@ Result<Value> Device::read_value(const Parameter& parameter) {
       });
 }
 
+Error Device::about(Error error, const std::string& name, modbus::RegisterAddress address) const {
+  error = located(std::move(error));
+  error.name = name;
+  error.register_address = address.value;
+  return error;
+}
+
+Result<void> Device::write_registers(modbus::RegisterAddress first, const Registers& registers) {
+  return registers.size() == 1 ? client_.write(first, registers.front())
+                               : client_.write(first, RegisterView(registers));
+}
+
+/// A tool that refuses because it is busy has done nothing, so it is asked again for a while.
+Result<void> Device::while_busy(const std::function<Result<void>()>& write) {
+  const auto& refusals = profile_->refusals;
+  Clock& clock = session_->clock();
+  const TimePoint limit = clock.now() + (refusals ? refusals->give_up_after : Duration::zero());
+  while (true) {
+    Result<void> written = write();
+    const bool busy = !written && refusals && written.error().device_code &&
+                      refusals->is_busy(*written.error().device_code);
+    if (!busy) return written;
+    const TimePoint next = clock.now() + refusals->retry_every;
+    if (next > limit) return written;
+    if (auto slept = clock.sleep_until(next); !slept) return slept;
+  }
+}
+
 Result<void> Device::send_write(const Parameter& parameter, const Registers& registers) {
-  auto sent = registers.size() == 1 ? client_.write(parameter.address, registers.front())
-                                    : client_.write(parameter.address, RegisterView(registers));
-  return sent.map_error([&](Error error) {
-    error = located(std::move(error));
-    error.name = parameter.name;
-    error.register_address = parameter.address.value;
-    return error;
-  });
+  return while_busy([&] { return write_registers(parameter.address, registers); })
+      .map_error(
+          [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
+}
+
+/// A refused FC 10h may have written its first register all the same.
+Error Device::with_remains(Error error, const Parameter& parameter, const Value& before) {
+  const bool pair = catalogue::register_count(parameter.encoding.kind) > 1;
+  if (!pair || error.code != Errc::exception_response) return error;
+  const auto now = read_value(parameter);
+  if (!now) error.message += "; what it holds now could not be read";
+  if (now && !(*now == before)) {
+    error.message += fmt::format("; it was written in part and holds {}", now->to_string());
+  }
+  return error;
 }
 
 Result<Written> Device::write(const Parameter& parameter, const Value& before, const Value& value) {
   const auto registers = catalogue::encode(parameter, value.number);
   if (!registers) return tl::unexpected(registers.error());
   auto sent = send_write(parameter, *registers);
-  if (!sent && !leaves_open(sent.error())) return tl::unexpected(std::move(sent.error()));
+  if (!sent && !leaves_open(sent.error())) {
+    return tl::unexpected(with_remains(std::move(sent.error()), parameter, before));
+  }
   auto now = read_value(parameter);
   const bool did_not_take = !sent && now && *now == before && !(*now == value);
   if (did_not_take) {
@@ -408,12 +506,16 @@ Result<Written> Device::write(const Parameter& parameter, const Value& before, c
   return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
 }
 
-Result<void> Device::send(const catalogue::Action& action, std::uint16_t value) {
-  return client_.write(action.address, value).map_error([&](Error error) {
-    error = located(std::move(error));
-    error.name = action.name;
-    error.register_address = action.address.value;
-    return error;
+Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
+  const auto registers = catalogue::encode(as_parameter(action), Decimal(value));
+  if (!registers) return tl::unexpected(registers.error());
+  return while_busy([&] { return write_registers(action.address, *registers); })
+      .map_error([&](Error error) { return about(std::move(error), action.name, action.address); });
+}
+
+Result<void> Device::write_word(modbus::RegisterAddress address, std::uint16_t word) {
+  return client_.write(address, word).map_error([this](Error error) {
+    return located(std::move(error));
   });
 }
 
@@ -424,17 +526,44 @@ Result<Shown> Device::shows(const std::string& parameter, std::int64_t number) {
       [&](const Value& value) { return value.number == Decimal(number) ? Shown::yes : Shown::no; });
 }
 
-Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint16_t value) {
-  Parameter confirming;
-  if (!action.confirm.empty()) {
-    auto found = profile_->find(action.confirm);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    confirming = std::move(*found);
-  }
-  auto sent = send(action, value);
-  if (!sent) return tl::unexpected(std::move(sent.error()));
-  if (action.confirm.empty()) return ActionResult::sent;
+Result<ActionResult> Device::perform(const catalogue::Action& action, std::int64_t value) {
+  if (action.confirm.empty()) return carry_out(action, value);
+  const auto confirming = profile_->find(action.confirm);
+  if (!confirming) return tl::unexpected(confirming.error());
   const Value expected{Decimal(action.confirm_value.value_or(value)), {}};
+  if (action.prepare) {
+    const auto now = read_value(*confirming);
+    if (!now) return tl::unexpected(now.error());
+    if (*now == expected) return ActionResult::confirmed;
+  }
+  auto done = carry_out(action, value);
+  if (!done || *done == ActionResult::not_confirmed) return done;
+  return confirm(action, *confirming, expected);
+}
+
+/// What there is to do: nothing is known of the effect but that the tool is ready again.
+Result<ActionResult> Device::carry_out(const catalogue::Action& action, std::int64_t value) {
+  if (action.prepare) {
+    if (auto prepared = prepare(*action.prepare); !prepared) {
+      return tl::unexpected(about(std::move(prepared.error()), action.name, action.address));
+    }
+  }
+  auto sent = action.rest ? send(action, *action.rest) : Result<void>();
+  if (sent) sent = send(action, value);
+  if (!sent) return tl::unexpected(std::move(sent.error()));
+  auto ready = await_ready(action.busy);
+  if (ready && action.rest) {
+    sent = send(action, *action.rest);
+    if (!sent) return tl::unexpected(std::move(sent.error()));
+    ready = await_ready(action.busy);
+  }
+  if (!ready) return tl::unexpected(without_proof(std::move(ready.error())));
+  if (*ready == Shown::no) return ActionResult::not_confirmed;
+  return action.busy > Duration::zero() ? ActionResult::finished : ActionResult::sent;
+}
+
+Result<ActionResult> Device::confirm(const catalogue::Action& action, const Parameter& confirming,
+                                     const Value& expected) {
   Clock& clock = session_->clock();
   const TimePoint deadline = clock.now() + session_->options().answer_timeout;
   while (true) {
@@ -448,6 +577,63 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::uint1
     if (next > deadline) return ActionResult::not_confirmed;
     if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
+}
+
+Result<void> Device::prepare(const catalogue::Preparation& preparation) {
+  const auto words = read_raw({modbus::RegisterTable::holding, preparation.address.value, 1});
+  if (!words) return tl::unexpected(words.error());
+  const std::uint16_t word = words->front();
+  const auto cleared = static_cast<std::uint16_t>(word & ~unsigned{preparation.clear});
+  if (cleared == word) return {};
+  return while_busy([&] { return client_.write(preparation.address, cleared); });
+}
+
+/// Until the status says that the tool does no longer work by itself; no limit: it never does.
+Result<Shown> Device::await_ready(Duration limit) {
+  if (limit == Duration::zero() || !profile_->run) return Shown::yes;
+  const auto status = profile_->find(profile_->run->status);
+  if (!status) return tl::unexpected(status.error());
+  Clock& clock = session_->clock();
+  const TimePoint deadline = clock.now() + limit;
+  while (true) {
+    const auto word = read_value(*status);
+    if (!word) return tl::unexpected(word.error());
+    const auto bits = static_cast<std::uint64_t>(word->number.mantissa());
+    if (((bits >> profile_->run->busy) & 1U) == 0) return Shown::yes;
+    const TimePoint next = clock.now() + busy_interval;
+    if (next > deadline) return Shown::no;
+    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+  }
+}
+
+// ---- everybody ----
+
+Result<void> Device::broadcast_word(modbus::RegisterAddress address, std::uint16_t word) {
+  return session_->broadcast(modbus::write_request(address, word)).map_error([this](Error error) {
+    return located(std::move(error));
+  });
+}
+
+Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
+  const auto registers = catalogue::encode(parameter, value.number);
+  if (!registers) return tl::unexpected(registers.error());
+  if (registers->size() == 1) return broadcast_word(parameter.address, registers->front());
+  return session_->broadcast(modbus::write_request(parameter.address, RegisterView(*registers)))
+      .map_error(
+          [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
+}
+
+/// Nobody says when it is done, so the longest time that it may take is waited for.
+Result<void> Device::broadcast(const catalogue::Action& action, std::int64_t value) {
+  Result<void> sent;
+  if (action.prepare) sent = broadcast_word(action.prepare->address, 0);
+  if (sent && action.rest) sent = broadcast_word(action.address, *action.rest);
+  if (sent) sent = broadcast(as_parameter(action), Value{Decimal(value), {}});
+  if (!sent || !action.rest) return sent;
+  if (action.busy > Duration::zero()) {
+    sent = session_->clock().sleep_until(session_->clock().now() + action.busy);
+  }
+  return sent ? broadcast_word(action.address, *action.rest) : sent;
 }
 
 Result<Registers> Device::read_raw(const RegisterRange& range) {

@@ -36,9 +36,15 @@ Result<StopResult> stop_and_confirm(Device& device, const catalogue::Action& sta
   }
 }
 
-RunGuard::RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm)
+GuardedMotion motion_of(const catalogue::Action& start) {
+  return {.start = [&start](Device& device) { return device.send(start, *start.value); },
+          .stop = [&start](Device& device,
+                           Clock& clock) { return stop_and_confirm(device, start, clock); }};
+}
+
+RunGuard::RunGuard(Device& device, GuardedMotion motion, Reopen reopen, Clock& calm)
     : device_(&device),
-      action_(&start),
+      motion_(std::move(motion)),
       reopen_(std::move(reopen)),
       calm_(&calm),
       answer_timeout_(device.session().options().answer_timeout) {}
@@ -49,7 +55,7 @@ RunGuard::~RunGuard() {
 
 Result<void> RunGuard::start() {
   armed_ = true;
-  auto started = device_->send(*action_, *action_->value);
+  auto started = motion_.start(*device_);
   acknowledged_ = started.has_value();
   return started;
 }
@@ -58,7 +64,7 @@ StopReport RunGuard::stop() {
   if (report_) return *report_;
   armed_ = false;
   const TimePoint began = calm_->now();
-  const TimePoint limit = began + stop_patience;
+  const TimePoint limit = began + stop_patience + motion_.stopping;
   StopReport report;
   while (true) {
     const auto stopped = try_to_stop(++report.attempts, limit);
@@ -84,7 +90,7 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt, TimePoint limit) {
   session.shield();
   session.set_answer_timeout(patience_of(attempt));
   device_->set_retries(0);  // it is better to send the stop again
-  return stop_and_confirm(*device_, *action_, *calm_);
+  return motion_.stop(*device_, *calm_);
 }
 
 Result<void> RunGuard::reopen(Duration patience) {

@@ -160,6 +160,7 @@ Result<void> Watcher::learn(const catalogue::Profile& profile) {
   if (!plan) return tl::unexpected(std::move(plan.error()));
   plan_ = std::move(*plan);
   previous_.assign(plan_.values.size(), std::nullopt);
+  motor_.reset();
   profile_ = &profile;
   if (!profile.events) return {};
   const auto number = profile.find(profile.events->number);
@@ -227,7 +228,7 @@ TimePoint Watcher::next_due() const {
   TimePoint due = clock_->now() + longest_pause;
   if (profile_->link.keep_alive > Duration::zero()) due = std::min(due, keep_alive_due_);
   if (plan_.events == EventMode::push) due = std::min(due, arm_due_);
-  if (plan_.events == EventMode::poll || !plan_.values.empty()) due = std::min(due, poll_due_);
+  if (plan_.events == EventMode::poll || polls_values()) due = std::min(due, poll_due_);
   return due;
 }
 
@@ -272,7 +273,7 @@ Result<void> Watcher::poll() {
       if (auto fetched = fetch_polled(*number); !fetched) return fetched;
     }
   }
-  return plan_.values.empty() ? Result<void>() : poll_values();
+  return polls_values() ? poll_values() : Result<void>();
 }
 
 /// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
@@ -287,12 +288,33 @@ Result<void> Watcher::fetch_polled(std::uint16_t number) {
 }
 
 Result<void> Watcher::poll_values() {
-  auto readings = link_->device.read_each(plan_.values, Limits::skip);
+  std::vector<catalogue::Parameter> wanted = plan_.values;
+  if (plan_.motor) {
+    const auto& more = plan_.motor->parameters();
+    wanted.insert(wanted.end(), more.begin(), more.end());
+  }
+  auto readings = link_->device.read_each(wanted, Limits::skip);
   if (!readings) return tl::unexpected(std::move(readings.error()));
-  for (std::size_t index = 0; index < readings->size() && !stopped_; ++index) {
+  if (plan_.motor) {
+    const auto state = std::span<const Reading>(*readings).subspan(plan_.values.size());
+    if (auto judged = judge_motor(state); !judged) return judged;
+  }
+  for (std::size_t index = 0; index < plan_.values.size() && !stopped_; ++index) {
     Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(std::move(reading.value.error()));
     tell_reading(index, reading);
+  }
+  return {};
+}
+
+/// What happened to the motor since it was last looked at. At first there is nothing to compare.
+Result<void> Watcher::judge_motor(std::span<const Reading> readings) {
+  const auto state = Motor::state_of(readings, plan_.motor->facts());
+  if (!state) return tl::unexpected(state.error());
+  const auto before = std::exchange(motor_, *state);
+  if (!before) return {};
+  for (const MotorEvent event : events_between(*before, *state)) {
+    tell(MotorNews{event, *state, clock_->wall()});
   }
   return {};
 }

@@ -40,12 +40,26 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 24> unit_wor
 constexpr std::array<std::pair<std::string_view, catalogue::Cloning>, 2> clone_words = {
     {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}}};
 
-constexpr std::array<std::pair<std::string_view, Hazard>, 5> hazard_words = {
+constexpr std::array<std::pair<std::string_view, catalogue::Effect>, 5> effect_words = {
+    {{"at-once", catalogue::Effect::at_once},
+     {"after-stop", catalogue::Effect::after_stop},
+     {"after-configuration", catalogue::Effect::after_configuration},
+     {"after-power-cycle", catalogue::Effect::after_power_cycle},
+     {"unknown", catalogue::Effect::unknown}}};
+
+constexpr std::array<std::pair<std::string_view, catalogue::Notation>, 2> notation_words = {
+    {{"decimal", catalogue::Notation::decimal}, {"hex", catalogue::Notation::hexadecimal}}};
+
+constexpr std::array<std::pair<std::string_view, catalogue::Motion>, 2> motion_words = {
+    {{"start", catalogue::Motion::start}, {"stop", catalogue::Motion::stop}}};
+
+constexpr std::array<std::pair<std::string_view, Hazard>, 6> hazard_words = {
     {{"none", Hazard::none},
      {"moves", Hazard::moves},
      {"locks", Hazard::locks},
      {"unclear", Hazard::unclear},
-     {"erases", Hazard::erases}}};
+     {"erases", Hazard::erases},
+     {"link", Hazard::link}}};
 
 /// One entry before it is repeated.
 struct Template {
@@ -83,13 +97,64 @@ std::optional<catalogue::Range> parse_limits(std::string_view text) {
   return range;
 }
 
-void read_limits(YamlMap& map, Parameter& parameter) {
-  const YamlNode* node = map.get("range");
-  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, map.findings())) return;
-  if (auto range = parse_limits(node->text)) {
-    parameter.range = *range;
-  } else {
+std::optional<catalogue::Range> read_decimals(YamlMap& map, std::string_view key) {
+  const YamlNode* node = map.get(key);
+  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, map.findings())) {
+    return std::nullopt;
+  }
+  auto range = parse_limits(node->text);
+  if (!range) {
     map.findings().add(node->at, fmt::format("'{}' is not a range such as 0..6.00", node->text));
+  }
+  return range;
+}
+
+void read_limits(YamlMap& map, Parameter& parameter) {
+  assign(parameter.range, read_decimals(map, "range"));
+  const auto except = read_decimals(map, "except");
+  if (!except) return;
+  if (except->minimum && except->maximum) {
+    parameter.except = except;
+  } else {
+    map.findings().add(map.get("except")->at, "a hole in a range has two ends");
+  }
+}
+
+void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
+                    std::vector<catalogue::BitName>& bits, Findings& findings) {
+  constexpr std::uint64_t highest_bit = 31;
+  expect(node, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto bit = parse_unsigned(entry.key, highest_bit);
+    if (!bit) {
+      findings.add(entry.key_at,
+                   fmt::format("'{}' is not a bit from 0 to {}", entry.key, highest_bit));
+    }
+    auto text = to_text(entry.value, findings);
+    if (bit && text) bits.push_back({static_cast<std::uint8_t>(*bit), std::move(*text), when});
+  }
+}
+
+/// bits: {0: M0}, and those that depend on another parameter: bits-by: {parameter: NAME, names:
+/// {0: {3: FWD}, 1: {3: START/STOP}}}.
+void read_bits(YamlMap& map, Parameter& parameter) {
+  if (const YamlNode* bits = map.get("bits")) {
+    read_bit_names(*bits, std::nullopt, parameter.bits, map.findings());
+  }
+  const YamlNode* by = map.get("bits-by");
+  if (by == nullptr) return;
+  YamlMap choice(*by, map.findings());
+  assign(parameter.bits_by, choice.text("parameter", Need::required));
+  const YamlNode* names = choice.get("names", Need::required);
+  choice.finish();
+  if (names == nullptr || !expect(*names, YamlNode::Kind::map, map.findings())) return;
+  for (const YamlEntry& entry : names->entries) {
+    const auto value = parse_integer(entry.key);
+    if (!value) {
+      map.findings().add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
+      continue;
+    }
+    read_bit_names(entry.value, *value, parameter.bits, map.findings());
   }
 }
 
@@ -157,6 +222,10 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   if (const YamlNode* labels = map.get("labels")) {
     parameter.labels = read_labels(*labels, map.findings());
   }
+  read_bits(map, parameter);
+  assign(parameter.notation, map.word<catalogue::Notation>("notation", "notation", notation_words));
+  assign(parameter.effect, map.word<catalogue::Effect>("effect", "effect", effect_words));
+  assign(parameter.risk, map.text("risk"));
   assign(parameter.access,
          map.word<catalogue::Access>("access", "access", access_words, Need::required));
   assign(parameter.evidence,
@@ -244,9 +313,9 @@ void read_entry(const YamlNode& node, const YamlNode* group, std::size_t layer,
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
                 Findings& findings) {
   YamlMap group(node, findings);
-  for (const std::string_view key :
-       {"name", "n", "stride", "table", "encoding", "scale", "unit", "access", "evidence",
-        "repeats", "source", "note", "overlaps", "clone", "secret", "fields"}) {
+  for (const std::string_view key : {"name", "n", "stride", "table", "encoding", "scale", "unit",
+                                     "access", "evidence", "repeats", "source", "note", "overlaps",
+                                     "effect", "notation", "range", "clone", "secret", "fields"}) {
     group.allow(key);
   }
   group.finish();
@@ -262,13 +331,17 @@ void read_given_value(YamlMap& map, Action& action) {
   if (const YamlNode* labels = map.get("labels")) {
     action.labels = read_labels(*labels, map.findings());
     std::erase_if(action.labels, [&](const Label& label) {
-      const bool wrong =
-          label.number < 0 || label.number > static_cast<std::int64_t>(last_register);
-      if (wrong) map.findings().add(labels->at, fmt::format("{} does not fit u16", label.number));
+      const bool wrong = label.number < catalogue::lowest(action.kind) ||
+                         label.number > catalogue::highest(action.kind);
+      if (wrong) {
+        map.findings().add(labels->at, fmt::format("{} does not fit {}", label.number,
+                                                   catalogue::to_text(action.kind)));
+      }
       return wrong;
     });
   }
   if (const auto range = map.range("range", last_register)) {
+    action.has_range = true;
     action.minimum = static_cast<std::uint16_t>(range->from);
     action.maximum = static_cast<std::uint16_t>(range->to);
   } else if (!action.labels.empty()) {
@@ -277,8 +350,25 @@ void read_given_value(YamlMap& map, Action& action) {
                             [](const Label& a, const Label& b) { return a.number < b.number; });
     action.minimum = static_cast<std::uint16_t>(low->number);
     action.maximum = static_cast<std::uint16_t>(high->number);
-  } else if (!action.value) {
+  } else if (!action.value && action.motion == catalogue::Motion::none) {
     map.findings().add(map.node().at, "an action needs a 'value', or a 'range' or 'labels'");
+  }
+}
+
+/// How an action is carried out beyond one write.
+void read_procedure(YamlMap& map, Action& action) {
+  assign(action.kind, map.word<Kind>("encoding", "encoding", encoding_words));
+  assign(action.motion, map.word<catalogue::Motion>("motion", "motion", motion_words));
+  action.rest = map.number<std::uint16_t>("rest");
+  assign(action.busy, map.duration("busy"));
+  if (const YamlNode* node = map.get("prepare")) {
+    YamlMap preparation(*node, map.findings());
+    catalogue::Preparation& prepare = action.prepare.emplace();
+    if (auto address = preparation.number<std::uint16_t>("register", Need::required)) {
+      prepare.address = {*address};
+    }
+    assign(prepare.clear, preparation.number<std::uint16_t>("clear", Need::required));
+    preparation.finish();
   }
 }
 
@@ -291,11 +381,13 @@ Action read_action(YamlMap& map) {
   }
   action.value = map.number<std::uint16_t>("value");
   action.stop_value = map.number<std::uint16_t>("stop");
+  read_procedure(map, action);
   read_given_value(map, action);
   assign(action.hazard, map.word<Hazard>("hazard", "hazard", hazard_words, Need::required));
   assign(action.evidence,
          map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
   assign(action.source, map.text("source", Need::required));
+  assign(action.note, map.text("note"));
   assign(action.check, map.text("check"));
   assign(action.confirm, map.text("confirm"));
   if (const auto confirmed = map.number<std::uint32_t>("confirm-value")) {

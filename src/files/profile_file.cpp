@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "files/profile_drive.hpp"
 #include "files/profile_entries.hpp"
 #include "files/yaml_map.hpp"
 #include "spindle/base/text.hpp"
@@ -237,6 +238,9 @@ void read_numbered(const YamlNode& node, ProfileDraft& draft, Findings& findings
 
 // ---- codes ----
 
+constexpr std::array<std::pair<std::string_view, catalogue::Resettable>, 2> reset_words = {
+    {{"possible", catalogue::Resettable::yes}, {"power-cycle", catalogue::Resettable::no}}};
+
 struct Provenance {
   Evidence evidence = Evidence::inferred;
   std::string source = {};
@@ -256,6 +260,7 @@ std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& f
   assign(code.remedy, map.text("remedy"));
   assign(code.evidence, map.word<Evidence>("evidence", "evidence", evidence_words));
   assign(code.source, map.text("source"));
+  assign(code.resettable, map.word<catalogue::Resettable>("reset", "reset", reset_words));
   map.finish();
   return code;
 }
@@ -281,7 +286,8 @@ void read_code_map(const YamlNode& node, const Provenance& from, catalogue::Code
   }
 }
 
-/// A map of codes, or a list of such maps with the evidence that each shares.
+}  // namespace
+
 void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& findings) {
   if (node.kind != YamlNode::Kind::sequence) {
     read_code_map(node, {}, codes, findings);
@@ -298,6 +304,8 @@ void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& fin
     if (list != nullptr) read_code_map(*list, from, codes, findings);
   }
 }
+
+namespace {
 
 using ReadSection = void (*)(const YamlNode&, ProfileDraft&, Findings&);
 
@@ -422,6 +430,10 @@ void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findi
   read_section(map, "events", read_events, draft.events, draft);
   read_section(map, "limits", read_limits, draft.limits, draft);
   read_section(map, "numbered", read_numbered, draft.numbered, draft);
+  read_section(map, "run", read_run, draft.run, draft);
+  read_section(map, "refusals", read_refusals, draft.refusals, draft);
+  read_section(map, "alarm-lists", read_alarm_lists, draft.alarm_lists, draft);
+  read_section(map, "watch", read_watched, draft.watched, draft);
   if (const YamlNode* codes = map.get("exceptions")) {
     read_codes(*codes, profile.exceptions, findings);
   }
@@ -448,11 +460,14 @@ const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_vi
   return found;
 }
 
-void read_texts(const YamlNode& document, catalogue::CodeTexts& codes, Findings& findings) {
+void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Findings& findings) {
   YamlMap map(document, findings);
   map.allow("part");
   if (const YamlNode* node = map.get("error-codes", Need::required)) {
-    read_codes(*node, codes, findings);
+    read_codes(*node, tables.error, findings);
+  }
+  if (const YamlNode* node = map.get("warning-codes")) {
+    read_codes(*node, tables.warning, findings);
   }
   map.finish();
 }
@@ -468,6 +483,13 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
   if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
   assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
   assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
+  if (const YamlNode* alarms = map.get("permanent-alarms")) {
+    expect(*alarms, YamlNode::Kind::sequence, findings);
+    for (const YamlNode& item : alarms->items) {
+      const auto code = to_unsigned(item, last_register, findings);
+      if (code) facts.permanent_alarms.push_back(static_cast<std::int64_t>(*code));
+    }
+  }
   assign(facts.absent, read_areas(map.get("absent"), findings));
   map.finish();
   return facts;

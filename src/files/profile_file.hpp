@@ -32,6 +32,10 @@ struct ProfileDraft {
   Origin events = {};
   Origin limits = {};
   Origin numbered = {};
+  Origin run = {};
+  Origin refusals = {};
+  Origin alarm_lists = {};
+  Origin watched = {};
   std::unordered_map<std::string, std::size_t> parameter_index = {};
 };
 
@@ -54,7 +58,10 @@ const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_vi
                           Findings& findings);
 
 /// `part: texts`, laid over what is there.
-void read_texts(const YamlNode& document, catalogue::CodeTexts& codes, Findings& findings);
+void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Findings& findings);
+
+/// A map of codes, or a list of such maps with the evidence that each shares.
+void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& findings);
 
 /// `part: simulation`.
 catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& findings);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "files/profile_drive.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/value.hpp"
 
@@ -262,7 +263,9 @@ void labels_are_unique(const ProfileDraft& draft, Findings& findings) {
     }
   });
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
-    const std::string fault = fault_of(action.labels, Parameter{});
+    Parameter plain;
+    plain.encoding.kind = action.kind;
+    const std::string fault = fault_of(action.labels, plain);
     if (!fault.empty()) {
       findings.add_once(origin.of("labels"), fmt::format("{}: {}", action.name, fault));
     }
@@ -485,6 +488,7 @@ bool is_catalogue_name(std::string_view text) {
 
 void check_rules(const ProfileDraft& draft, Findings& findings) {
   for (const Rule rule : rules) rule(draft, findings);
+  check_drive_rules(draft, findings);
 }
 
 }  // namespace spindle::files

@@ -145,8 +145,8 @@ Profile build(const Chain& chain, Findings& findings) {
   return std::move(draft.profile);
 }
 
-catalogue::CodeTexts collect_texts(const Chain& chain, Findings& findings) {
-  catalogue::CodeTexts codes;
+catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
+  catalogue::CodeTables codes;
   for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
     if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
       read_texts(*part, codes, findings);
@@ -250,13 +250,19 @@ Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
 }
 
 Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {
+  return load_code_tables(name_or_file).map([](catalogue::CodeTables tables) {
+    return std::move(tables.error);
+  });
+}
+
+Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view name_or_file) const {
   const auto path = locate(name_or_file);
   if (!path) return tl::unexpected(path.error());
   Library library;
   Findings findings;
   const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
   if (!chain) return tl::unexpected(chain.error());
-  catalogue::CodeTexts codes = collect_texts(*chain, findings);
+  catalogue::CodeTables codes = collect_texts(*chain, findings);
   if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
   return codes;
 }

@@ -169,9 +169,26 @@ Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries) {
   }
   if (!response) return response;
   if (const auto code = modbus::exception_of(*response)) {
-    return tl::unexpected(exception_error(request, *code));
+    Error error = exception_error(request, *code);
+    error.device_code = read_refusal();
+    return tl::unexpected(std::move(error));
   }
   return response;
+}
+
+/// Empty where there is no such register, or no answer: the exception itself is what matters.
+std::optional<std::uint32_t> Client::read_refusal() {
+  if (!limits_.refusal) return std::nullopt;
+  const RegisterRange& range = *limits_.refusal;
+  const auto response =
+      session_->transact(modbus::read_request(range.table, {range.first}, range.count));
+  if (!response || modbus::exception_of(*response)) return std::nullopt;
+  constexpr unsigned bits_per_register = 16;
+  std::uint32_t code = 0;
+  for (const std::uint16_t word : modbus::registers_of(*response)) {
+    code = (code << bits_per_register) | word;
+  }
+  return code;
 }
 
 Result<Registers> Client::read(const RegisterRange& range) {

@@ -146,6 +146,8 @@ Result<void> Session::broadcast(const modbus::Pdu& request) {
       .and_then([&] { return send(adu, modbus::frame(options_.rules.framing, adu)); })
       .map([&] {
         last_activity_ += std::max(Duration::zero(), options_.broadcast_gap - options_.gap);
+        // Whoever has the line next does not know of the pause; and it was sent, come what may.
+        static_cast<void>(keep_gap());
       });
 }
 

@@ -42,6 +42,7 @@ Record error_record(const Error& error, WallTime time) {
     record.fields.push_back({"register", number(*error.register_address)});
   }
   if (error.exception) record.fields.push_back({"exception", number(*error.exception)});
+  if (error.device_code) record.fields.push_back({"device_code", number(*error.device_code)});
   if (!error.endpoint.empty()) record.fields.push_back({"endpoint", error.endpoint});
   return record;
 }

@@ -5,9 +5,16 @@
 //   [FAULT=SPEC]...
 //                         a tool that lives as long as the transcript; with an operator who drives
 //                         a screw now and then, every Nth of them NG
-//   %bus URL [UNITS=N] [FAULT=SPEC]...
+//   %bank URL [UNITS=N] [FAULT=SPEC]...
 //                         a serial line (rtu:// or rtu+tcp://) with units 1 to N that have nothing
 //                         but registers, and are strict about their gaps
+//   %bus URL PROFILE UNITS=1,2,3
+//                         motor drivers on one serial line, alive as long as the transcript
+//   %alarm URL UNIT CODE  an alarm occurs on one of them; %warning the same; %power URL UNIT
+//                         switches one off and on; %setter URL UNIT DURATION keeps it busy
+//   %wait DURATION        time passes
+//   %later DURATION URL UNIT REGISTER VALUE
+//                         so long from now somebody else writes a register
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
 //                         backups are kept on
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
@@ -42,7 +49,9 @@
 #include "spindle/cli/run.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/link/serial_settings.hpp"
+#include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/world.hpp"
+#include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
 #include "spindle/sim/sim_transport.hpp"
@@ -107,6 +116,7 @@ struct Tool {
   catalogue::Profile profile;
   sim::FaultPlan faults;
   std::unique_ptr<sim::Server> server;
+  sim::BlvBus* bus = nullptr;  ///< the server, where it is one
   sim::AnswerCounter answers;
   std::uint32_t connections = 0;
 };
@@ -141,7 +151,7 @@ class Stage {
         std::move(tool);
   }
 
-  void add_bus(const std::vector<std::string>& words) {
+  void add_bank(const std::vector<std::string>& words) {
     auto tool = std::make_unique<Tool>();
     test::SerialBank::Options options;
     for (std::size_t index = 1; index < words.size(); ++index) {
@@ -160,6 +170,55 @@ class Stage {
     tools_[commands::shared_line(endpoint)] = std::move(tool);
   }
   void hide_progress() { hides_progress_ = true; }
+
+  /// Motor drivers on one line; what happens to them is told by happen().
+  void add_bus(const std::vector<std::string>& words) {
+    auto tool = std::make_unique<Tool>();
+    tool->profile = profiles_.load(words.at(1)).value();
+    sim::BlvOptions options;
+    for (std::size_t index = 2; index < words.size(); ++index) {
+      const auto equals = words[index].find('=');
+      const std::string value = words[index].substr(equals + 1);
+      if (words[index].starts_with("FAULT=")) {
+        tool->faults.push_back(sim::parse_fault(value).value());
+      } else {
+        options.units.clear();
+        for (const std::string_view unit : split(value, ',')) {
+          options.units.push_back(static_cast<std::uint8_t>(parse_unsigned(unit, 31).value()));
+        }
+      }
+    }
+    auto bus =
+        sim::make_blv_bus(tool->profile, profiles_.load_simulation(words.at(1)).value(), options);
+    tool->bus = bus.get();
+    tool->server = std::move(bus);
+    tools_[commands::shared_line(link::parse_endpoint(words.at(0)).value())] = std::move(tool);
+  }
+
+  void happen(const std::string& what, const std::vector<std::string>& words) {
+    if (what == "wait") return clock_.advance(parse_duration(words.at(0)).value());
+    if (what == "later") return write_later(words);
+    sim::BlvBus& bus =
+        *tools_.at(commands::shared_line(link::parse_endpoint(words.at(0)).value()))->bus;
+    const auto unit = static_cast<std::uint8_t>(std::stoul(words.at(1)));
+    if (what == "power") return bus.power_cycle(unit, clock_.now());
+    if (what == "setter") {
+      return bus.use_setter(unit, clock_.now() + parse_duration(words.at(2)).value());
+    }
+    const auto code = static_cast<std::uint8_t>(parse_unsigned(words.at(2), 255).value());
+    if (what == "alarm") bus.raise_alarm(unit, code, clock_.now());
+    if (what == "warning") bus.raise_warning(unit, code, clock_.now());
+  }
+
+  void write_later(const std::vector<std::string>& words) {
+    sim::BlvBus* bus =
+        tools_.at(commands::shared_line(link::parse_endpoint(words.at(1)).value()))->bus;
+    const modbus::UnitId unit{static_cast<std::uint8_t>(std::stoul(words.at(2)))};
+    const auto write = modbus::write_request({static_cast<std::uint16_t>(std::stoul(words.at(3)))},
+                                             static_cast<std::uint16_t>(std::stoul(words.at(4))));
+    clock_.at(clock_.now() + parse_duration(words.at(0)).value(),
+              [=, this] { bus->answer({99}, unit, write, clock_.now()); });
+  }
 
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
@@ -235,7 +294,7 @@ class Stage {
 
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkFacts& facts) {
-    const bool serial = endpoint.medium == link::Medium::serial;
+    const bool serial = endpoint.medium != link::Medium::tcp;
     const auto found =
         tools_.find(serial ? commands::shared_line(endpoint)
                            : address(endpoint.host, endpoint.port.value_or(facts.port)));
@@ -312,8 +371,13 @@ class Player {
 
   void directive(const std::string& line) {
     const auto words = shell_words(line.substr(1));
+    const std::string& what = words.at(0);
+    if (what == "bus") stage_.add_bus({words.begin() + 1, words.end()});
+    for (const std::string_view event : {"alarm", "warning", "power", "setter", "wait", "later"}) {
+      if (what == event) stage_.happen(what, {words.begin() + 1, words.end()});
+    }
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
-    if (words.at(0) == "bus") stage_.add_bus({words.begin() + 1, words.end()});
+    if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();

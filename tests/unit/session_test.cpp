@@ -529,11 +529,11 @@ TEST_CASE("rtu: the gap is kept from the last byte in either direction, no longe
   Line broadcasting(rtu());
   broadcasting.script.sending_takes = 9ms;
   REQUIRE(broadcasting.session.broadcast(arm));
-  CHECK(broadcasting.elapsed() == 9ms);  // nobody answers, so nobody is waited for
+  CHECK(broadcasting.elapsed() == 19ms);  // nobody is waited for but the pause from the last byte
   CHECK(broadcasting.script.sent[0].bytes == rtu_frame(0, arm));
   broadcasting.script.on_request(rtu_answer(20ms, two_values));
   REQUIRE(broadcasting.session.transact(read_two));
-  CHECK(broadcasting.sent_at(1) == 19ms);  // the pause from the last byte sent
+  CHECK(broadcasting.sent_at(1) == 19ms);
 }
 
 TEST_CASE("rtu: other units' traffic while nobody asks moves the gap") {

@@ -121,13 +121,15 @@ TEST_CASE("a pair of registers takes both numbers, and what overlaps is stored o
   CHECK(names_of(stored_parameters(profile)) == Lines{"p1", "torque", "pair", "elsewhere"});
 }
 
-TEST_CASE("without numbers all holding registers are stored in the order of the catalogue") {
+TEST_CASE("without numbers what can be set is stored in the order of the catalogue") {
   Profile profile;
-  profile.parameters = {parameter("b", 20), parameter("a", 10, Access::read_only)};
+  profile.parameters = {parameter("b", 20), parameter("a", 10, Access::read_only),
+                        parameter("command", 30), parameter("c", 5)};
+  profile.run = catalogue::RunFacts{.command = "command"};
   Parameter input = parameter("input", 5, Access::read_only);
   input.table = modbus::RegisterTable::input;
   profile.parameters.push_back(input);
-  CHECK(names_of(stored_parameters(profile)) == Lines{"b", "a"});
+  CHECK(names_of(stored_parameters(profile)) == Lines{"b", "c"});
 }
 
 TEST_CASE("the fingerprint depends on what is stored and not on where the file is") {

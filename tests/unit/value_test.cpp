@@ -194,3 +194,64 @@ TEST_CASE("check_range: either side may be open") {
   CHECK(below.error().code == Errc::out_of_range);
   CHECK(below.error().message == "4 is below 5, the minimum of the profile");
 }
+
+namespace {
+
+catalogue::Parameter bit_field() {
+  catalogue::Parameter parameter;
+  parameter.name = "command.word";
+  parameter.encoding.kind = catalogue::Kind::u32;
+  parameter.bits = {{0, "M0"}, {1, "M1"}, {3, "FWD", 0}, {4, "REV", 0}, {3, "START/STOP", 1}};
+  parameter.bits_by = "motor.mode";
+  return parameter;
+}
+
+}  // namespace
+
+TEST_CASE("a bit field is shown by the names that count") {
+  const auto two_wire = catalogue::with_bits_for(bit_field(), 0);
+  const Registers word = {0, 0x0A};
+  CHECK(catalogue::decode(two_wire, word)->to_string() == "M1 FWD");
+  CHECK(catalogue::decode(catalogue::with_bits_for(bit_field(), 1), word)->label ==
+        "M1 START/STOP");
+  CHECK(catalogue::decode(catalogue::with_bits_for(bit_field(), std::nullopt), word)->label ==
+        "M1 bit3");
+  CHECK(catalogue::decode(bit_field(), word)->label == "M1 bit3");
+  CHECK(catalogue::decode(two_wire, Registers{0x8000, 0})->label == "bit31");
+  CHECK(catalogue::decode(two_wire, Registers{0, 0})->to_string() == "0");
+  CHECK(two_wire.bits_by.empty());
+}
+
+TEST_CASE("a bit field is typed by names or as a number") {
+  const auto two_wire = catalogue::with_bits_for(bit_field(), 0);
+  CHECK(catalogue::parse_value(two_wire, "M1+fwd")->number == Decimal(0x0A));
+  CHECK(catalogue::parse_value(two_wire, "rev,M0")->number == Decimal(0x11));
+  CHECK(catalogue::parse_value(two_wire, "0x2A")->number == Decimal(0x2A));
+  CHECK(catalogue::parse_value(two_wire, "M0+M0")->number == Decimal(1));
+  const auto wrong = catalogue::parse_value(two_wire, "M1+START/STOP");
+  REQUIRE_FALSE(wrong);
+  CHECK(wrong.error().code == Errc::bad_value);
+  CHECK(wrong.error().message == "'START/STOP' is none of its bits; it has M0, M1, FWD, REV");
+  CHECK_FALSE(catalogue::parse_value(two_wire, "M1+"));
+}
+
+TEST_CASE("what is excepted from a range is refused") {
+  catalogue::Parameter speed;
+  speed.encoding.kind = catalogue::Kind::u32;
+  speed.range = {Decimal(0), Decimal(4000)};
+  speed.except = catalogue::Range{Decimal(1), Decimal(79)};
+  for (const char* good : {"0", "80", "4000"}) CHECK(catalogue::parse_value(speed, good));
+  for (const char* bad : {"1", "79", "4001"}) {
+    const auto refused = catalogue::parse_value(speed, bad);
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().code == Errc::out_of_range);
+  }
+}
+
+TEST_CASE("a code is shown as documents print it") {
+  catalogue::Parameter alarm;
+  alarm.notation = catalogue::Notation::hexadecimal;
+  CHECK(catalogue::decode(alarm, Registers{0x85})->to_string() == "85h");
+  CHECK(catalogue::decode(alarm, Registers{6})->to_string() == "06h");
+  CHECK(catalogue::decode(alarm, Registers{0})->to_string() == "0");
+}

@@ -97,7 +97,8 @@ struct Error {
   std::string tried = {};     ///< operation under way, such as "report server id"
   std::optional<std::chrono::nanoseconds> waited = std::nullopt;
   std::optional<std::uint16_t> register_address = std::nullopt;
-  std::optional<std::uint8_t> exception = std::nullopt;  ///< exception code as received
+  std::optional<std::uint8_t> exception = std::nullopt;     ///< exception code as received
+  std::optional<std::uint32_t> device_code = std::nullopt;  ///< why, in the device's own code
 
   [[nodiscard]] ExitStatus status() const { return info(code).status; }
 };

@@ -48,6 +48,28 @@ struct Range {
   std::optional<Decimal> maximum;
 };
 
+/// When a written value begins to act.
+enum class Effect : std::uint8_t {
+  at_once,
+  after_stop,           ///< when the motor stands still
+  after_configuration,  ///< when the product was told to configure itself, or was switched on anew
+  after_power_cycle,    ///< when it was stored and the product switched off and on
+  unknown,              ///< no source says
+};
+
+enum class Notation : std::uint8_t {
+  decimal,
+  hexadecimal,  ///< codes that documents print as "30h"; shown so beside the number
+};
+
+/// Name of one bit of a bit field.
+struct BitName {
+  std::uint8_t bit = 0;  ///< 0: the lowest
+  std::string text;
+  /// The name counts only while `Parameter::bits_by` has this value; empty: always.
+  std::optional<std::int64_t> when = std::nullopt;
+};
+
 /// One entry of the catalogue.
 struct Parameter {
   std::string name;   ///< "preset.1.target-torque", "p242", "@holding:2"
@@ -57,16 +79,27 @@ struct Parameter {
   Encoding encoding = {};
   std::string unit;  ///< "%", "rpm", "deg"; "torque" stands for the tool's own torque unit
   Range range = {};
+  std::optional<Range> except = std::nullopt;  ///< a hole in the range, both sides known
   std::optional<Decimal> default_value = std::nullopt;
   std::vector<Label> labels = {};
+  std::vector<BitName> bits = {};  ///< of a bit field
+  std::string bits_by = {};        ///< parameter whose value decides between names; may be empty
+  Notation notation = Notation::decimal;
   Access access = Access::read_only;
   Cloning cloning = Cloning::allowed;
   Secrecy secrecy = Secrecy::open;
   Evidence evidence = Evidence::inferred;
   std::string source;  ///< document and section
   std::string note;  ///< what a user should know, such as when a change takes effect; may be empty
+  std::optional<Effect> effect = std::nullopt;  ///< empty: the profile does not speak of it
+  std::string risk = {};  ///< what a change may cost, told before it is written; may be empty
 };
 
+/// The bit field with only the names that count while `bits_by` has this value; empty: not known,
+/// so only names that always count.
+Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value);
+
+std::string_view to_text(Effect effect);  ///< "at-once", as written in profiles
 std::string_view to_text(Evidence evidence);
 std::optional<Evidence> parse_evidence(std::string_view text);
 std::string_view to_text(Access access);                ///< "r" or "rw"

@@ -11,6 +11,7 @@
 #include "spindle/base/error.hpp"
 #include "spindle/catalogue/identity.hpp"
 #include "spindle/catalogue/parameter.hpp"
+#include "spindle/catalogue/run_facts.hpp"
 #include "spindle/modbus/adu.hpp"
 
 namespace spindle::catalogue {
@@ -96,6 +97,17 @@ enum class Hazard : std::uint8_t {
   locks,    ///< takes the tool away from its operator
   unclear,  ///< the register's meaning is not certain: it may move or lock
   erases,   ///< overwrites stored settings
+  link,     ///< erases settings without which the tool may no longer be reached
+};
+
+/// What an action does to a product that is run by a command word.
+enum class Motion : std::uint8_t { none, start, stop };
+
+/// Done before an action is sent: these bits of a register are cleared. A broadcast clears all of
+/// it, because it can not be read.
+struct Preparation {
+  modbus::RegisterAddress address = {};
+  std::uint16_t clear = 0;
 };
 
 /// A deed, as opposed to a stored value: a write that makes the tool do something.
@@ -103,19 +115,30 @@ struct Action {
   std::string name;
   std::string title;
   modbus::RegisterAddress address = {};
+  Kind kind = Kind::u16;                              ///< of the value; a pair is sent whole
   std::optional<std::uint16_t> value = std::nullopt;  ///< fixed value; empty: the user gives one
   std::optional<std::uint16_t> stop_value = std::nullopt;  ///< ends what the action began
   std::uint16_t minimum = 0;                               ///< of a given value
   std::uint16_t maximum = 0;
+  bool has_range = false;  ///< numbers from minimum to maximum may be given beside the labels
   std::vector<Label> labels = {};
+  Motion motion = Motion::none;  ///< the words are those of RunFacts
+  /// The register acts when its value changes to `value`: this is written before it and behind it.
+  std::optional<std::uint16_t> rest = std::nullopt;
+  std::optional<Preparation> prepare = std::nullopt;
+  Duration busy = {};  ///< how long the tool may be busy with it; zero: not at all
   Hazard hazard = Hazard::none;
   Evidence evidence = Evidence::inferred;
   std::string source;
-  std::string check;    ///< how to verify the assignment on the tool; one sentence
-  std::string confirm;  ///< parameter whose reading proves the effect; empty: nothing can
+  std::string note = {};  ///< what a user should know before sending it; may be empty
+  std::string check;      ///< how to verify the assignment on the tool; one sentence
+  std::string confirm;    ///< parameter whose reading proves the effect; empty: nothing can
   /// Reading that proves it; empty: the value written.
   std::optional<std::int64_t> confirm_value = std::nullopt;
 };
+
+/// Whether an alarm can be reset by command once its cause is gone.
+enum class Resettable : std::uint8_t { unknown, yes, no };
 
 /// Meaning of one code: alarm, error, exception.
 struct CodeText {
@@ -123,9 +146,37 @@ struct CodeText {
   std::string remedy;
   Evidence evidence = Evidence::inferred;
   std::string source;
+  Resettable resettable = Resettable::unknown;
 };
 
 using CodeTexts = std::map<std::int64_t, CodeText>;
+
+/// Which table explains the codes of a list.
+enum class CodeTable : std::uint8_t { error, warning, refusal };
+
+/// The tables of a profile that are loaded only by those who show codes.
+struct CodeTables {
+  CodeTexts error = {};
+  CodeTexts warning = {};
+};
+
+/// What a product says, in a register of its own, of the exception response that it sent last.
+struct RefusalFacts {
+  std::string parameter = {};
+  CodeTexts codes = {};
+  std::vector<std::int64_t> busy = {};  ///< codes of a tool that only has to be waited for
+  Duration retry_every = {};
+  Duration give_up_after = {};
+
+  [[nodiscard]] bool is_busy(std::int64_t code) const;
+};
+
+/// One list of codes that `alarms` shows.
+struct AlarmList {
+  std::string name;                     ///< "present", "alarm-history"
+  std::vector<std::string> parameters;  ///< names or patterns, the newest first
+  CodeTable codes = CodeTable::error;
+};
 
 /// A start state for the simulated tool. Patterns are globs over the names of named and numbered
 /// parameters; later entries win.
@@ -136,6 +187,7 @@ struct SimulationFacts {
   std::uint8_t limit_exception =
       static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_value);
   std::uint16_t stopped_error = 0;  ///< error code of a run that was stopped before its target
+  std::vector<std::int64_t> permanent_alarms = {};  ///< that only switching off and on ends
   struct Value {
     std::string pattern;
     std::int64_t raw = 0;
@@ -166,6 +218,10 @@ class Profile {
   std::vector<Parameter> parameters;
   std::vector<Action> actions;
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
+  std::optional<RunFacts> run = std::nullopt;  ///< of a product that is run by a command word
+  std::optional<RefusalFacts> refusals = std::nullopt;
+  std::vector<AlarmList> alarm_lists = {};  ///< empty: the present alarm and what else is named so
+  std::vector<std::string> watched = {};    ///< values that `watch` polls unless others are named
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Error `unknown_name` with a suggestion.

@@ -60,8 +60,8 @@ struct Snapshot {
 
 /// Everything that a backup of such a tool holds, each register once. Where parameters are
 /// numbered: the whole numbered space by register, under its names where it has some, and named
-/// parameters elsewhere that can be written. Otherwise all holding registers that are parameters,
-/// in the order of the catalogue.
+/// parameters elsewhere that can be written. Otherwise all holding registers that can be set, in
+/// the order of the catalogue. Never the word that commands a motor.
 std::vector<Parameter> stored_parameters(const Profile& profile);
 
 /// Tells two versions of a profile apart, as far as backups are concerned: 16 hexadecimal digits of

@@ -10,7 +10,8 @@
 namespace spindle::catalogue {
 
 /// A decoded value: always an exact number, with its label when the parameter is an enumeration
-/// that names it.
+/// that names it, the names of its bits ("M1 FWD") when it is a bit field, or "30h" when it is a
+/// code.
 struct Value {
   Decimal number;
   std::string label;  ///< empty when there is none
@@ -27,8 +28,8 @@ Result<Value> decode(const Parameter& parameter, RegisterView registers);
 /// scale, `out_of_range` when it does not fit the kind.
 Result<Registers> encode(const Parameter& parameter, const Decimal& number);
 
-/// What a user typed: a number ("2.71", "0x1F" where the scale is 1), or a label of the enumeration
-/// (ASCII case ignored). Checked against encoding, labels and the profile's range. Errors
+/// What a user typed: a number ("2.71", "0x1F" where the scale is 1), a label of the enumeration,
+/// or names of bits joined by '+' or ',' (ASCII case ignored). Checked against encoding, labels and the profile's range. Errors
 /// `bad_value` (with a suggestion for labels) and `out_of_range`.
 Result<Value> parse_value(const Parameter& parameter, std::string_view text);
 

@@ -30,10 +30,15 @@ Result<Outcome> get(const GetOptions& options, Context& context);
 
 enum class Execution : std::uint8_t { real, dry_run };
 
+/// Whether a tool stores what was written once more, where it would forget it at power-off.
+enum class Storing : std::uint8_t { no, yes };
+
 struct SetOptions {
   std::string target;
   std::vector<std::string> assignments;  ///< NAME=VALUE
   Execution execution = Execution::real;
+  Storing storing = Storing::no;
+  Reach reach = Reach::one;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
 
@@ -43,6 +48,7 @@ struct DoOptions {
   std::string target;
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
+  Reach reach = Reach::one;
 };
 Result<Outcome> perform(const DoOptions& options, Context& context);
 
@@ -66,7 +72,7 @@ struct WatchOptions {
   device::EventMode events = device::EventMode::push;
   device::Samples samples = device::Samples::changes;
   device::Reconnection reconnection = device::Reconnection::forever;
-  Duration interval = std::chrono::milliseconds(200);
+  std::optional<Duration> interval;  ///< between two polls; empty: as usual
   std::size_t count = 0;  ///< end after so many events and changes; 0: never
   std::optional<Duration> duration;
   std::optional<Duration> idle_timeout;
@@ -79,11 +85,21 @@ struct RemoteStartOptions {
   std::string direction;          ///< value of the action direction; empty: leave as it is
   std::optional<Duration> limit;  ///< stop after this time
   Acceptance acceptance = Acceptance::verified_only;
+  // Of a motor that a command word runs.
+  std::string speed = {};  ///< r/min
+  catalogue::Direction direction_of_motor = catalogue::Direction::forward;
+  std::optional<std::uint16_t> operation = std::nullopt;  ///< operation data; empty: the profile's
+  std::string acceleration = {};                          ///< seconds; empty: leave as it is
+  std::string deceleration = {};                          ///< seconds; empty: leave as it is
+  std::optional<Duration> watchdog = std::nullopt;        ///< the driver's own; empty: leave it
+  std::optional<catalogue::StopMode> stop = std::nullopt;
 };
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context);
 
 struct RemoteStopOptions {
   std::vector<std::string> targets;
+  std::optional<catalogue::StopMode> stop = std::nullopt;
+  Reach reach = Reach::one;
 };
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 
@@ -125,6 +141,7 @@ struct RestoreOptions {
   Execution execution = Execution::real;
   ModelCheck model = ModelCheck::strict;
   OnFailure on_failure = OnFailure::roll_back;
+  Storing storing = Storing::no;  ///< in non-volatile memory, once and only when all succeeded
 };
 Result<Outcome> restore(const RestoreOptions& options, Context& context);
 

@@ -25,6 +25,9 @@ enum class Consent : std::uint8_t {
   no_input,  ///< --no-input: never ask, so refuse
 };
 
+/// Whom a command means: one tool, or everybody on its serial line.
+enum class Reach : std::uint8_t { one, everybody };
+
 enum class Verbosity : std::uint8_t { normal, frames };
 
 /// The options that every command takes (contract, section 2.2), as far as commands see them.

@@ -19,6 +19,7 @@ struct Target {
   std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
   std::string torque_unit = {};  ///< of the tools file; empty: unknown
   std::vector<std::string> verified = {};
+  Reach reach = Reach::one;
 
   /// The error as one of this tool, with its address beside its name.
   [[nodiscard]] Error blamed(Error error) const;
@@ -67,6 +68,9 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const
 /// other registers than the profile's is refused (`wrong_generation`).
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Context& context);
+
+/// A tool on a serial line whose profile nobody named.
+Error unproven(const Target& target);
 
 /// An open tool, and what was prepared from its profile.
 template <typename Prepared>

@@ -60,6 +60,7 @@ enum class Shown : std::uint8_t { no, yes };
 enum class ActionResult : std::uint8_t {
   confirmed,      ///< a reading proves the effect
   sent,           ///< acknowledged; nothing that can be read proves the effect
+  finished,       ///< acknowledged, and the tool says that it no longer works on it
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
 
@@ -128,7 +129,7 @@ class Device {
                         const catalogue::Value& value);
 
   /// Sends an action's value once, never again; acknowledged is all that it means.
-  Result<void> send(const catalogue::Action& action, std::uint16_t value);
+  Result<void> send(const catalogue::Action& action, std::int64_t value);
 
   /// Sends an action's stop value. Requires an action that has one.
   Result<void> send_stop(const catalogue::Action& action) {
@@ -138,8 +139,18 @@ class Device {
   /// Whether a parameter reads as this number now.
   Result<Shown> shows(const std::string& parameter, std::int64_t number);
 
-  /// Sends the action once, never again, and waits for its confirming parameter.
-  Result<ActionResult> perform(const catalogue::Action& action, std::uint16_t value);
+  /// Sends the action once, never again, and waits for its confirming parameter. Prepares it,
+  /// makes an edge of it and waits until the tool has worked on it, as the action says. What needs
+  /// a preparation is not sent when its effect is there already. Not for motions.
+  Result<ActionResult> perform(const catalogue::Action& action, std::int64_t value);
+
+  /// FC 06 to one register, once, without reading back or waiting for a busy tool.
+  Result<void> write_word(modbus::RegisterAddress address, std::uint16_t word);
+
+  /// To everybody on a serial line: sent is all that is known.
+  Result<void> broadcast(const catalogue::Parameter& parameter, const catalogue::Value& value);
+  Result<void> broadcast(const catalogue::Action& action, std::int64_t value);
+  Result<void> broadcast_word(modbus::RegisterAddress address, std::uint16_t word);
 
   /// Switches the tool's unasked event frames on or off; on expires unless it is repeated. Requires
   /// a profile with events.
@@ -168,12 +179,28 @@ class Device {
   Result<Registers> read_raw(const link::RegisterRange& range);
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
+  Error with_device_code(Error error) const;
+  [[nodiscard]] catalogue::Parameter meant_by(const catalogue::Parameter& parameter,
+                                              const link::RegisterImage& image) const;
   Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
                      const link::RegisterImage& values,
                      const link::RegisterImage& limit_values) const;
   std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
                                                 const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
+  Result<void> write_registers(modbus::RegisterAddress first, const Registers& registers);
+  Error with_remains(Error error, const catalogue::Parameter& parameter,
+                     const catalogue::Value& before);
+  Result<void> while_busy(const std::function<Result<void>()>& write);
+  Result<void> prepare(const catalogue::Preparation& preparation);
+  Result<Shown> await_ready(Duration limit);
+  Result<ActionResult> carry_out(const catalogue::Action& action, std::int64_t value);
+  Result<ActionResult> confirm(const catalogue::Action& action,
+                               const catalogue::Parameter& confirming,
+                               const catalogue::Value& expected);
+  [[nodiscard]] std::optional<catalogue::Parameter> decider_of(
+      const catalogue::Parameter& parameter) const;
+  Error about(Error error, const std::string& name, modbus::RegisterAddress address) const;
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);
 
   std::string target_;

@@ -22,6 +22,18 @@ struct StopReport {
   std::string trouble = {};  ///< the last trouble, for `unconfirmed`
 };
 
+/// What a guard starts and stops.
+struct GuardedMotion {
+  /// Sends the start, exactly once.
+  std::function<Result<void>(Device&)> start;
+  /// Sends the stop and waits for the proof; may be called again and again.
+  std::function<Result<StopResult>(Device&, Clock&)> stop;
+  Duration stopping = {};  ///< how long a stop that works may take
+};
+
+/// The motion of an action with a stop value, which must outlive it.
+GuardedMotion motion_of(const catalogue::Action& start);
+
 /// From the moment a start is sent, a stop is sent on every way out. Whoever holds a guard calls
 /// stop(); the destructor does it when nobody did. Stopping is not ended by an interrupt, and it
 /// reopens a lost link. It can not stop a tool that can not be reached: this is not a safety
@@ -31,8 +43,11 @@ class RunGuard {
   /// Opens the tool anew for a stop, on a line that interrupts do not end, within `patience`.
   using Reopen = std::function<Result<Device>(Duration patience)>;
 
-  /// `start` is an action with a stop value. `calm` is a clock whose sleeps are not interrupted.
-  RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm);
+  /// `calm` is a clock whose sleeps are not interrupted.
+  RunGuard(Device& device, GuardedMotion motion, Reopen reopen, Clock& calm);
+  /// `start` is an action with a stop value.
+  RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm)
+      : RunGuard(device, motion_of(start), std::move(reopen), calm) {}
   ~RunGuard();
   RunGuard(const RunGuard&) = delete;
   RunGuard& operator=(const RunGuard&) = delete;
@@ -41,7 +56,8 @@ class RunGuard {
   /// may run all the same.
   Result<void> start();
 
-  /// Sends the stop until it is proven to have worked, for about ten seconds at most. Further calls
+  /// Sends the stop until it is proven to have worked, for about ten seconds at most and the time
+  /// that the stop itself may take. Further calls
   /// do nothing and report the same. The device goes on with the connection that it ended with.
   StopReport stop();
 
@@ -55,7 +71,7 @@ class RunGuard {
   [[nodiscard]] bool is_proven(const StopReport& report) const;
 
   Device* device_;
-  const catalogue::Action* action_;
+  GuardedMotion motion_;
   Reopen reopen_;
   Clock* calm_;
   Duration answer_timeout_;  ///< the user's or the profile's

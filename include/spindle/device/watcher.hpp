@@ -10,6 +10,7 @@
 
 #include "spindle/device/device.hpp"
 #include "spindle/device/event_tracker.hpp"
+#include "spindle/device/motor_follower.hpp"
 
 namespace spindle::device {
 
@@ -49,7 +50,7 @@ struct LinkNews {
   std::string message;
 };
 
-using News = std::variant<EventNews, ValueNews, GapNews, LinkNews>;
+using News = std::variant<EventNews, ValueNews, GapNews, LinkNews, MotorNews>;
 
 /// How events are learned of.
 enum class EventMode : std::uint8_t {
@@ -63,6 +64,7 @@ enum class Reconnection : std::uint8_t { forever, never };
 struct WatchPlan {
   EventMode events = EventMode::push;
   std::vector<catalogue::Parameter> values = {};
+  std::optional<Motor> motor = std::nullopt;  ///< polled along with the values for what it does
   Duration interval = std::chrono::milliseconds(200);  ///< between two polls
   Samples samples = Samples::changes;
 };
@@ -112,6 +114,8 @@ class Watcher {
   Result<void> ask(const std::function<Result<void>()>& request);
   Result<void> poll();
   Result<void> poll_values();
+  Result<void> judge_motor(std::span<const Reading> readings);
+  [[nodiscard]] bool polls_values() const { return !plan_.values.empty() || plan_.motor; }
   void tell_reading(std::size_t index, Reading& reading);
   Result<Fetched> fetch_last(EventSource source);
   Result<void> fetch_polled(std::uint16_t number);
@@ -139,6 +143,7 @@ class Watcher {
   EventTracker tracker_ = {};
   std::size_t number_at_ = 0;
   std::vector<std::optional<catalogue::Value>> previous_ = {};
+  std::optional<MotorState> motor_ = std::nullopt;  ///< as seen last
   TimePoint arm_due_ = {};
   TimePoint keep_alive_due_ = {};
   TimePoint poll_due_ = {};

@@ -36,6 +36,9 @@ class ProfileStore {
   /// for them. Empty when the profile has none.
   [[nodiscard]] Result<catalogue::CodeTexts> load_error_codes(std::string_view name_or_file) const;
 
+  /// The same with all tables of codes.
+  [[nodiscard]] Result<catalogue::CodeTables> load_code_tables(std::string_view name_or_file) const;
+
   /// Every fault of a file and of those it extends, all documents; empty when it is valid. Error
   /// only when the file can not be read or found.
   [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;

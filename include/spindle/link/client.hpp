@@ -31,6 +31,8 @@ struct ReadLimits {
   /// A read whose answer would look like a spontaneous frame; never issued.
   std::optional<RegisterRange> forbidden_shape =
       std::nullopt;  // table and count; `first` is ignored
+  /// Where the server says, in a code of its own, why it sent its last exception response.
+  std::optional<RegisterRange> refusal = std::nullopt;
 };
 
 /// One request of a plan, and the wanted ranges whose registers its answer brings.
@@ -73,7 +75,8 @@ class Client {
  public:
   Client(Session& session, ReadLimits limits, unsigned retries);
 
-  /// One request (FC 03/04). An exception response becomes `exception_response` with its code.
+  /// One request (FC 03/04). An exception response becomes `exception_response` with its code, and
+  /// with the device's own where the limits say where it stands: it is read right after it.
   Result<Registers> read(const RegisterRange& range);
 
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
@@ -105,6 +108,7 @@ class Client {
   Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
   std::vector<RegisterRange> askable(const std::vector<RegisterRange>& wanted,
                                      RegisterImage& image) const;
+  [[nodiscard]] std::optional<std::uint32_t> read_refusal();
   Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image);
   void remember(const PlannedRead& refused, const Error& error, RegisterImage& image);
   [[nodiscard]] const Error* known_absent(const RegisterRange& range) const;

@@ -69,7 +69,8 @@ class Session {
   /// at once. Unit 0 is `usage`: broadcast() is for that.
   Result<modbus::Pdu> transact(const modbus::Pdu& request);
 
-  /// RTU: sends to unit 0. Nobody answers, so success means "sent", never "done".
+  /// RTU: sends to unit 0, and keeps the pause behind it. Nobody answers, so success means "sent",
+  /// never "done".
   Result<void> broadcast(const modbus::Pdu& request);
 
   /// The oldest spontaneous frame, waiting for one until the deadline; empty at the deadline.

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "spindle/catalogue/parameter.hpp"
+
+namespace spindle::catalogue {
+
+enum class Direction : std::uint8_t { forward, reverse };
+enum class StopMode : std::uint8_t { decelerate, instant };
+
+/// Words that command a motor in one input mode, without the bits that select operation data.
+struct RunWords {
+  std::uint16_t forward = 0;
+  std::uint16_t reverse = 0;
+  std::uint16_t decelerate = 0;
+  std::uint16_t instant = 0;
+};
+
+/// How a product is run whose motor follows a command word: a level, which holds until it is told
+/// otherwise. Names are those of parameters; of a 32-bit one the word is the low half.
+struct RunFacts {
+  std::string command = {};  ///< the command word
+  std::string status = {};   ///< the status word
+  std::string mode = {};     ///< parameter whose value decides what the bits of the word mean
+  std::map<std::int64_t, RunWords> modes = {};
+  /// Bits of which every motion needs at least one, whatever the mode: a word without them never
+  /// moves a motor.
+  std::uint16_t starting = 0;
+  /// Words that stop in every mode: for broadcasts, and when the mode can not be read.
+  std::uint16_t decelerate_always = 0;
+  std::uint16_t instant_always = 0;
+  std::uint16_t select = 0;  ///< adjoining bits that hold the number of the operation data
+
+  std::uint8_t running = 0;   ///< bits of the status word
+  std::uint8_t at_speed = 0;  ///< the speed asked for is reached
+  std::uint8_t busy = 0;      ///< internal processing
+
+  std::string speed = {};         ///< of operation data {n}; its range is that of the parameter
+  std::string acceleration = {};  ///< time, seconds
+  std::string deceleration = {};  ///< time, seconds
+  std::uint16_t first = 0;        ///< operation data from
+  std::uint16_t last = 0;         ///< to
+  std::uint16_t preferred = 0;    ///< used unless the user names another
+
+  /// While this parameter is not `digital`, operation data up to `analog_to` have their speed from
+  /// outside.
+  std::string analog = {};
+  std::int64_t digital = 0;
+  std::uint16_t analog_to = 0;
+
+  std::string command_speed = {};   ///< signed; 0 when the motor is told to stand still
+  std::string feedback_speed = {};  ///< signed
+  std::string load = {};            ///< may be empty
+  std::string alarm = {};           ///< present alarm; 0: none
+  std::string warning = {};         ///< present warning; may be empty
+  std::string watchdog = {};        ///< time without a query after which the driver stops; 0: never
+  Evidence evidence = Evidence::inferred;
+  std::string source = {};
+
+  /// The word that selects operation data.
+  [[nodiscard]] std::uint16_t selecting(std::uint16_t number) const;
+};
+
+/// "operation.{n}.speed" with the number in its place.
+std::string numbered_name(const std::string& pattern, std::uint16_t number);
+
+}  // namespace spindle::catalogue

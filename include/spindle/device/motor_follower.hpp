@@ -1,0 +1,39 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "spindle/device/motor.hpp"
+
+namespace spindle::device {
+
+/// Why following a running motor is over.
+enum class MotorEnding : std::uint8_t {
+  elapsed,   ///< the time allowed is over; it still runs
+  alarm,     ///< an alarm ended the run
+  stopped,   ///< it stopped, and nobody here stopped it
+  ignored,   ///< the start was acknowledged, but the motor does not run
+  too_fast,  ///< its command speed is above the one asked for
+};
+
+/// Something that happened to a motor, as seen by polling.
+struct MotorNews {
+  MotorEvent event;
+  MotorState state;
+  WallTime time;
+};
+
+struct MotorFollowOptions {
+  TimePoint deadline = TimePoint::max();
+  Duration interval = std::chrono::milliseconds(100);  ///< between two looks
+  std::int64_t fastest = 0;                            ///< command speed that is asked for
+  /// Hears how long it has run and how, several times a second; an error ends the following.
+  std::function<Result<void>(Duration elapsed, const MotorState&)> progress = {};
+};
+
+/// Follows a motor from just behind its start. Starts and stops nothing. What happens is appended
+/// to `news`. Errors: interrupts and link trouble.
+Result<MotorEnding> follow_motor(Device& device, const Motor& motor, MotorStopper& stopper,
+                                 const MotorFollowOptions& options, std::vector<MotorNews>& news);
+
+}  // namespace spindle::device

@@ -1,0 +1,88 @@
+#include "motor_records.hpp"
+
+#include <fmt/format.h>
+
+#include "records.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using device::MotorEvent;
+
+std::string meaning_of(std::int64_t code, const catalogue::CodeTexts& texts) {
+  const auto known = texts.find(code);
+  return code == 0 || known == texts.end() ? std::string() : known->second.text;
+}
+
+/// What people read beside the kind.
+std::string words_of(const device::MotorNews& news, const catalogue::CodeTables& tables) {
+  switch (news.event) {
+    case MotorEvent::alarm:
+      return code_words(news.state.alarm, tables.error);
+    case MotorEvent::warning:
+      return code_words(news.state.warning, tables.warning);
+    case MotorEvent::started:
+    case MotorEvent::at_speed:
+    case MotorEvent::stopped:
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string_view kind_of(MotorEvent event) {
+  switch (event) {
+    case MotorEvent::started:
+      return "started";
+    case MotorEvent::at_speed:
+      return "at-speed";
+    case MotorEvent::warning:
+      return "warning";
+    case MotorEvent::alarm:
+      return "alarm";
+    case MotorEvent::stopped:
+      return "stopped";
+  }
+  return "";
+}
+
+std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts) {
+  if (code == 0) return {};
+  const std::string meaning = meaning_of(code, texts);
+  return fmt::format("{:02X}h{}{}", code, meaning.empty() ? "" : " ", meaning);
+}
+
+report::Record motor_record(const device::MotorNews& news, const Target& target,
+                            const catalogue::CodeTables& tables) {
+  const device::MotorState& state = news.state;
+  const bool bad = news.event == MotorEvent::alarm || news.event == MotorEvent::warning;
+  report::Record record{.type = "event", .target = target.shown, .time = news.time, .fields = {}};
+  record.fields = {{"kind", std::string(kind_of(news.event))},
+                   {"source", std::string("poll")},
+                   {"speed", number(state.feedback_speed)},
+                   {"command_speed", number(state.command_speed)},
+                   {"load", number(state.load)},
+                   {"alarm", number(state.alarm)},
+                   {"alarm_text", text_or_null(meaning_of(state.alarm, tables.error))},
+                   {"warning", number(state.warning)},
+                   {"warning_text", text_or_null(meaning_of(state.warning, tables.warning))},
+                   {.key = "text",
+                    .cell = text_or_null(words_of(news, tables)),
+                    .audience = report::Audience::columns,
+                    .tone = bad ? report::Tone::bad : report::Tone::plain}};
+  return record;
+}
+
+std::vector<report::Column> motor_columns(Tools tools) {
+  using report::Align;
+  std::vector<report::Column> columns = {{"TIME", "time", Align::left, 24}};
+  if (tools == Tools::several) columns.push_back({"TARGET", "target", Align::left, 16});
+  columns.insert(columns.end(), {{"KIND", "kind", Align::left, 8},
+                                 {"SPEED", "speed", Align::right, 6},
+                                 {"LOAD", "load", Align::right, 4},
+                                 {"TEXT", "text", Align::left, 1}});
+  return columns;
+}
+
+}  // namespace spindle::commands

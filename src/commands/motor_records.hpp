@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "event_records.hpp"
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/commands/target.hpp"
+#include "spindle/device/motor_follower.hpp"
+#include "spindle/report/renderer.hpp"
+
+namespace spindle::commands {
+
+/// "started", "at-speed", "warning", "alarm" or "stopped".
+std::string_view kind_of(device::MotorEvent event);
+
+/// "30h overload"; the code alone when it is not known, empty when it is 0.
+std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts);
+
+/// The `event` record of something that was seen to happen to a motor.
+report::Record motor_record(const device::MotorNews& news, const Target& target,
+                            const catalogue::CodeTables& tables);
+
+/// Columns of a stream of news of motors, drawn row by row.
+std::vector<report::Column> motor_columns(Tools tools);
+
+}  // namespace spindle::commands

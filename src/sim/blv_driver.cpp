@@ -1,0 +1,124 @@
+#include "spindle/sim/blv_driver.hpp"
+
+#include <algorithm>
+#include <deque>
+
+#include "blv_unit.hpp"
+
+namespace spindle::sim {
+namespace {
+
+using modbus::Pdu;
+
+constexpr std::uint8_t everybody = 0;
+
+Duration gap_at(const catalogue::SerialFacts& serial, unsigned baud) {
+  for (const catalogue::GapRule& rule : serial.gaps) {
+    if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
+  }
+  return {};
+}
+
+class SimulatedBus final : public BlvBus {
+ public:
+  SimulatedBus(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+               const BlvOptions& options) {
+    for (const std::uint8_t unit : options.units) units_.emplace_back(profile, start, unit);
+    const catalogue::SerialFacts& serial = profile.link.serial;
+    const unsigned baud = options.baud == 0 ? serial.baud : options.baud;
+    if (options.gaps == Gaps::enforced) gap_ = gap_at(serial, baud);
+  }
+
+  std::optional<Pdu> answer(ConnectionId /*connection*/, modbus::UnitId unit, const Pdu& request,
+                            TimePoint now) override {
+    advance(now);
+    std::optional<Pdu> response;
+    for (BlvUnit& one : units_) {
+      one.hear_good_frame();
+      if (unit.value == one.address()) {
+        response = one.answer(request, now);
+      } else if (unit.value == everybody ? is_write(request) : follows(one, unit, request)) {
+        one.answer(request, now);  // and nobody hears what it says to it
+      }
+    }
+    return response;
+  }
+
+  [[nodiscard]] bool answers_to(modbus::UnitId unit) const override {
+    return std::any_of(units_.begin(), units_.end(),
+                       [unit](const BlvUnit& one) { return one.address() == unit.value; });
+  }
+  [[nodiscard]] Duration required_gap() const override { return gap_; }
+  [[nodiscard]] Duration answer_delay(modbus::UnitId unit) const override {
+    for (const BlvUnit& one : units_) {
+      if (one.address() == unit.value) return one.waiting_time();
+    }
+    return {};
+  }
+  void bad_frame(TimePoint now) override {
+    advance(now);
+    for (BlvUnit& one : units_) one.hear_bad_frame(now);
+  }
+
+  void advance(TimePoint now) override {
+    for (BlvUnit& one : units_) one.advance(now);
+  }
+  [[nodiscard]] std::optional<TimePoint> next_change() const override {
+    std::optional<TimePoint> next;
+    for (const BlvUnit& one : units_) {
+      const auto due = one.next_change();
+      if (due && (!next || *due < *next)) next = due;
+    }
+    return next;
+  }
+  std::vector<Push> take_pushes() override { return {}; }
+  void connected(ConnectionId /*connection*/) override {}
+  void disconnected(ConnectionId /*connection*/) override {}
+
+  void raise_alarm(std::uint8_t unit, std::uint8_t code, TimePoint now) override {
+    advance(now);
+    if (BlvUnit* one = find(unit)) one->raise_alarm(code, now);
+  }
+  void raise_warning(std::uint8_t unit, std::uint8_t code, TimePoint now) override {
+    advance(now);
+    if (BlvUnit* one = find(unit)) one->raise_warning(code);
+  }
+  void use_setter(std::uint8_t unit, TimePoint until) override {
+    if (BlvUnit* one = find(unit)) one->use_setter(until);
+  }
+  void power_cycle(std::uint8_t unit, TimePoint now) override {
+    advance(now);
+    if (BlvUnit* one = find(unit)) one->power_cycle(now);
+  }
+
+ private:
+  static bool is_write(const Pdu& request) {
+    const auto function = static_cast<modbus::FunctionCode>(request.function);
+    return function == modbus::FunctionCode::write_single_register ||
+           function == modbus::FunctionCode::write_multiple_registers;
+  }
+  // A group send reaches children by function 10h only.
+  static bool follows(const BlvUnit& child, modbus::UnitId parent, const Pdu& request) {
+    return child.group() == parent.value &&
+           request.function ==
+               static_cast<std::uint8_t>(modbus::FunctionCode::write_multiple_registers);
+  }
+  BlvUnit* find(std::uint8_t unit) {
+    const auto found = std::find_if(units_.begin(), units_.end(),
+                                    [unit](const BlvUnit& one) { return one.address() == unit; });
+    return found == units_.end() ? nullptr : &*found;
+  }
+
+  std::deque<BlvUnit> units_ = {};
+  Duration gap_ = {};
+};
+
+}  // namespace
+
+std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
+                                     const catalogue::SimulationFacts& start,
+                                     const BlvOptions& options) {
+  return std::make_unique<SimulatedBus>(profile, start, options);
+}
+
+}  // namespace spindle::sim

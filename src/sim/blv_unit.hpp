@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "blv_motor.hpp"
+#include "blv_registers.hpp"
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/modbus/pdu.hpp"
+
+namespace spindle::sim {
+
+/// One simulated BLV driver. Knows nothing of other units, frames or connections.
+class BlvUnit {
+ public:
+  BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+          std::uint8_t address);
+
+  [[nodiscard]] std::uint8_t address() const { return address_; }
+  [[nodiscard]] std::int64_t group() const;
+  [[nodiscard]] Duration waiting_time() const { return waiting_time_; }
+
+  void advance(TimePoint now);
+  [[nodiscard]] std::optional<TimePoint> next_change() const;
+
+  /// A query for this unit, its group or everybody.
+  modbus::Pdu answer(const modbus::Pdu& request, TimePoint now);
+  /// A good frame for whomever; a bad one was meant for nobody knows whom.
+  void hear_good_frame();
+  void hear_bad_frame(TimePoint now);
+
+  void raise_alarm(std::int64_t code, TimePoint now);
+  void raise_warning(std::int64_t code);
+  void use_setter(TimePoint until) { setter_until_ = until; }
+  void power_cycle(TimePoint now);
+
+ private:
+  /// What refuses a request: the exception, and the code in the driver's own register.
+  struct Refusal {
+    modbus::ExceptionCode exception;
+    std::int64_t code;
+  };
+  using Outcome = std::optional<Refusal>;
+  using Handler = Outcome (BlvUnit::*)(TimePoint);
+  struct Deed {
+    std::uint16_t even;
+    std::uint32_t rest;
+    std::uint32_t value;
+    Handler handler;
+  };
+  /// Bits of the command word by their names, in one input mode.
+  struct Wires {
+    std::uint32_t forward = 0;   ///< FWD
+    std::uint32_t reverse = 0;   ///< REV
+    std::uint32_t slow = 0;      ///< STOP-MODE
+    std::uint32_t start = 0;     ///< START/STOP
+    std::uint32_t run = 0;       ///< RUN/BRAKE
+    std::uint32_t backward = 0;  ///< FWD/REV
+  };
+  enum class Wish : std::uint8_t { forward, reverse, decelerate, brake };
+
+  modbus::Pdu respond(const modbus::Pdu& request, TimePoint now);
+  modbus::Pdu refuse(const modbus::Pdu& request, const Refusal& refusal);
+  modbus::Pdu read(const modbus::Pdu& request, const modbus::ReadRequest& wanted, TimePoint now);
+  Outcome write(std::uint16_t first, RegisterView values, TimePoint now);
+  Outcome write_pair(std::uint16_t even, std::uint32_t raw, TimePoint now);
+  Outcome use(const Deed& deed, std::uint32_t before, std::uint32_t raw, TimePoint now);
+  [[nodiscard]] Outcome check_busy(TimePoint now) const;
+
+  Outcome reset_alarm(TimePoint now);
+  Outcome clear_alarm_history(TimePoint now);
+  Outcome clear_warning_history(TimePoint now);
+  Outcome clear_communication_history(TimePoint now);
+  Outcome configure(TimePoint now);
+  Outcome initialize(TimePoint now);
+  Outcome initialize_all(TimePoint now);
+  Outcome load(TimePoint now);
+  Outcome save(TimePoint now);
+  [[nodiscard]] Outcome check_at_rest(TimePoint now) const;
+  [[nodiscard]] Outcome check_memory() const;
+  void work(Duration time, TimePoint now) { busy_until_ = now + time; }
+
+  void obey(TimePoint now);
+  [[nodiscard]] Wish wish_of(std::uint32_t word) const;
+  [[nodiscard]] std::int64_t speed_of(std::uint16_t operation) const;
+  [[nodiscard]] Duration time_of(const std::string& pattern, std::uint16_t operation) const;
+  void make_effective();
+  void note_error(std::int64_t code);
+  void show(TimePoint now);
+  [[nodiscard]] std::uint32_t status_word(TimePoint now) const;
+  [[nodiscard]] std::uint32_t mask_of(const std::string& parameter, std::string_view bit,
+                                      std::optional<std::int64_t> mode) const;
+  [[nodiscard]] std::optional<TimePoint> watchdog_due() const;
+
+  std::uint8_t address_;
+  catalogue::RunFacts run_;
+  catalogue::RefusalFacts refusals_;
+  std::vector<catalogue::Parameter> words_;  ///< with the names of bits
+  std::vector<std::int64_t> permanent_alarms_;
+  std::uint16_t max_read_;
+  std::uint16_t max_write_;
+  BlvRegisters registers_;
+  std::vector<Deed> deeds_ = {};
+  std::int64_t load_ = 0;  ///< per cent, while the motor turns
+
+  BlvMotor motor_ = {};
+  std::int64_t mode_ = 0;    ///< in effect, whatever the register says by now
+  std::int64_t analog_ = 0;  ///< likewise
+  Duration waiting_time_ = {};
+  std::int64_t bad_frames_ = 0;  ///< in a row
+  TimePoint busy_until_ = TimePoint::min();
+  TimePoint setter_until_ = TimePoint::min();
+  std::optional<TimePoint> last_query_ = std::nullopt;
+};
+
+}  // namespace spindle::sim

@@ -1,0 +1,453 @@
+#include "spindle/sim/blv_driver.hpp"
+
+#include <doctest/doctest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "spindle/catalogue/value.hpp"
+#include "spindle/files/profile_store.hpp"
+#include "spindle/modbus/adu.hpp"
+#include "spindle/modbus/pdu.hpp"
+#include "unit/hex.hpp"
+
+namespace {
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using modbus::Pdu;
+using modbus::RegisterTable;
+
+/// Drivers on a bus, and a master that talks to them in PDUs. The addresses are those of the notes.
+struct Bus {
+  static constexpr std::uint16_t command = 0x007D;
+  static constexpr std::uint16_t status = 0x007F;
+  static constexpr std::uint16_t alarm = 0x0081;
+  static constexpr std::uint16_t last_error = 0x00AD;
+  static constexpr std::uint16_t speed_now = 0x00CE;
+  static constexpr unsigned move = 1U << 13;
+  static constexpr unsigned at_speed = 1U << 14;
+  static constexpr unsigned busy = 1U << 8;
+
+  explicit Bus(const sim::BlvOptions& options = {}) {
+    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
+    profile = store.load("orientalmotor-blv").value();
+    bus = sim::make_blv_bus(profile, store.load_simulation("orientalmotor-blv").value(), options);
+  }
+
+  std::optional<Pdu> ask(const Pdu& request, std::uint8_t unit = 1) {
+    return bus->answer({1}, {unit}, request, now);
+  }
+  std::uint16_t read(std::uint16_t address, std::uint8_t unit = 1) {
+    return modbus::registers_of(
+               ask(modbus::read_request(RegisterTable::holding, {address}, 1), unit).value())
+        .front();
+  }
+  std::int32_t pair(std::uint16_t even, std::uint8_t unit = 1) {
+    const auto words = modbus::registers_of(
+        ask(modbus::read_request(RegisterTable::holding, {even}, 2), unit).value());
+    return static_cast<std::int32_t>((std::uint32_t{words[0]} << 16U) | words[1]);
+  }
+  /// The exception of a single write; 0: none.
+  int write(std::uint16_t address, std::uint16_t value, std::uint8_t unit = 1) {
+    const auto answer = ask(modbus::write_request({address}, value), unit);
+    return modbus::exception_of(answer.value()).value_or(0);
+  }
+  int write(std::uint16_t first, const Registers& values, std::uint8_t unit = 1) {
+    const auto answer = ask(modbus::write_request({first}, RegisterView(values)), unit);
+    return modbus::exception_of(answer.value()).value_or(0);
+  }
+  void pulse(std::uint16_t address) {
+    CHECK(write(address, 1) == 0);
+    wait(1100ms);
+    CHECK(write(address, 0) == 0);
+  }
+  void wait(Duration time) {
+    now += time;
+    bus->advance(now);
+  }
+  bool shows(unsigned bit, std::uint8_t unit = 1) { return (read(status, unit) & bit) != 0; }
+
+  catalogue::Profile profile;
+  std::unique_ptr<sim::BlvBus> bus;
+  TimePoint now = TimePoint(1h);
+};
+
+}  // namespace
+
+TEST_CASE("blv driver: what lies outside its map or its limits is refused, and it says why") {
+  Bus bus;
+  const auto refused = [&](const Pdu& request) {
+    return modbus::exception_of(bus.ask(request).value()).value_or(0);
+  };
+  const auto read = [](std::uint16_t first, std::uint16_t count) {
+    return modbus::read_request(RegisterTable::holding, {first}, count);
+  };
+  CHECK(refused(read(0x0480, 16)) == 0);
+  CHECK(refused(read(0x1FFF, 1)) == 0);
+  CHECK(refused(read(0x2000, 1)) == 2);
+  CHECK(bus.read(Bus::last_error) == 0x88);
+  CHECK(refused(read(0x1FFF, 2)) == 2);
+  CHECK(refused(read(0x0480, 17)) == 3);
+  CHECK(bus.read(Bus::last_error) == 0x8C);
+  CHECK(refused(modbus::read_request(RegisterTable::input, {0x0480}, 1)) == 1);
+  CHECK(bus.read(Bus::last_error) == 0x88);
+  CHECK(refused(modbus::report_server_id_request()) == 1);
+  CHECK(refused({0x08, {0, 1, 0x12, 0x34}}) == 1);
+  CHECK(bus.ask(modbus::loopback_request(0x1234)) == modbus::loopback_request(0x1234));
+  CHECK(bus.write(0x0481, 79) == 4);
+  CHECK(bus.read(Bus::last_error) == 0x8C);
+  CHECK(bus.write(0x0081, 1) == 2);
+  CHECK(bus.write(0x0480, Registers(17, 0)) == 3);
+}
+
+TEST_CASE("blv driver: of communication errors the latest ten are kept, the newest first") {
+  Bus bus;
+  bus.write(0x0481, 79);
+  for (int i = 0; i < 9; ++i) bus.ask(modbus::report_server_id_request());
+  CHECK(bus.read(0x00AF) == 0x88);
+  CHECK(bus.read(0x00C1) == 0x8C);
+  bus.ask(modbus::report_server_id_request());
+  CHECK(bus.read(0x00C1) == 0x88);
+}
+
+TEST_CASE("blv driver: pairs are written whole, by halves, and never half out of range") {
+  Bus bus;
+  CHECK(bus.write(0x0484, {0, 1000}) == 0);
+  CHECK(bus.pair(0x0484) == 1000);
+  CHECK(bus.write(0x0485, 900) == 0);
+  CHECK(bus.pair(0x0484) == 900);
+  CHECK(bus.write(0x0484, 1) == 4);  // 0x00010384
+  CHECK(bus.pair(0x0484) == 900);
+  CHECK(bus.write(0x0030, {0xFFFF, 0xFFFF}) == 0);
+  CHECK(bus.pair(0x0030) == -1);
+  CHECK(bus.write(0x0031, 1) == 4);  // 0xFFFF0001 is no address
+  CHECK(bus.write(0x0030, {0, 2}) == 0);
+}
+
+TEST_CASE("blv driver: a function 10h that is refused has written what stands before") {
+  Bus bus;
+  CHECK(bus.write(0x0480, {0, 500, 0, 50, 0, 700}) == 4);
+  CHECK(bus.pair(0x0480) == 500);
+  CHECK(bus.pair(0x0482) == 0);
+  CHECK(bus.pair(0x0484) == 1000);
+}
+
+TEST_CASE("blv driver: two-wire words run, ramp, reverse and stop the motor") {
+  Bus bus;
+  CHECK(bus.write(0x0485, 1000) == 0);
+  CHECK(bus.write(0x0605, 10) == 0);  // one second up
+  CHECK(bus.write(0x0685, 20) == 0);  // two seconds down
+  CHECK(bus.write(Bus::command, 0x2A) == 0);
+  CHECK(bus.shows(Bus::move));
+  CHECK_FALSE(bus.shows(Bus::at_speed));
+  bus.wait(500ms);
+  CHECK(bus.pair(Bus::speed_now) == 500);
+  bus.wait(500ms);
+  CHECK(bus.pair(Bus::speed_now) == 1000);
+  CHECK(bus.shows(Bus::at_speed));
+  CHECK(bus.read(0x00C5) == 2);
+  CHECK(bus.write(Bus::command, 0x32) == 0);
+  bus.wait(2s);
+  CHECK(bus.pair(Bus::speed_now) == 0);
+  CHECK(bus.shows(Bus::move));
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == -1000);
+  CHECK(bus.write(Bus::command, 0x22) == 0);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == -500);
+  CHECK(bus.shows(Bus::move));
+  bus.wait(1s);
+  CHECK_FALSE(bus.shows(Bus::move));
+  CHECK(bus.write(Bus::command, 0x2A) == 0);
+  bus.wait(1s);
+  CHECK(bus.write(Bus::command, 0x02) == 0);
+  CHECK_FALSE(bus.shows(Bus::move));
+}
+
+TEST_CASE("blv driver: both directions at once stop the motor") {
+  Bus bus;
+  bus.write(Bus::command, 0x2A);
+  bus.wait(1s);
+  bus.write(Bus::command, 0x3A);
+  CHECK_FALSE(bus.shows(Bus::move));
+}
+
+TEST_CASE("blv driver: a speed that is changed while running is followed") {
+  Bus bus;
+  bus.write(Bus::command, 0x2A);
+  bus.wait(1s);
+  bus.write(0x0485, 2000);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 2000);
+  bus.write(0x0485, 0);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 0);
+}
+
+TEST_CASE("blv driver: three wires count from Configuration on") {
+  Bus bus;
+  CHECK(bus.write(0x1040, {0, 1}) == 0);
+  CHECK(bus.write(Bus::command, 0x12) == 0);  // still REV
+  CHECK(bus.shows(Bus::move));
+  CHECK(bus.write(0x018D, 1) == 4);  // not while it runs
+  CHECK(bus.read(Bus::last_error) == 0x8D);
+  CHECK(bus.write(Bus::command, 0x00) == 0);
+  CHECK(bus.write(0x018D, 1) == 0);
+  CHECK(bus.shows(Bus::busy));
+  CHECK(bus.write(0x018D, 0) == 4);
+  CHECK(bus.read(Bus::last_error) == 0x8A);
+  bus.wait(1100ms);
+  CHECK_FALSE(bus.shows(Bus::busy));
+  CHECK(bus.write(0x018D, 0) == 0);
+  CHECK(bus.write(Bus::command, 0x1A) == 0);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 1000);
+  CHECK(bus.write(Bus::command, 0x12) == 0);
+  bus.wait(250ms);
+  CHECK(bus.pair(Bus::speed_now) == 500);
+  CHECK(bus.write(Bus::command, 0x3A) == 0);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == -1000);
+  CHECK(bus.write(Bus::command, 0x0A) == 0);
+  CHECK_FALSE(bus.shows(Bus::move));
+}
+
+TEST_CASE("blv driver: data 0 and 1 follow the analog value until digital is configured") {
+  Bus bus;
+  bus.write(0x0481, 1500);
+  bus.write(Bus::command, 0x28);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 600);
+  bus.write(Bus::command, 0x00);
+  bus.write(0x10E3, 1);
+  bus.write(Bus::command, 0x28);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 600);
+  bus.write(Bus::command, 0x00);
+  bus.pulse(0x018D);
+  bus.write(Bus::command, 0x28);
+  bus.wait(1s);
+  CHECK(bus.pair(Bus::speed_now) == 1500);
+}
+
+TEST_CASE("blv driver: maintenance commands act on the edge only") {
+  Bus bus;
+  bus.bus->raise_alarm(1, 0x30, bus.now);
+  CHECK(bus.write(0x0181, 1) == 0);
+  CHECK(bus.read(Bus::alarm) == 0);
+  bus.bus->raise_alarm(1, 0x30, bus.now);
+  CHECK(bus.write(0x0181, 1) == 0);
+  CHECK(bus.read(Bus::alarm) == 0x30);  // it stayed at 1
+  CHECK(bus.write(0x0181, 2) == 4);
+  CHECK(bus.write(0x0181, 0) == 0);
+  CHECK(bus.write(0x0181, 1) == 0);
+  CHECK(bus.read(Bus::alarm) == 0);
+  CHECK(bus.read(0x0083) == 0x30);
+  CHECK(bus.read(0x0085) == 0x30);
+}
+
+TEST_CASE("blv driver: an alarm lets the motor coast, and after the reset the word counts again") {
+  Bus bus;
+  bus.write(Bus::command, 0x2A);
+  bus.wait(1s);
+  bus.bus->raise_alarm(1, 0x30, bus.now);
+  CHECK(bus.shows(Bus::move));
+  bus.wait(1s);
+  CHECK_FALSE(bus.shows(Bus::move));
+  bus.write(Bus::command, 0x2A);
+  CHECK_FALSE(bus.shows(Bus::move));
+  SUBCASE("a word that still runs starts it again") {
+    bus.pulse(0x0181);
+    CHECK(bus.shows(Bus::move));
+  }
+  SUBCASE("a word that was cleared does not") {
+    bus.write(Bus::command, 0x02);
+    bus.pulse(0x0181);
+    CHECK_FALSE(bus.shows(Bus::move));
+  }
+}
+
+TEST_CASE("blv driver: three alarms end only with the power") {
+  for (const std::uint8_t code : {std::uint8_t{0x20}, std::uint8_t{0x41}, std::uint8_t{0x83}}) {
+    CAPTURE(code);
+    Bus bus;
+    bus.bus->raise_alarm(1, code, bus.now);
+    bus.pulse(0x0181);
+    CHECK(bus.read(Bus::alarm) == code);
+    bus.bus->power_cycle(1, bus.now);
+    CHECK(bus.read(Bus::alarm) == 0);
+    CHECK(bus.read(0x0083) == code);
+  }
+  Bus bus;
+  bus.bus->raise_alarm(1, 0x41, bus.now);
+  CHECK(bus.write(0x0193, 1) == 4);
+  CHECK(bus.read(Bus::last_error) == 0x8A);
+}
+
+TEST_CASE("blv driver: the watchdog stops a motor that nobody asks for") {
+  Bus bus;
+  bus.write(0x1201, 500);
+  bus.write(Bus::command, 0x2A);
+  for (int i = 0; i < 10; ++i) {
+    bus.wait(400ms);
+    CHECK(bus.shows(Bus::move));
+  }
+  REQUIRE(bus.bus->next_change() == bus.now + 500ms);
+  bus.wait(3s);
+  CHECK_FALSE(bus.shows(Bus::move));
+  CHECK(bus.read(Bus::alarm) == 0x85);
+  CHECK(bus.read(0x0083) == 0x85);
+  CHECK(bus.read(0x0085) == 0);
+}
+
+TEST_CASE("blv driver: without a watchdog the motor runs for ever") {
+  Bus bus;
+  bus.write(Bus::command, 0x2A);
+  bus.wait(1h);
+  CHECK(bus.shows(Bus::move));
+  CHECK(bus.read(Bus::alarm) == 0);
+}
+
+TEST_CASE("blv driver: bad frames warn, then stop the motor") {
+  Bus bus;
+  bus.write(Bus::command, 0x2A);
+  bus.bus->bad_frame(bus.now);
+  bus.bus->bad_frame(bus.now);
+  CHECK(bus.read(0x0099) == 0x84);  // warning history; the good frame ended the warning itself
+  CHECK(bus.read(0x0097) == 0);
+  CHECK(bus.read(Bus::alarm) == 0);
+  for (int i = 0; i < 3; ++i) bus.bus->bad_frame(bus.now);
+  bus.wait(2s);
+  CHECK(bus.read(Bus::alarm) == 0x84);
+  CHECK_FALSE(bus.shows(Bus::move));
+  CHECK(bus.read(0x00AF) == 0x84);
+}
+
+TEST_CASE("blv driver: only what was saved outlives the power") {
+  Bus bus;
+  bus.write(0x0485, 1100);
+  bus.write(0x0193, 1);
+  CHECK(bus.write(0x0487, 1200) == 4);  // it is busy with the memory
+  CHECK(bus.read(Bus::last_error) == 0x8A);
+  bus.wait(1s);
+  CHECK(bus.write(0x0487, 1200) == 0);
+  bus.write(0x0193, 0);
+  bus.write(0x0030, {0, 2});
+  bus.write(0x1201, 800);
+  bus.bus->power_cycle(1, bus.now);
+  CHECK(bus.pair(0x0484) == 1100);
+  CHECK(bus.pair(0x0486) == 0);
+  CHECK(bus.pair(0x0030) == -1);
+  CHECK(bus.pair(0x1200) == 0);
+  CHECK(bus.pair(0x007C) == 0);
+}
+
+TEST_CASE("blv driver: load and initialize take the memory's and the factory's values") {
+  Bus bus;
+  bus.write(0x0485, 1100);
+  bus.write(0x1407, 0);
+  bus.pulse(0x0193);
+  bus.write(0x0485, 1200);
+  bus.pulse(0x0191);
+  CHECK(bus.pair(0x0484) == 1100);
+  bus.pulse(0x018F);
+  CHECK(bus.pair(0x0484) == 1000);
+  CHECK(bus.pair(0x1406) == 0);
+  bus.pulse(0x0195);
+  CHECK(bus.pair(0x1406) == 1);
+}
+
+TEST_CASE("blv driver: the setter keeps everybody else from writing") {
+  Bus bus;
+  bus.bus->use_setter(1, bus.now + 2s);
+  CHECK(bus.write(0x0485, 1100) == 4);
+  CHECK(bus.read(Bus::last_error) == 0x89);
+  bus.wait(2s);
+  CHECK(bus.write(0x0485, 1100) == 0);
+}
+
+TEST_CASE("blv bus: other units are silent, a broadcast is done by all and answered by none") {
+  Bus bus({.units = {1, 2, 5}});
+  CHECK_FALSE(bus.ask(modbus::loopback_request(1), 3));
+  CHECK(bus.bus->answers_to({5}));
+  CHECK_FALSE(bus.bus->answers_to({0}));
+  CHECK_FALSE(bus.ask(modbus::write_request({0x0485}, 1300), 0));
+  for (const std::uint8_t unit : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{5}}) {
+    CHECK(bus.pair(0x0484, unit) == 1300);
+  }
+  CHECK_FALSE(bus.ask(modbus::loopback_request(1), 0));
+}
+
+TEST_CASE("blv bus: children do what is written to their parent with function 10h") {
+  Bus bus({.units = {1, 2, 3}});
+  bus.write(0x0030, {0, 1}, 2);
+  CHECK(bus.write(0x0484, {0, 1400}, 1) == 0);
+  CHECK(bus.pair(0x0484, 1) == 1400);
+  CHECK(bus.pair(0x0484, 2) == 1400);
+  CHECK(bus.pair(0x0484, 3) == 1000);
+  CHECK(bus.write(0x0485, 1500, 1) == 0);  // function 06h reaches the parent alone
+  CHECK(bus.pair(0x0484, 2) == 1400);
+  CHECK(bus.write(0x0484, {0, 1600}, 2) == 0);  // a child still has its own address
+  CHECK(bus.pair(0x0484, 2) == 1600);
+  CHECK(bus.pair(0x0484, 1) == 1500);
+  bus.write(0x0030, {0xFFFF, 0xFFFF}, 2);
+  bus.write(0x0484, {0, 1700}, 1);
+  CHECK(bus.pair(0x0484, 2) == 1600);
+}
+
+TEST_CASE("blv bus: it wants silence before a query, and takes its time to answer") {
+  Bus bus;
+  CHECK(bus.bus->required_gap() == 5500us);
+  CHECK(bus.bus->answer_delay({1}) == 10ms);
+  CHECK(Bus({.baud = 19200}).bus->required_gap() == 5500us);
+  CHECK(Bus({.baud = 115200}).bus->required_gap() == 3500us);
+  CHECK(Bus({.gaps = sim::Gaps::ignored}).bus->required_gap() == 0ms);
+  bus.write(0x140B, 5);
+  bus.pulse(0x018D);
+  CHECK(bus.bus->answer_delay({1}) == 10ms);
+  bus.pulse(0x0193);
+  bus.bus->power_cycle(1, bus.now);
+  CHECK(bus.bus->answer_delay({1}) == 500us);
+}
+
+// Protocol notes, section 2.1: frames as computed there, asked of the simulated driver.
+TEST_CASE("blv bus: golden frames") {
+  struct Exchange {
+    const char* query;
+    const char* response;
+  };
+  const Exchange exchanges[] = {
+      {"01 10 04 84 00 02 04 00 00 03 E8 C8 42", "01 10 04 84 00 02 00 D1"},
+      {"01 06 04 85 03 E8 99 AD", "01 06 04 85 03 E8 99 AD"},
+      {"01 06 00 7D 00 2A 98 0D", "01 06 00 7D 00 2A 98 0D"},
+      {"01 06 00 7D 00 22 99 CB", "01 06 00 7D 00 22 99 CB"},
+      {"01 10 00 7C 00 02 04 00 00 00 12 74 D3", "01 10 00 7C 00 02 80 10"},
+      {"01 06 00 7D 00 00 19 D2", "01 06 00 7D 00 00 19 D2"},
+      {"01 10 10 40 00 02 04 00 00 00 01 FB 9F", "01 10 10 40 00 02 44 DC"},
+      {"01 10 12 00 00 02 04 00 00 03 E8 27 B1", "01 10 12 00 00 02 44 B0"},
+      {"01 06 10 E3 00 01 BD 3C", "01 06 10 E3 00 01 BD 3C"},
+      {"01 06 01 81 00 01 19 DE", "01 06 01 81 00 01 19 DE"},
+      {"01 06 01 81 00 00 D8 1E", "01 06 01 81 00 00 D8 1E"},
+      {"01 03 04 80 00 11 85 1E", "01 83 03 01 31"},
+      {"02 10 00 30 00 02 04 00 00 00 01 3E 3F", "02 10 00 30 00 02 41 F4"},
+      {"02 10 00 30 00 02 04 FF FF FF FF FE 6B", "02 10 00 30 00 02 41 F4"},
+      {"00 06 00 7D 00 20 19 DB", ""},
+  };
+  Bus bus({.units = {1, 2}});
+  for (const Exchange& exchange : exchanges) {
+    CAPTURE(exchange.query);
+    const Bytes query = test::hex(exchange.query);
+    const auto deframed = modbus::deframe(modbus::Framing::rtu, modbus::Role::server, query);
+    const auto* frame = std::get_if<modbus::Deframed>(&deframed);
+    REQUIRE(frame != nullptr);
+    CHECK(frame->consumed == query.size());
+    CHECK(modbus::frame(modbus::Framing::rtu, frame->adu) == query);
+    const auto answer = bus.ask(frame->adu.pdu, frame->adu.unit.value);
+    const Bytes sent =
+        answer ? modbus::frame(modbus::Framing::rtu, {{}, frame->adu.unit, *answer}) : Bytes();
+    CHECK(to_hex(sent) == exchange.response);
+    bus.wait(100ms);
+  }
+}

@@ -1,0 +1,238 @@
+#include "spindle/device/motor.hpp"
+
+#include <doctest/doctest.h>
+
+#include <chrono>
+#include <vector>
+
+#include "spindle/device/motor_follower.hpp"
+#include "support/blv_bench.hpp"
+
+namespace {
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using catalogue::StopMode;
+using device::Motor;
+using device::MotorEvent;
+using device::MotorState;
+using device::MotorStopper;
+using device::StopResult;
+using test::BlvBench;
+
+constexpr std::uint16_t command = 0x007D;
+
+std::vector<MotorEvent> between(const MotorState& before, const MotorState& now) {
+  return device::events_between(before, now);
+}
+
+}  // namespace
+
+TEST_CASE("events are what differs between two looks") {
+  const MotorState still;
+  MotorState starting{.running = true};
+  MotorState running{.running = true, .at_speed = true};
+  MotorState failed{.alarm = 0x30};
+  CHECK(between(still, still).empty());
+  CHECK(between(still, starting) == std::vector{MotorEvent::started});
+  CHECK(between(starting, running) == std::vector{MotorEvent::at_speed});
+  CHECK(between(still, running) == std::vector{MotorEvent::started, MotorEvent::at_speed});
+  CHECK(between(running, running).empty());
+  CHECK(between(running, still) == std::vector{MotorEvent::stopped});
+  CHECK(between(running, failed) == std::vector{MotorEvent::alarm, MotorEvent::stopped});
+  CHECK(between(failed, failed).empty());
+  CHECK(between(failed, {.alarm = 0x85}) == std::vector{MotorEvent::alarm});
+  CHECK(between(failed, still).empty());
+  CHECK(between(still, {.warning = 0x21}) == std::vector{MotorEvent::warning});
+  CHECK(between({.warning = 0x21}, still).empty());
+}
+
+TEST_CASE("only products that are run by a command word have a motor") {
+  catalogue::Profile profile;
+  profile.id = "none";
+  CHECK(Motor::of(profile).error().code == Errc::usage);
+}
+
+TEST_CASE("a look shows the state, the speeds and the codes") {
+  BlvBench bench;
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  bench.write(command, 0x32);
+  bench.clock.advance(1s);
+  auto state = motor.look(device).value();
+  CHECK(state.running);
+  CHECK(state.at_speed);
+  CHECK(state.feedback_speed == -1000);
+  CHECK(state.load == 18);
+  bench.bus->raise_warning(1, 0x21, bench.clock.now());
+  bench.bus->raise_alarm(1, 0x30, bench.clock.now());
+  bench.clock.advance(1s);
+  state = motor.look(device).value();
+  CHECK_FALSE(state.running);
+  CHECK(state.alarm == 0x30);
+  CHECK(state.warning == 0x21);
+  CHECK(state.command_speed == 0);
+}
+
+namespace {
+
+struct Stop {
+  std::uint16_t input_mode;
+  std::uint16_t word;
+  StopMode how;
+  std::uint16_t expected;
+};
+
+}  // namespace
+
+TEST_CASE("a motor is stopped by the word of its input mode") {
+  const Stop stops[] = {
+      {0, 0x2A, StopMode::decelerate, 0x22}, {0, 0x32, StopMode::decelerate, 0x22},
+      {0, 0x2A, StopMode::instant, 0x02},    {0, 0x0A, StopMode::decelerate, 0x22},
+      {1, 0x1A, StopMode::decelerate, 0x12}, {1, 0x3A, StopMode::decelerate, 0x12},
+      {1, 0x1A, StopMode::instant, 0x0A},
+  };
+  for (const Stop& stop : stops) {
+    CAPTURE(stop.word);
+    BlvBench bench;
+    if (stop.input_mode == 1) bench.configure(0x1040, 1);
+    bench.write(command, stop.word);
+    bench.clock.advance(1s);
+    REQUIRE(bench.moves());
+    auto device = bench.open().value();
+    const Motor motor = Motor::of(bench.profile).value();
+    MotorStopper stopper(motor, stop.how);
+    stopper.observe(device);
+    CHECK(stopper.stopping() == 500ms);
+    CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+    CHECK(bench.read(command) == stop.expected);
+    CHECK_FALSE(bench.moves());
+  }
+}
+
+// 12h decelerates in 3-wire mode and runs in reverse in 2-wire mode; the register shows 3-wire from
+// the moment it is written, the driver heeds it from Configuration on.
+TEST_CASE("a mode that was written and not configured never turns a stop into a start") {
+  for (const std::uint16_t word : {std::uint16_t{0x00}, std::uint16_t{0x2A}, std::uint16_t{0x32}}) {
+    CAPTURE(word);
+    BlvBench bench;
+    bench.write(0x1041, 1);
+    bench.write(command, word);
+    bench.clock.advance(1s);
+    auto device = bench.open().value();
+    const Motor motor = Motor::of(bench.profile).value();
+    MotorStopper stopper(motor, StopMode::decelerate);
+    stopper.observe(device);
+    auto stopped = stopper.stop(device, bench.clock);
+    if (stopped == StopResult::unconfirmed) stopped = stopper.stop(device, bench.clock);
+    CHECK(stopped == StopResult::confirmed);
+    CHECK((bench.read(command) & 0x18U) == 0);
+    CHECK_FALSE(bench.moves());
+  }
+}
+
+TEST_CASE("a gentle stop that does not help becomes a hard one") {
+  BlvBench bench;
+  bench.write(0x0685, 150);  // fifteen seconds, which the stopper is told nothing of
+  bench.write(command, 0x2A);
+  bench.clock.advance(1s);
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  stopper.started(0x2A, 0, 300ms);
+  stopper.seen_running();
+  CHECK(stopper.stop(device, bench.clock) == StopResult::unconfirmed);
+  CHECK(bench.read(command) == 0x22);
+  CHECK(bench.moves());
+  CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+  CHECK(bench.read(command) == 0x02);
+}
+
+TEST_CASE("without anything known a motor is stopped by words that stop in every mode") {
+  for (const auto& [how, expected] : {std::pair(StopMode::decelerate, std::uint16_t{0x20}),
+                                      std::pair(StopMode::instant, std::uint16_t{0x00})}) {
+    BlvBench bench;
+    bench.configure(0x1040, 1);
+    bench.write(command, 0x1A);
+    bench.clock.advance(1s);
+    auto device = bench.open().value();
+    const Motor motor = Motor::of(bench.profile).value();
+    MotorStopper stopper(motor, how);
+    CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+    CHECK(bench.read(command) == expected);
+  }
+}
+
+TEST_CASE("a guard stops a motor, also when nobody calls it") {
+  BlvBench bench;
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  stopper.started(0x2A, 0, 500ms);
+  const device::GuardedMotion motion{
+      .start = [&](device::Device& on) { return motor.command(on, 0x2A); },
+      .stop = [&](device::Device& on, Clock& clock) { return stopper.stop(on, clock); },
+      .stopping = 500ms};
+  const auto reopen = [&](Duration) { return bench.open(); };
+  SUBCASE("at the end of a scope") {
+    device::RunGuard guard(device, motion, reopen, bench.clock);
+    REQUIRE(guard.start());
+    bench.clock.advance(1s);
+    CHECK(bench.moves());
+  }
+  SUBCASE("on a line that loses answers") {
+    bench.faults = {{.kind = sim::FaultKind::lost, .every = 4}};
+    device = bench.open().value();
+    device::RunGuard guard(device, motion, reopen, bench.clock);
+    static_cast<void>(guard.start());
+    bench.clock.advance(1s);
+    CHECK(guard.stop().result == StopResult::confirmed);
+  }
+  SUBCASE("in an alarm") {
+    device::RunGuard guard(device, motion, reopen, bench.clock);
+    REQUIRE(guard.start());
+    bench.clock.advance(1s);
+    bench.bus->raise_alarm(1, 0x30, bench.clock.now());
+    CHECK(guard.stop().result == StopResult::confirmed);
+  }
+  CHECK_FALSE(bench.moves());
+  CHECK((bench.read(command) & 0x18U) == 0);
+}
+
+TEST_CASE("following tells what happens, and why it is over") {
+  BlvBench bench;
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  std::vector<device::MotorNews> news;
+  device::MotorFollowOptions options{.deadline = bench.clock.now() + 3s, .fastest = 1000};
+  SUBCASE("elapsed") {
+    bench.write(command, 0x2A);
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::elapsed);
+    REQUIRE(news.size() == 2);
+    CHECK(news[0].event == MotorEvent::started);
+    CHECK(news[1].event == MotorEvent::at_speed);
+  }
+  SUBCASE("alarm") {
+    bench.write(command, 0x2A);
+    bench.clock.at(bench.clock.now() + 1s,
+                   [&] { bench.bus->raise_alarm(1, 0x30, bench.clock.now()); });
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::alarm);
+    CHECK(news.back().event == MotorEvent::alarm);
+  }
+  SUBCASE("stopped by somebody else") {
+    bench.write(command, 0x2A);
+    bench.clock.at(bench.clock.now() + 1s, [&] { bench.write(command, 0); });
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::stopped);
+  }
+  SUBCASE("ignored") {
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::ignored);
+    options.deadline = bench.clock.now() + 200ms;
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::ignored);
+  }
+  SUBCASE("too fast") {
+    options.fastest = 900;
+    bench.write(command, 0x32);
+    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::too_fast);
+  }
+}
