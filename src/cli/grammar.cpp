@@ -497,7 +497,7 @@ std::string trouble_words() {
   }
   text += "\nOutages (such as sleep=3s@every:20s: after 20 s, 40 s, 60 s, for 3 s each):\n";
   for (const sim::OutageHelp& outage : sim::outage_help()) {
-    text += fmt::format("  {:<29}{}\n", outage.syntax, outage.meaning);
+    text += fmt::format("  {:<28}  {}\n", outage.syntax, outage.meaning);
   }
   return text;
 }

@@ -1,0 +1,246 @@
+// The manual pages: made from their sources, complete, and true to the code. SPINDLE_UPDATE=1
+// rewrites them.
+#include "cli/manual.hpp"
+
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "cli/grammar.hpp"
+#include "spindle/files/profile_store.hpp"
+#include "spindle/files/tools_file.hpp"
+#include "support/schema_manual.hpp"
+
+using namespace spindle;
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path root = SPINDLE_SOURCE_DIR;
+const fs::path manual = root / "man";
+const std::vector<std::string> pages = {"spindle.1", "spindle-profile.5", "spindle-tools.5",
+                                        "spindle-backup.5", "spindle-json.7"};
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path);
+  REQUIRE_MESSAGE(file.good(), path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+cli::Hole example(std::string name, const std::string& file) {
+  std::vector<std::string> lines;
+  std::istringstream text(read(manual / "examples" / file));
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return {std::move(name), cli::mdoc_literal(lines)};
+}
+
+std::vector<cli::Hole> all_holes() {
+  std::vector<cli::Hole> holes = cli::manual_holes(cli::describe_grammar());
+  const auto schema = nlohmann::ordered_json::parse(read(root / "share" / "spindle-1.schema.json"));
+  for (cli::Hole& hole : test::schema_holes(schema)) holes.push_back(std::move(hole));
+  holes.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
+  holes.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
+  holes.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
+  return holes;
+}
+
+/// What the first group of a pattern finds.
+std::set<std::string> found(const std::string& text, const std::string& pattern) {
+  const std::regex expression(pattern);
+  std::set<std::string> all;
+  for (auto at = std::sregex_iterator(text.begin(), text.end(), expression);
+       at != std::sregex_iterator(); ++at) {
+    all.insert((*at)[1]);
+  }
+  return all;
+}
+
+std::string sources(const fs::path& folder, const std::string& prefix) {
+  std::string text;
+  for (const auto& entry : fs::directory_iterator(root / "src" / folder)) {
+    const fs::path& path = entry.path();
+    const bool wanted = path.extension() == ".cpp" && path.stem().string().starts_with(prefix);
+    if (wanted) text += read(path);
+  }
+  return text;
+}
+
+/// The keys that a reader of files asks its YAML map for.
+std::set<std::string> keys_of_reader(const std::string& prefix) {
+  return found(sources("files", prefix),
+               R"re((?:(?:get|text|flag|decimal|duration|range|allow|number<[^>]*>|word<[^>]*>))re"
+               R"re(\(|read_(?:section|slice|areas|decimals)\(map, |check_count\(counts, ))re"
+               R"re("([a-z-]+)")re");
+}
+
+/// Whether a page has a word behind one of the macros that mark keys and fixed words.
+bool explains(const std::string& page, const std::string& word) {
+  const std::regex marked(
+      fmt::format(R"re((^|\n)\.(It )?(Pq )?(Ic|Cm|Ev)( [^\n]*)? {}( [^\n]*)?\n)re",
+                  std::regex_replace(word, std::regex(R"re([.%])re"), R"re((\\&)?\$&)re")));
+  return std::regex_search(page, marked) ||
+         std::regex_search(page, std::regex(fmt::format(R"re(\n\.(It )?(Ic|Cm|Ev) {}\n)re", word)));
+}
+
+}  // namespace
+
+TEST_CASE("manual: every page is what its source and the program make of it") {
+  const std::vector<cli::Hole> holes = all_holes();
+  for (const std::string& name : pages) {
+    CAPTURE(name);
+    const auto page = cli::fill_holes(read(manual / (name + ".in")), holes);
+    REQUIRE_MESSAGE(page.has_value(), page.error().name);
+    if (std::getenv("SPINDLE_UPDATE") != nullptr) {
+      std::ofstream file(manual / name);
+      file << *page;
+    }
+    CHECK_MESSAGE(*page == read(manual / name), "SPINDLE_UPDATE=1 rewrites it");
+    CHECK(page->find_first_not_of("\n !\"#$%&'()*+,-./0123456789:;<=>?@ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                  "[\\]^_`abcdefghijklmnopqrstuvwxyz{|}~") == std::string::npos);
+  }
+}
+
+TEST_CASE("manual: every hole is used, and one that nobody fills is told") {
+  std::string all;
+  for (const std::string& name : pages) all += read(manual / (name + ".in"));
+  for (const cli::Hole& hole : all_holes()) {
+    CAPTURE(hole.name);
+    CHECK(all.find("\n@" + hole.name + "@\n") != std::string::npos);
+  }
+  const auto page = cli::fill_holes("before\n@NOBODY@\n", all_holes());
+  REQUIRE_FALSE(page.has_value());
+  CHECK(page.error().code == Errc::bad_file);
+  CHECK(page.error().name == "NOBODY");
+}
+
+TEST_CASE("manual: a page is filled line by line") {
+  const std::vector<cli::Hole> holes = {{"A", ".Pp\nmore\n"}, {"EMPTY", ""}};
+  CHECK(cli::fill_holes("x\n@A@\ny @A@\n@EMPTY@\n@@\n", holes) == "x\n.Pp\nmore\ny @A@\n@@\n");
+}
+
+TEST_CASE("manual: text is neither a request, an escape nor a typographic character") {
+  CHECK(cli::mdoc_escaped(R"(a\b 'c' "d" `e` ^~-)") ==
+        R"(a\eb \(aqc\(aq \(dqd\(dq \(gae\(ga \(ha\(ti\-)");
+  CHECK(cli::mdoc_argument("N") == "N");
+  CHECK(cli::mdoc_argument("Op") == "\\&Op");
+  CHECK(cli::mdoc_argument("end") == "end");
+  CHECK(cli::mdoc_argument("") == "\\&");
+  CHECK(cli::mdoc_argument(".") == "\\&.");
+  CHECK(cli::mdoc_argument("two words") == "\"two words\"");
+  CHECK(cli::mdoc_argument("[NAME|PATTERN...]") == "[NAME|PATTERN...]");
+  CHECK(cli::mdoc_prose("One. Two (2.) three.") == "One.\nTwo (2.)\nthree.\n");
+  CHECK(cli::mdoc_prose(".profile is a file") == "\\&.profile is a file\n");
+  CHECK(cli::mdoc_prose("") == "");
+  const std::vector<std::string> lines = {".x 'y'", "", "  z"};
+  CHECK(cli::mdoc_literal(lines) == ".Bd -literal -offset indent\n\\&.x \\(aqy\\(aq\n\n  z\n.Ed\n");
+  std::string words;
+  for (int i = 0; i < 60; ++i) words += "word ";
+  std::istringstream wrapped(cli::mdoc_prose(words));
+  for (std::string line; std::getline(wrapped, line);) CHECK(line.size() <= 78);
+}
+
+TEST_CASE("manual: commands, their options and every exit status are there") {
+  const std::string page = read(manual / "spindle.1");
+  const cli::Description description = cli::describe_grammar();
+  for (const cli::CommandDescription& command : description.commands) {
+    CAPTURE(command.name);
+    CHECK(page.find("\n.Ss " + cli::mdoc_argument(command.name)) != std::string::npos);
+    for (const cli::OptionDescription& option : command.options) {
+      CHECK(page.find((option.is_argument() ? "Ar " : "Fl ") +
+                      cli::mdoc_argument(option.names.back().substr(
+                          option.is_argument() ? 0 : 1))) != std::string::npos);
+    }
+  }
+  for (const StatusInfo& status : status_table()) {
+    CHECK(page.find(fmt::format("\n.It Sy {} {}\n", static_cast<int>(status.status),
+                                cli::mdoc_argument(status.name))) != std::string::npos);
+  }
+}
+
+TEST_CASE("manual: an appendix is text and terms, a command below another has its own heading") {
+  const cli::Description description{
+      .commands = {{.name = "a",
+                    .synopsis = "X",
+                    .meaning = "does it",
+                    .appendix = "Words (of it):\n  one[=N]   the first\n  two\n\nAnd more.\n",
+                    .commands = {{.name = "a b", .meaning = "below"}}}}};
+  CHECK(cli::manual_holes(description).front().text ==
+        ".Ss a\n.Dl spindle a X\\&\n.Pp\nDoes it.\n.Pp\nWords (of it):\n.Pp\n.Bl -tag -width Ds "
+        "-compact\n.It Cm one[=N]\nthe "
+        "first\n.It Cm two\n.El\n.Pp\nAnd more.\n.Ss a b\n.Dl spindle a b\\&\n.Pp\nBelow.\n");
+}
+
+TEST_CASE("manual: every variable of the environment that is read is explained") {
+  const std::string page = read(manual / "spindle.1");
+  const auto names =
+      found(sources("cli", ""), R"re((?:variable|xdg_folder)\(world, "([A-Z_]+)")re");
+  CHECK(names.size() >= 8);
+  for (const std::string& name : names) {
+    CAPTURE(name);
+    CHECK(explains(page, name));
+  }
+}
+
+TEST_CASE("manual: every option of a URL is explained") {
+  const std::string page = read(manual / "spindle.1");
+  const auto names = found(sources("link", "endpoint"), R"re(\{"([a-z0-9]+)", [^"]*set_\w+\})re");
+  CHECK(names.size() >= 4);
+  for (const std::string& name : names) {
+    CAPTURE(name);
+    CHECK(page.find("\n.It Cm " + name + "\n") != std::string::npos);
+  }
+}
+
+TEST_CASE("manual: every key of every kind of file is explained") {
+  struct Row {
+    std::string reader;
+    std::string page;
+    std::size_t at_least;
+  };
+  for (const Row& row :
+       {Row{"profile_", "spindle-profile.5", 80}, Row{"tools_", "spindle-tools.5", 5},
+        Row{"backup_", "spindle-backup.5", 0}}) {
+    const std::string page = read(manual / row.page);
+    const auto keys = keys_of_reader(row.reader);
+    CHECK(keys.size() >= row.at_least);
+    for (const std::string& key : keys) {
+      CAPTURE(row.page);
+      CAPTURE(key);
+      CHECK(explains(page, key));
+    }
+  }
+}
+
+TEST_CASE("manual: the words of a profile are explained") {
+  const std::string page = read(manual / "spindle-profile.5");
+  const auto words = found(sources("files", "profile_"),
+                           R"re(\{"([A-Za-z0-9.%-]+)", (?:"|true|false|'|\w+::|[A-Z]\w*::))re");
+  CHECK(words.size() >= 40);
+  for (const std::string& word : words) {
+    CAPTURE(word);
+    CHECK(explains(page, word));
+  }
+}
+
+TEST_CASE("manual: the examples of files are valid") {
+  const files::ProfileStore store({(root / "profiles").string()});
+  for (const char* name : {"my-driver.yaml", "bm-line1.yaml"}) {
+    CAPTURE(name);
+    const auto findings = store.check((manual / "examples" / name).string());
+    REQUIRE(findings.has_value());
+    CHECK(findings->empty());
+  }
+  const auto tools = files::load_tools((manual / "examples" / "tools.yaml").string());
+  REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
+  CHECK(tools->tools.size() == 2);
+}
