@@ -271,5 +271,6 @@ class TraceTest(unittest.TestCase):
         self.assertIn("Write Multiple Registers", told)
         self.assertEqual(told.count("Query"), told.count("Response"))
 
+
 if __name__ == "__main__":
     unittest.main(verbosity=2)
