@@ -412,6 +412,8 @@ class RoundTripTest(MotorTest):
         for where in PLACES:
             with self.subTest(where), Bus(where=where) as bus:
                 file = support.home().path / f"before{PLACES.index(where)}.yaml"
+                self.assertEqual(start(bus.url, "--for", "100ms").status, 0)
+                ran = bus.commands()
                 saved = run("backup", bus.url, "-f", file)
                 self.assertEqual(saved.status, 0, saved)
                 changes = {"operation.4.speed": 700, "motor.jog-speed": 250, "operation.7.torque-limit": 90}
@@ -424,7 +426,7 @@ class RoundTripTest(MotorTest):
                 self.assertEqual(restored.status, 0, restored)
                 same = run("diff", file, bus.url, "--json")
                 self.assertEqual((same.status, same.records("diff")), (0, []), same)
-                self.assertEqual(bus.commands(), [])  # no command among what is restored
+                self.assertEqual(bus.commands(), ran)  # no command among what is restored
 
 
 class ScanTest(MotorTest):
