@@ -18,7 +18,7 @@ class MemoryDisk {
             .write = [this](const std::string& path, std::string_view text,
                             Overwrite overwrite) { return write(path, text, overwrite); },
             .append = [this](const std::string& path, std::string_view line) -> Result<void> {
-          const std::lock_guard lock(mutex_);
+              const std::lock_guard lock(mutex_);
               if (full_) return tl::unexpected(no_room(path));
               files_[plain(path)] += line;
               return {};
