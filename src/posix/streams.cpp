@@ -6,6 +6,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "posix/wait.hpp"
+
 namespace spindle::posix {
 namespace {
 
@@ -41,20 +43,24 @@ Result<void> write_out(std::string_view text) {
 
 void write_err(std::string_view text) { write_all(STDERR_FILENO, text); }
 
-std::optional<std::string> read_line() {
-  // Byte by byte: what follows the line belongs to the next reader of standard input.
-  std::string line;
-  char byte = 0;
-  for (;;) {
-    const ssize_t got = ::read(STDIN_FILENO, &byte, 1);
-    // A user who presses Ctrl-C at a question wants out: a signal must not become an answer.
-    if (got < 0) return std::nullopt;
-    if (got == 0) break;
-    if (byte == '\n') return line;
-    line += byte;
-  }
-  if (line.empty()) return std::nullopt;
-  return line;
+std::function<std::optional<std::string>()> line_reader(const Clock& clock,
+                                                        const Interrupt& interrupt) {
+  return [&clock, &interrupt]() -> std::optional<std::string> {
+    // Byte by byte: what follows the line belongs to the next reader of standard input.
+    std::string line;
+    char byte = 0;
+    for (;;) {
+      // A user who presses Ctrl-C at a question wants out, also just before the wait begins.
+      const Woken woken = wait_for({STDIN_FILENO, POLLIN}, TimePoint::max(), clock, interrupt);
+      const ssize_t got = woken == Woken::ready ? ::read(STDIN_FILENO, &byte, 1) : -1;
+      if (got < 0) return std::nullopt;
+      if (got == 0) break;
+      if (byte == '\n') return line;
+      line += byte;
+    }
+    if (line.empty()) return std::nullopt;
+    return line;
+  };
 }
 
 bool is_terminal(Stream stream) {

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import pty
+import select
 import signal
 import subprocess
 import unittest
@@ -27,13 +28,13 @@ def ask_on_terminal(arguments, question, answer):
     if pid == 0:
         program = support.binary()
         os.execve(program, [program, *arguments], support.home().environment())
-    shown = b""
+    shown, answered = b"", False
     with contextlib.suppress(OSError):  # the end of the terminal
-        while question not in shown:
+        while select.select([terminal], [], [], support.DEADLINE)[0]:
             shown += os.read(terminal, 4096)
-        os.write(terminal, answer)
-        while True:
-            shown += os.read(terminal, 4096)
+            if question in shown and not answered:
+                answered = os.write(terminal, answer) > 0
+        os.kill(pid, signal.SIGKILL)  # it neither ended nor said anything more
     _, status = os.waitpid(pid, 0)
     os.close(terminal)
     return shown.decode(), os.waitstatus_to_exitcode(status)

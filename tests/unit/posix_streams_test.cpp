@@ -11,6 +11,8 @@
 #include <string>
 
 #include "posix/descriptor.hpp"
+#include "spindle/posix/clock.hpp"
+#include "spindle/posix/signals.hpp"
 #include "spindle/posix/streams.hpp"
 
 using namespace spindle;
@@ -127,28 +129,34 @@ TEST_CASE("streams: lines are read without their end, the last one also without 
   put(pipe.writer, "yes\n\nlast");
   pipe.writer.close();
   const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [] {
-    if (posix::read_line() != "yes") return 1;
-    if (posix::read_line() != "") return 2;
-    if (posix::read_line() != "last") return 3;
-    return posix::read_line().has_value() ? 4 : 0;
+    const posix::SignalWatch signals;
+    const posix::SteadyClock clock(signals.interrupt());
+    const auto read_line = posix::line_reader(clock, signals.interrupt());
+    if (read_line() != "yes") return 1;
+    if (read_line() != "") return 2;
+    if (read_line() != "last") return 3;
+    return read_line().has_value() ? 4 : 0;
   });
   CHECK(finish(child) == 0);
 }
 
-TEST_CASE("streams: a signal at the prompt is never an answer") {
+TEST_CASE("streams: a signal at the prompt is never an answer, nor one just before it") {
   Pipe pipe;
   put(pipe.writer, "y");
-  const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [] {
-    struct sigaction action = {};
-    action.sa_handler = [](int) {};
-    ::sigaction(SIGALRM, &action, nullptr);
-    // The alarm comes again and again: whenever the read begins, one falls into it.
-    const timeval period = {.tv_sec = 0, .tv_usec = 1000};
-    const itimerval timer = {.it_interval = period, .it_value = period};
-    ::setitimer(ITIMER_REAL, &timer, nullptr);
-    return posix::read_line().has_value() ? 1 : 0;
-  });
-  CHECK(finish(child) == 0);
+  for (const bool early : {false, true}) {
+    const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [early] {
+      const posix::SignalWatch signals;
+      const posix::SteadyClock clock(signals.interrupt());
+      struct sigaction action = {};
+      action.sa_handler = [](int) { ::raise(SIGINT); };
+      ::sigaction(SIGALRM, &action, nullptr);
+      if (early) ::raise(SIGINT);
+      const itimerval timer = {.it_interval = {}, .it_value = {.tv_sec = 0, .tv_usec = 20'000}};
+      if (!early) ::setitimer(ITIMER_REAL, &timer, nullptr);
+      return posix::line_reader(clock, signals.interrupt())().has_value() ? 1 : 0;
+    });
+    CHECK(finish(child) == 0);
+  }
 }
 
 TEST_CASE("streams: a pipe is no terminal") {

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
+#include "spindle/base/interrupt.hpp"
 
 namespace spindle::posix {
 
@@ -15,8 +18,10 @@ Result<void> write_out(std::string_view text);
 /// Writes everything to standard error; failures are ignored, there is nobody left to tell.
 void write_err(std::string_view text);
 
-/// One line from standard input without its end; empty at end of input.
-std::optional<std::string> read_line();
+/// Reads one line of standard input, without its end; empty at end of input and when an interrupt
+/// was raised, before or during the wait.
+std::function<std::optional<std::string>()> line_reader(const Clock& clock,
+                                                        const Interrupt& interrupt);
 
 /// Whether the reader of standard output is still there. Only pipes and sockets can tell; others
 /// are always open.
