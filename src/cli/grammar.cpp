@@ -57,6 +57,7 @@ struct Draft {
   std::map<const CLI::App*, Words> words;
   const CLI::App* chosen = nullptr;
   Invocation::ToolsFile tools_use = Invocation::ToolsFile::loaded;
+  std::string only_as_text;  ///< why neither JSON nor CSV can be had; empty: they can
   Run run;
 };
 
@@ -223,8 +224,13 @@ struct TypedScan {
   commands::ScanOptions options;
   std::string units;
 };
+struct TypedIdentify {
+  commands::IdentifyOptions options;
+  std::string jobs;
+};
 struct TypedBackup {
   commands::BackupOptions options;
+  std::string jobs;
   bool force = false;
   bool include_secrets = false;
 };
@@ -251,7 +257,7 @@ struct TypedSimulate {
 
 /// Everything that CLI11 writes into; must live as long as the parser.
 struct TypedCommands {
-  commands::IdentifyOptions identify;
+  TypedIdentify identify;
   commands::ListOptions list;
   TypedGet get;
   TypedSet set;
@@ -273,18 +279,31 @@ struct TypedCommands {
   commands::ProfileNameOptions profile_check;
 };
 
+constexpr std::string_view jobs_words = "how many tools at a time (default 64)";
+
+Result<void> fill_jobs(const std::string& text, std::size_t& jobs) {
+  if (text.empty()) return {};
+  const auto number = to_number("--jobs", text, 1, 10'000);
+  if (!number) return tl::unexpected(number.error());
+  jobs = *number;
+  return {};
+}
+
 void add_identify(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"identify", "TARGET...",
                            "who is there: maker, model, serial, firmware, profile",
                            "spindle identify sim:doga-bm\n"
                            "spindle identify tcp://192.168.10.23:5000\n"
                            "spindle identify station3 station4 --json"};
-  const auto run = [](const commands::IdentifyOptions& options, Context& context) {
-    return options.targets.empty() ? Result<Outcome>(tl::unexpected(missing("identify", "TARGET")))
-                                   : commands::identify(options, context);
+  const auto run = [](TypedIdentify identify, Context& context) -> Result<Outcome> {
+    if (identify.options.targets.empty()) return tl::unexpected(missing("identify", "TARGET"));
+    auto filled = fill_jobs(identify.jobs, identify.options.jobs);
+    if (!filled) return tl::unexpected(std::move(filled.error()));
+    return commands::identify(identify.options, context);
   };
-  add_command(app, draft, words, typed.identify, run)
-      ->add_option("TARGET", typed.identify.targets, "tool name, @group or URL");
+  CLI::App* command = add_command(app, draft, words, typed.identify, run);
+  command->add_option("TARGET", typed.identify.options.targets, "tool name, @group or URL");
+  option(command, "--jobs", typed.identify.jobs, "N", std::string(jobs_words));
 }
 
 void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -673,6 +692,9 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
 
 Result<Outcome> run_backup(TypedBackup typed, Context& context) {
   if (typed.options.targets.empty()) return tl::unexpected(missing("backup", "TARGET"));
+  if (auto filled = fill_jobs(typed.jobs, typed.options.jobs); !filled) {
+    return tl::unexpected(std::move(filled.error()));
+  }
   if (typed.force) typed.options.overwrite = Overwrite::allow;
   if (typed.include_secrets) typed.options.secrets = commands::Secrets::include;
   return commands::backup(typed.options, context);
@@ -689,11 +711,15 @@ void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
   auto& options = typed.backup.options;
   command->add_option("TARGET", options.targets, "tool name, @group or URL");
   option(command, "-f,--file", options.file, "FILE",
-         "where to (default TARGET.yaml in the present folder); - is standard output");
+         "where to (default TARGET.yaml in the present folder); - is standard output")
+      ->each([&draft](const std::string& file) {
+        if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
+      });
   option(command, "--dir", options.folder, "FOLDER", "one file TARGET.yaml a tool in this folder");
   command->add_flag("--force", typed.backup.force, "replace files that are there");
   command->add_flag("--include-secrets", typed.backup.include_secrets,
                     "also what the profile marks as secret");
+  option(command, "--jobs", typed.backup.jobs, "N", std::string(jobs_words));
 }
 
 void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -1034,6 +1060,10 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   if (wants_version) {
     invocation.asks = Invocation::Asks::version;
     return invocation;
+  }
+  if (!draft.only_as_text.empty() && invocation.format != report::Format::table) {
+    return tl::unexpected(
+        usage(draft.only_as_text, "leave out --json and --output, or name a file"));
   }
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));

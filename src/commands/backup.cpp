@@ -214,8 +214,8 @@ Result<Outcome> backup(const BackupOptions& options, Context& context) {
     if (!made) return tl::unexpected(std::move(made.error()));
   }
   Saving saving(options, *paths, *profiles, targets->size(), context);
-  const auto results =
-      side_by_side(*targets, [&](const Target& target) { return saving.save(target); });
+  const auto results = side_by_side(*targets, options.jobs,
+                                    [&](const Target& target) { return saving.save(target); });
   saving.clear_progress();
   if (options.file == standard_output) return tell_quietly(results.front());
   return tell(results, context);

@@ -132,8 +132,8 @@ Result<Identified> identify_one(const Target& target, const Context& context) {
 Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
   const auto targets = resolve_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
-  const auto results =
-      side_by_side(*targets, [&](const Target& target) { return identify_one(target, context); });
+  const auto results = side_by_side(
+      *targets, options.jobs, [&](const Target& target) { return identify_one(target, context); });
   Outcome outcome;
   Listing listing(context, columns);
   for (const Result<Identified>& result : results) {

@@ -38,8 +38,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   auto targets = resolve_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
   for (Target& target : *targets) target.reach = options.reach;
-  const auto results = side_by_side(
-      *targets, [&](const Target& target) { return stop_one(target, options, context); });
+  // A stop waits for no other one.
+  const auto results = side_by_side(*targets, targets->size(), [&](const Target& target) {
+    return stop_one(target, options, context);
+  });
   Outcome outcome;
   Listing listing(context, stop_columns());
   for (std::size_t index = 0; index < results.size(); ++index) {

@@ -349,7 +349,7 @@ Result<Outcome> RestoreRun::end() {
                                {"unchanged", count_cell(unchanged)},
                                {"skipped", count_cell(task_->plan.skipped.size() - unchanged)},
                                {"rolled_back", count_cell(rolled_back_)},
-                               {"saved", text_or_null(saved_)}},
+                               {"saved_state", text_or_null(saved_)}},
                               outcome_.status(), tool_->target.shown, context_->clock),
                sentence)
       .map([&] { return outcome_; });

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -15,23 +18,28 @@ namespace spindle::commands {
 /// Places of the targets that share a line, line by line.
 std::vector<std::vector<std::size_t>> by_line(const std::vector<Target>& targets);
 
-/// Calls `handle(target)` for every target, in a thread of its own for every line when there are
-/// several, and returns the results in the order of the targets. The units of one serial line take
-/// turns: only one at a time can have it. Threads share nothing that changes.
+/// Calls `handle(target)` for every target, at most `jobs` (from 1) at a time, each in a thread of
+/// its own when there are several, and returns the results in the order of the targets. The units
+/// of one serial line take turns: only one at a time can have it. Threads share nothing that
+/// changes but the place of the next line.
 template <typename Handle>
-auto side_by_side(const std::vector<Target>& targets, Handle handle) {
+auto side_by_side(const std::vector<Target>& targets, std::size_t jobs, Handle handle) {
   using Handled = std::invoke_result_t<Handle, const Target&>;
   std::vector<std::optional<Handled>> slots(targets.size());
   const auto fill = [&](const std::vector<std::size_t>& line) {
     for (const std::size_t index : line) slots[index] = handle(targets[index]);
   };
   const auto lines = by_line(targets);
-  if (lines.size() == 1) {
-    fill(lines.front());
-  } else {
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    for (std::size_t line = next++; line < lines.size(); line = next++) fill(lines[line]);
+  };
+  {
+    const std::size_t others = std::max<std::size_t>(std::min(jobs, lines.size()), 1) - 1;
     std::vector<std::jthread> threads;
-    threads.reserve(lines.size());
-    for (const auto& line : lines) threads.emplace_back(fill, line);
+    threads.reserve(others);
+    for (std::size_t thread = 0; thread < others; ++thread) threads.emplace_back(work);
+    work();
   }
   std::vector<Handled> results;
   results.reserve(slots.size());

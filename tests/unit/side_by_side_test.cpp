@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <mutex>
 #include <string>
@@ -50,7 +51,7 @@ TEST_CASE("results come in the order of the targets, whatever shares a line") {
       targets_at({"rtu:///dev/x?unit=1", "tcp://a", "rtu:///dev/x?unit=2", "tcp://b"});
   std::mutex mutex;
   std::vector<std::string> order;
-  const auto shown = side_by_side(targets, [&](const Target& target) {
+  const auto shown = side_by_side(targets, 64, [&](const Target& target) {
     const std::lock_guard lock(mutex);
     order.push_back(target.shown);
     return target.shown;
@@ -60,4 +61,28 @@ TEST_CASE("results come in the order of the targets, whatever shares a line") {
     CHECK(shown[index] == targets[index].shown);
   const auto first = std::find(order.begin(), order.end(), targets[0].shown);
   CHECK(std::find(first, order.end(), targets[2].shown) != order.end());
+}
+
+TEST_CASE("no more tools than jobs are handled at the same time, and all of them in the end") {
+  std::vector<std::string> urls;
+  for (int tool = 0; tool < 20; ++tool) urls.push_back("tcp://host" + std::to_string(tool));
+  std::vector<Target> targets;
+  for (const std::string& url : urls) targets.push_back(target_at(url));
+  for (const int jobs : {1, 3, 64}) {
+    std::atomic<int> now = 0;
+    std::atomic<int> most = 0;
+    const auto shown =
+        side_by_side(targets, static_cast<std::size_t>(jobs), [&](const Target& target) {
+          const int others = ++now;
+          int seen = most.load();
+          while (others > seen && !most.compare_exchange_weak(seen, others)) {
+          }
+          std::this_thread::yield();
+          --now;
+          return target.shown;
+        });
+    CHECK(shown == urls);
+    CHECK(most.load() >= 1);
+    CHECK(most.load() <= jobs);
+  }
 }

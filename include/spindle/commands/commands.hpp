@@ -11,8 +11,12 @@
 /// One options struct and one function a verb. None of them prints, exits or parses a command line.
 namespace spindle::commands {
 
+/// Tools that are handled at the same time, unless --jobs says otherwise.
+inline constexpr std::size_t usual_jobs = 64;
+
 struct IdentifyOptions {
   std::vector<std::string> targets;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> identify(const IdentifyOptions& options, Context& context);
 
@@ -120,6 +124,7 @@ struct BackupOptions {
   std::string folder;  ///< where files named after their targets go; empty: the present one
   Overwrite overwrite = Overwrite::refuse;
   Secrets secrets = Secrets::leave_out;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> backup(const BackupOptions& options, Context& context);
 
