@@ -91,6 +91,7 @@ Result<void> begin_capture(const std::string& path, const Disk& disk) {
   if (path.empty()) return {};
   auto begun = disk.write(path, files::capture_head(), Overwrite::refuse);
   if (!begun && begun.error().status() == ExitStatus::usage) {
+    begun.error().name = path;
     begun.error().hint = "choose another name for --trace";
   }
   return begun;

@@ -249,9 +249,10 @@ Result<Target> resolve_target(const std::string& text, const Context& context) {
   auto targets = resolve_targets({text}, context);
   if (!targets) return tl::unexpected(std::move(targets.error()));
   if (targets->size() == 1) return std::move(targets->front());
-  return tl::unexpected(Error{.code = Errc::usage,
-                              .message = fmt::format("'{}' is {} tools, and this command takes one",
-                                                     text, targets->size())});
+  return tl::unexpected(Error{
+      .code = Errc::usage,
+      .message = fmt::format("'{}' is {} tools, and this command takes one", text, targets->size()),
+      .hint = fmt::format("name one of them, such as {}", targets->front().shown)});
 }
 
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context) {
