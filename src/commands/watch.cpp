@@ -10,6 +10,7 @@
 #include "event_records.hpp"
 #include "listing.hpp"
 #include "motor_records.hpp"
+#include "progress.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
@@ -25,9 +26,12 @@ using device::Heed;
 /// thing that several threads touch.
 class Stage {
  public:
-  Stage(const WatchOptions& options, const std::vector<report::Column>& columns, Context& context)
+  Stage(const WatchOptions& options, std::size_t tools, const std::vector<report::Column>& columns,
+        Context& context)
       : options_(&options),
         context_(&context),
+        tools_(tools),
+        status_(context),
         listing_(context, columns),
         started_(context.clock.now()),
         last_event_(started_) {}
@@ -35,7 +39,9 @@ class Stage {
   Heed tell(const device::News& news, const NewsRecords& records) {
     const std::lock_guard lock(mutex_);
     if (ended_) return Heed::stop;
+    status_.clear();
     listing_.add(std::visit([&](const auto& one) { return record_of(one, records); }, news));
+    show_status();
     const bool counted = options_->count > 0 && events_ + changes_ >= options_->count;
     if (counted || !listing_.open()) end();
     return ended_ ? Heed::stop : Heed::go_on;
@@ -51,6 +57,7 @@ class Stage {
     outcome_.fail(watched.error());
     const ExitStatus status = watched.error().status();
     const bool asked_to_end = status == ExitStatus::interrupted || status == ExitStatus::terminated;
+    status_.clear();
     if (!asked_to_end) listing_.add(watched.error());
   }
 
@@ -69,6 +76,7 @@ class Stage {
   }
 
   Result<Outcome> finish() {
+    status_.clear();
     if (closed_) return tl::unexpected(Error{.code = Errc::closed_pipe});
     if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
     const bool idle =
@@ -102,8 +110,20 @@ class Stage {
     return records.gap(news, context_->clock.wall());
   }
   report::Record record_of(const device::LinkNews& news, const NewsRecords& records) {
-    if (news.state == device::LinkState::lost) ++losses_;
+    if (news.state == device::LinkState::lost) {
+      ++losses_;
+      --connected_;
+    }
+    if (news.state == device::LinkState::connected) ++connected_;
     return records.link(news, context_->clock.wall());
+  }
+
+  /// Under the stream, where both are one terminal.
+  void show_status() {
+    const bool alone = context_->common.verbosity == Verbosity::normal;
+    if (!context_->io.out_is_terminal || !alone) return;
+    status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),
+                             counted(ok_ + ng_, "result"), ng_));
   }
 
   /// Wakes the other tools' threads too; each still says its farewell.
@@ -131,7 +151,9 @@ class Stage {
 
   const WatchOptions* options_;
   Context* context_;
+  std::size_t tools_;
   std::mutex mutex_;
+  ProgressLine status_;
   Listing listing_;
   Outcome outcome_ = {};
   TimePoint started_;
@@ -142,6 +164,7 @@ class Stage {
   std::size_t changes_ = 0;
   std::size_t gaps_ = 0;
   std::size_t losses_ = 0;
+  std::size_t connected_ = 0;
   bool ended_ = false;
   bool closed_ = false;
 };
@@ -241,7 +264,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
       return tl::unexpected(std::move(checked.error()));
     }
   }
-  Stage stage(options, columns_for(*tools), context);
+  Stage stage(options, tools->size(), columns_for(*tools), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, stage, options, context);
     stage.leave(watched);

@@ -7,6 +7,8 @@ of keep-alives.
 
 import contextlib
 import os
+import pty
+import select
 import signal
 import socket
 import threading
@@ -305,6 +307,36 @@ class EndingTest(unittest.TestCase):
             finished = support.run("watch", url, *JSON, "--no-reconnect")
             self.assertEqual(finished.status, 4, finished)
             self.assertEqual(finished.records("link"), [])
+
+
+class TerminalTest(unittest.TestCase):
+    def test_status_line_under_the_stream(self):
+        with EventServer() as server:
+            pid, terminal = pty.fork()
+            if pid == 0:
+                program = support.binary()
+                arguments = [program, "watch", server.url, *PROFILE, "--count", "2", "--color", "never"]
+                os.execve(program, arguments, support.home().environment())
+            shown = b""
+            support.wait_until(lambda: server.armed, "the watch arms the output")
+            with contextlib.suppress(OSError):  # the end of the terminal
+                for kind in (1, 2):
+                    before = shown.count(b"of 1 tool connected")
+                    server.event(kind)
+                    while shown.count(b"of 1 tool connected") <= before:
+                        self.assertTrue(select.select([terminal], [], [], support.DEADLINE)[0])
+                        shown += os.read(terminal, 4096)
+                while select.select([terminal], [], [], support.DEADLINE)[0]:
+                    shown += os.read(terminal, 4096)
+            _, status = os.waitpid(pid, 0)
+            os.close(terminal)
+        text = shown.decode()
+        self.assertEqual(os.waitstatus_to_exitcode(status), 0, text)
+        self.assertIn("1 of 1 tool connected, 1 result, 0 NG", text)
+        self.assertIn("1 of 1 tool connected, 2 results, 1 NG", text)
+        # What stays on the screen has no status line: each was wiped before the next record.
+        lines = [line.rsplit("\r\x1b[K", 1)[-1] for line in text.split("\r\n")]
+        self.assertEqual([line for line in lines if "tool connected" in line], [])
 
 
 class ReconnectingTest(unittest.TestCase):
