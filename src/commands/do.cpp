@@ -35,9 +35,8 @@ Result<std::vector<Deed>> check_deeds(const DoOptions& options, const Profile& p
   for (const std::string& text : options.actions) {
     auto deed = parse_deed(text, profile);
     if (!deed) return tl::unexpected(std::move(deed.error()));
-    auto allowed = check_evidence(deed->action, target, options.acceptance).and_then([&] {
-      return check_guard(*deed);
-    });
+    auto allowed = check_guard(*deed).and_then(
+        [&] { return check_evidence(deed->action, target, options.acceptance); });
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
     deeds.push_back(std::move(*deed));
   }

@@ -252,8 +252,8 @@ class TraceTest(unittest.TestCase):
         options = [word for field in fields for word in ("-e", field)]
         seen = support.run("tshark", "-r", path, "-T", "fields", "-E", "separator=|", *options)
         complaints = support.run("tshark", "-r", path, "-Y", COMPLAINT)
-        self.assertEqual(complaints.stdout, "")
-        return [line.split("|") for line in seen.stdout.splitlines()]
+        self.assertEqual(complaints.out, "")
+        return [line.split("|") for line in seen.out.splitlines()]
 
     def test_tcp(self):
         packets = self.packets("get", "sim:doga-bm", "preset.1.target-torque")
