@@ -87,7 +87,7 @@ WRONG = [
     ([*DO, "alarm-reset=1"], "alarm-reset", "alone"),
     ([*DO, "select-preset=16", "--accept-unverified"], "'16'", "15"),
     ([*DO, "select-preset=3"], "select-preset", "--accept-unverified"),
-    ([*DO, "start", "--yes"], "start", "--accept-unverified"),
+    ([*DO, "start", "--yes"], "start", "remote-start"),
     ([*DO, "start", "--accept-unverified", "--yes"], "start", "guard"),
     ([*DO, "select-preset=3", "--accept-unverified"], "select-preset", "--yes"),
     ([*DO, "select-preset=3", "--accept-unverified", "--no-input"], "select-preset", "--yes"),

@@ -141,7 +141,8 @@ TEST_CASE("what is no target says what is near, or what there is") {
       {"@line", Errc::unknown_name, "unknown target '@line'; did you mean '@line1'?"},
       {"nobody", Errc::unknown_name,
        "unknown target 'nobody'; name a tool of spindle.yaml, or a URL such as tcp://HOST"},
-      {"@line1", Errc::usage, "'@line1' is 2 tools, and this command takes one"},
+      {"@line1", Errc::usage,
+       "'@line1' is 2 tools, and this command takes one; name one of them, such as station3"},
   };
   for (const Case& row : cases) {
     CAPTURE(row.text);
