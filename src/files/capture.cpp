@@ -36,14 +36,14 @@ constexpr std::size_t alignment = 4;
 template <typename Integer>
 void put_little(std::string& into, Integer value) {
   for (std::size_t byte = 0; byte < sizeof value; ++byte) {
-    into.push_back(static_cast<char>((value >> (8 * byte)) & 0xFFU));
+    into.push_back(static_cast<char>((std::uint64_t{value} >> (8 * byte)) & 0xFFU));
   }
 }
 
 template <typename Integer>
 void put_big(std::string& into, Integer value) {
   for (std::size_t byte = sizeof value; byte > 0; --byte) {
-    into.push_back(static_cast<char>((value >> (8 * (byte - 1))) & 0xFFU));
+    into.push_back(static_cast<char>((std::uint64_t{value} >> (8 * (byte - 1))) & 0xFFU));
   }
 }
 
