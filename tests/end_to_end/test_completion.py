@@ -124,10 +124,10 @@ class CompletionTest(unittest.TestCase):
             zpty -w terminal "source '{SCRIPTS}/_spindle'"
             zpty -w terminal 'compadd() {{ local -a found; builtin compadd -O found "$@"; print -rl -- $found >>shown; builtin compadd "$@" }}'
             zpty -w terminal 'bindkey "^I" complete-word; print -r ready >ready'
-            repeat 100 {{ [[ -e ready ]] && break; sleep 0.05 }}
+            repeat 300 {{ [[ -e ready ]] && break; sleep 0.05 }}
             zpty -w -n terminal "$1"$'\\t'
             zpty -w terminal $'\\C-u'"print -r done >done"
-            repeat 100 {{ [[ -e done ]] && break; sleep 0.05 }}
+            repeat 300 {{ [[ -e done ]] && break; sleep 0.05 }}
             zpty -d terminal
             sort -u shown
             rm -f shown ready done
