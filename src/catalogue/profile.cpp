@@ -163,6 +163,11 @@ Result<Parameter> parse_raw(std::string_view text) {
 
 }  // namespace
 
+modbus::RegisterTable table_of(const EventFacts& events) {
+  constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
+  return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
+}
+
 bool RefusalFacts::is_busy(std::int64_t code) const {
   return std::find(busy.begin(), busy.end(), code) != busy.end();
 }

@@ -76,8 +76,7 @@ NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile
     : target_(&target), profile_(&profile), tables_(std::move(tables)) {
   if (!profile.events) return;
   const catalogue::EventFacts& events = *profile.events;
-  const auto table =
-      events.function == 4 ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
+  const auto table = catalogue::table_of(events);
   for (const catalogue::Parameter& parameter : profile.parameters) {
     const std::uint16_t address = parameter.address.value;
     const bool inside = parameter.table == table && address >= events.first &&

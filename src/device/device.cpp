@@ -73,12 +73,6 @@ bool is_said_absent(const Parameter& parameter, const catalogue::Profile& profil
   });
 }
 
-modbus::RegisterTable event_table(const catalogue::EventFacts& events) {
-  const bool input =
-      events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
-  return input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
-}
-
 link::ReadLimits read_limits(const catalogue::Profile& profile) {
   link::ReadLimits limits;
   limits.max_read = profile.link.max_read;
@@ -93,11 +87,8 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
         {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
   }
   if (profile.events) {
-    const bool input = profile.events->function ==
-                       static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
     limits.forbidden_shape =
-        RegisterRange{input ? modbus::RegisterTable::input : modbus::RegisterTable::holding, 0,
-                      profile.events->count};
+        RegisterRange{catalogue::table_of(*profile.events), 0, profile.events->count};
   }
   if (profile.refusals) {
     if (const auto code = profile.find(profile.refusals->parameter)) {
@@ -657,7 +648,7 @@ Result<std::uint16_t> Device::event_number() {
 
 Result<std::optional<Registers>> Device::last_event() {
   const catalogue::EventFacts& events = *profile_->events;
-  const auto table = event_table(events);
+  const auto table = catalogue::table_of(events);
   const auto all_but_one = static_cast<std::uint16_t>(events.count - 1);
   const auto last = static_cast<std::uint16_t>(events.first + all_but_one);
   const auto number = profile_->find(events.number);

@@ -442,8 +442,7 @@ void SimulatedBm::emit(std::string_view kind, const EventData& data, TimePoint n
 }
 
 std::optional<Pdu> SimulatedBm::event_frame() const {
-  constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
-  const auto table = events_.function == input ? RegisterTable::input : RegisterTable::holding;
+  const auto table = catalogue::table_of(events_);
   const auto block = registers_.read(table, events_.first, events_.count);
   if (!block) return std::nullopt;
   return modbus::read_response(table, *block);

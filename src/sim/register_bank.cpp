@@ -20,11 +20,6 @@ std::int64_t number_in(std::uint16_t word, Kind kind) {
   return kind == Kind::i16 ? std::int64_t{static_cast<std::int16_t>(word)} : std::int64_t{word};
 }
 
-RegisterTable table_of(std::uint8_t read_function) {
-  constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
-  return read_function == input ? RegisterTable::input : RegisterTable::holding;
-}
-
 }  // namespace
 
 RegisterBank::RegisterBank(const catalogue::Profile& profile,
@@ -122,7 +117,7 @@ void RegisterBank::add_numbered(const catalogue::NumberedFacts& facts) {
 void RegisterBank::add_event_block(const catalogue::EventFacts& facts) {
   for (std::uint16_t i = 0; i < facts.count; ++i) {
     const auto address = static_cast<std::uint16_t>(facts.first + i);
-    words(table_of(facts.function)).try_emplace(address, std::uint16_t{0});
+    words(catalogue::table_of(facts)).try_emplace(address, std::uint16_t{0});
   }
 }
 

@@ -72,6 +72,9 @@ struct EventFacts {
   std::map<std::int64_t, std::string> kinds = {};  ///< value to the contract's event kind
 };
 
+/// The table that the event block stands in.
+modbus::RegisterTable table_of(const EventFacts& events);
+
 /// The tool's own limits of parameter n: registers n + offset.
 struct LimitFacts {
   std::uint16_t minimum_offset = 0;
