@@ -1,10 +1,14 @@
 """The completion scripts in real shells: what a TAB offers, offline."""
 
+import contextlib
 import os
 import pathlib
+import pty
 import shutil
+import signal
 import subprocess
 import tempfile
+import threading
 import unittest
 
 import support
@@ -42,6 +46,69 @@ CASES = (
 
 def tearDownModule():
     support.remove_home()
+
+
+class Zsh:
+    """A zsh on a terminal of its own, as it completes only for people; what it adds as a candidate is
+    written down. One serves all cases: its completion system takes seconds to start on a slow disk."""
+
+    DEADLINE = 120.0
+    SET_UP = (
+        "PROMPT= LISTMAX=10000",
+        "autoload -Uz compinit",
+        "compinit -u -D",
+        f"source '{SCRIPTS}/_spindle'",
+        "compadd() { local -a found; builtin compadd -O found \"$@\"; print -rl -- $found >>shown; "
+        "builtin compadd \"$@\" }",
+        "bindkey '^I' complete-word",
+    )
+
+    def __init__(self, folder, environment):
+        self.folder = pathlib.Path(folder)
+        self.pid, self.terminal = pty.fork()
+        if self.pid == 0:
+            os.chdir(folder)
+            os.execvpe("zsh", ["zsh", "-f", "-i"], {**environment, "TERM": "dumb"})
+        # What is never read would fill the terminal in the end, and stop the shell.
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.said = b""
+        self.reader.start()
+
+    def __enter__(self):
+        for line in self.SET_UP:
+            self._type(f"{line}\r")
+        self._finish("")
+        return self
+
+    def __exit__(self, *_):
+        os.kill(self.pid, signal.SIGKILL)
+        os.waitpid(self.pid, 0)
+        self.reader.join(self.DEADLINE)
+        os.close(self.terminal)
+
+    def _read(self):
+        with contextlib.suppress(OSError):  # the end of the terminal
+            while chunk := os.read(self.terminal, 4096):
+                self.said += chunk
+
+    def _type(self, text):
+        os.write(self.terminal, text.encode())
+
+    def _finish(self, typed):
+        """Types, and waits until the shell has got as far as to run another command."""
+        done = self.folder / "done"
+        done.unlink(missing_ok=True)
+        self._type(f"{typed}\x15print -r done >|done\r")  # Ctrl-U: the line is given up
+        try:
+            support.wait_until(done.exists, "zsh is done", self.DEADLINE)
+        except AssertionError as error:
+            raise AssertionError(f"{error}; it said {self.said!r}") from None
+
+    def offered(self, typed):
+        shown = self.folder / "shown"
+        shown.write_text("")
+        self._finish(f"{typed}\t")
+        return sorted(set(filter(None, shown.read_text().splitlines())))
 
 
 class CompletionTest(unittest.TestCase):
@@ -115,28 +182,8 @@ class CompletionTest(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("zsh"), "zsh is not installed")
     def test_zsh(self):
-        """zsh completes only for people: its line editor runs in a terminal of its own, and what is
-        added as a candidate is written down."""
-        script = f"""
-            zmodload zsh/zpty
-            zpty terminal zsh -f -i
-            zpty -w terminal "PROMPT=; autoload -Uz compinit; compinit -u -D"
-            zpty -w terminal "source '{SCRIPTS}/_spindle'"
-            zpty -w terminal 'compadd() {{ local -a found; builtin compadd -O found "$@"; print -rl -- $found >>shown; builtin compadd "$@" }}'
-            zpty -w terminal 'bindkey "^I" complete-word; print -r ready >ready'
-            repeat 300 {{ [[ -e ready ]] && break; sleep 0.05 }}
-            zpty -w -n terminal "$1"$'\\t'
-            zpty -w terminal $'\\C-u'"print -r done >done"
-            repeat 300 {{ [[ -e done ]] && break; sleep 0.05 }}
-            zpty -d terminal
-            sort -u shown
-            rm -f shown ready done
-        """
-
-        def offered(typed):
-            return self.run_shell("zsh", "-f", "-c", f": >shown\n{script}", "zsh", typed)
-
-        self.check(offered)
+        with Zsh(self.folder, self.environment) as zsh:
+            self.check(zsh.offered)
 
 
 if __name__ == "__main__":

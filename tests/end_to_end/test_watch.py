@@ -24,6 +24,7 @@ SECONDS = 30 if LONG else 5
 PROFILE = ("--profile", "doga-bm")
 JSON = (*PROFILE, "--json")
 KEEP_ALIVE, ARM_EXPIRES = 1.0, 10.0
+NOT_DELAYED = 1.0  # seconds, on a busy machine; a connection to a dead tool is given up after 3
 QUICK = 0.75  # seconds that an end may take, farewell included, on a busy machine
 
 
@@ -241,16 +242,17 @@ class EndingTest(unittest.TestCase):
             self.assertNotIn("\x1b", finished.stdout)
 
     def test_second_signal_ends_at_once(self):
-        with EventServer() as server, Watching(server.url, *JSON) as watching:
-            support.wait_until(lambda: server.armed, "the watch arms the output")
-            with server._lock:  # the farewell gets no answer
-                began = time.monotonic()
-                watching.process.send_signal(signal.SIGINT)
-                threading.Event().wait(0.1)
-                self.assertIsNone(watching.process.poll())
-                watching.process.send_signal(signal.SIGINT)
-                self.assertEqual(watching.process.wait(support.DEADLINE), 130)
-                self.assertLess(time.monotonic() - began, 0.4)
+        def end():
+            with EventServer() as server, Watching(server.url, *JSON) as watching:
+                support.wait_until(lambda: server.armed, "the watch arms the output")
+                with server._lock:  # the farewell gets no answer
+                    watching.process.send_signal(signal.SIGINT)
+                    threading.Event().wait(0.1)
+                    self.assertIsNone(watching.process.poll())
+                    status, seconds, stderr = watching.end(signal.SIGINT)
+            return support.Finished(watching.arguments, status, "", stderr, seconds)
+
+        self.assertEqual(support.quickest(end, 0.3).status, 130)
 
     def test_closed_pipe(self):
         for also in ((), ("--output", "csv"), ("--output", "table")):
@@ -433,7 +435,7 @@ class ReconnectingTest(unittest.TestCase):
                         sent = time.monotonic()
                         server.event()
                         support.wait_until(lambda: len(watching.numbers()) == count, "it is told")
-                        self.assertLess(time.monotonic() - sent, 0.25)
+                        self.assertLess(time.monotonic() - sent, NOT_DELAYED)
                     status, seconds, _ = watching.end()
                 self.assertEqual(status, 143)
                 self.assertLess(seconds, QUICK)
