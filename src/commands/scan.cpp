@@ -112,14 +112,11 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
   show_progress({}, context);
   if (outcome.succeeded() == 0) outcome.negate();
   const auto found = static_cast<std::int64_t>(outcome.succeeded());
-  return listing.end()
-      .and_then([&] {
-        return context.renderer.summary(
-            summary_record({{"asked", number(asked)}, {"found", number(found)}}, outcome.status(),
-                           bus->shown, context.clock),
-            fmt::format("{} asked, {} found", asked, found));
-      })
-      .map([&] { return outcome; });
+  return finish(listing, outcome,
+                {.counts = {{"asked", number(asked)}, {"found", number(found)}},
+                 .sentence = fmt::format("{} asked, {} found", asked, found),
+                 .target = bus->shown},
+                context);
 }
 
 }  // namespace spindle::commands

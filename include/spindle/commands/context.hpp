@@ -72,6 +72,9 @@ struct Context {
 /// The same context with a clock and lines that signals do not end.
 Context calm_context(const Context& context);
 
+/// The same context with another renderer, which must outlive it.
+Context with_renderer(const Context& context, report::Renderer& renderer);
+
 /// How a command that handled several things ended.
 class Outcome {
  public:
@@ -79,6 +82,8 @@ class Outcome {
   void fail(const Error& error);
   /// Done, and the answer is no (status 1), unless something failed.
   void negate() { negative_ = true; }
+  /// All that happened elsewhere happened here, too.
+  void add(const Outcome& other);
 
   /// ok; the common status of all failures when nothing succeeded; else partial. Interruptions win.
   [[nodiscard]] ExitStatus status() const;
@@ -86,6 +91,8 @@ class Outcome {
   [[nodiscard]] std::size_t failed() const { return failed_; }
 
  private:
+  void note_failures(std::size_t count, ExitStatus status);
+
   std::size_t succeeded_ = 0;
   std::size_t failed_ = 0;
   bool negative_ = false;
