@@ -94,10 +94,9 @@ struct Findings {
   catalogue::Resettable resettable = catalogue::Resettable::unknown;
   enum class Reset : std::uint8_t { none, done, failed } reset = Reset::none;
 
-  /// Whether there is an alarm now.
-  [[nodiscard]] bool is_present() const {
-    return present.number != Decimal(0) && reset != Reset::done;
-  }
+  [[nodiscard]] bool was_present() const { return present.number != Decimal(0); }
+  /// Whether there is still an alarm now.
+  [[nodiscard]] bool is_present() const { return was_present() && reset != Reset::done; }
 };
 
 /// The meaning of a code by the table of its list; null when it is not known.
@@ -234,7 +233,7 @@ Result<Findings> examine(const Target& target, const AlarmsOptions& options, Ask
     done = reset(*opened->prepared.reset, asked, opened->tool, findings, context);
   }
   if (!done) return tl::unexpected(std::move(done.error()));
-  return tell(summary_of(findings.is_present() ? 1 : 0, findings.outcome, sentence_of(findings),
+  return tell(summary_of(findings.was_present() ? 1 : 0, findings.outcome, sentence_of(findings),
                          target.shown),
               findings.outcome, context)
       .map([&] { return findings; });
@@ -284,14 +283,16 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
       });
   outcome.add(outcome_of_all(performances, [](const Findings& found) { return found.outcome; }));
   std::size_t present = 0;
+  std::size_t remaining = 0;
   std::size_t failed = targets.size() - reached.size();
   for (const auto& [tape, found] : performances) {
-    if (found && found->is_present()) ++present;
+    if (found && found->was_present()) ++present;
+    if (found && found->is_present()) ++remaining;
     if (!found || found->outcome.failed() > 0) ++failed;
   }
   return play(performances, context)
       .and_then([&] {
-        return tell(summary_of(present, outcome, sentence_of(present, failed, targets.size()), {}),
+        return tell(summary_of(present, outcome, sentence_of(remaining, failed, targets.size()), {}),
                     outcome, context);
       })
       .map([&] { return outcome; });

@@ -137,11 +137,13 @@ Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds&
     names.push_back(target.shown);
     for (const Deed& deed : deeds.at(target.shown)) {
       const std::string& name = deed.action.name;
-      if (deed.action.hazard == Hazard::link) {
+      const bool is_dangerous = deed.action.hazard == Hazard::link;
+      const bool is_in_question = is_dangerous && context.common.consent != Consent::given;
+      if (!is_in_question) tell_notes(deed, target, context);
+      if (is_dangerous) {
         dangerous.emplace(name, deed.action.note);
         continue;
       }
-      tell_notes(deed, target, context);
       const bool is_new = std::find(ordinary.begin(), ordinary.end(), name) == ordinary.end();
       if (is_new) ordinary.push_back(name);
     }
