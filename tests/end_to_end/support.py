@@ -11,6 +11,8 @@ import fcntl
 import json
 import os
 import pathlib
+import pty
+import select
 import selectors
 import shutil
 import signal
@@ -231,6 +233,25 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
     return Finished(arguments, status, *texts, seconds)
 
 
+def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):
+    """Runs spindle on a terminal of its own, calls `meanwhile` at its question, and types the answer."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.chdir(home().path)
+        os.execve(binary(), [binary(), *arguments], home().environment())
+    shown, answered = b"", False
+    with contextlib.suppress(OSError):  # the end of the terminal
+        while select.select([terminal], [], [], DEADLINE)[0]:
+            shown += os.read(terminal, 4096)
+            if question in shown and not answered:
+                meanwhile()
+                answered = os.write(terminal, answer) > 0
+        os.kill(pid, signal.SIGKILL)  # it neither ended nor said anything more
+    _, status = os.waitpid(pid, 0)
+    os.close(terminal)
+    return shown.decode(), os.waitstatus_to_exitcode(status)
+
+
 @contextlib.contextmanager
 def simulator(profile="doga-bm", *flags, listen="tcp://127.0.0.1:0"):
     """A simulated tool on a free port; gives its URL."""
@@ -321,6 +342,10 @@ class Recorder:
             opened.close()
         for thread in self._threads:
             thread.join(DEADLINE)
+
+    def lead_to(self, url):
+        """Connections from now on lead to another server."""
+        self._upstream = host_and_port(url)
 
     def count(self, *functions):
         return sum(request.function in functions for request in self.requests)
