@@ -235,10 +235,11 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
 
 def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):
     """Runs spindle on a terminal of its own, calls `meanwhile` at its question, and types the answer."""
+    program, folder, environment = binary(), home().path, home().environment()
     pid, terminal = pty.fork()
     if pid == 0:
-        os.chdir(home().path)
-        os.execve(binary(), [binary(), *arguments], home().environment())
+        os.chdir(folder)
+        os.execve(program, [program, *arguments], environment)
     shown, answered = b"", False
     with contextlib.suppress(OSError):  # the end of the terminal
         while select.select([terminal], [], [], DEADLINE)[0]:
