@@ -224,9 +224,10 @@ class GapTest(unittest.TestCase):
         self.assertEqual(sum(way == ">" for _, way, _ in heard), self.COUNT)
         gaps = [(at - before) / 1e9 for (before, _, _), (at, way, _) in zip(heard, heard[1:]) if way == ">"]
         self.assertGreaterEqual(min(gaps), gap, f"{baud} baud")
-        # A busy machine lets either side sleep now and then; the slowest tenth is its doing.
-        usual = sorted(gaps)[:len(gaps) * 9 // 10]
-        self.assertLessEqual(sum(usual) / len(usual), gap + 0.001, f"{baud} baud")
+        # A busy machine lets either side sleep at times, and never makes a gap shorter: a client that waits
+        # for too long does so in the quicker half, too.
+        quicker = sorted(gaps)[:len(gaps) // 2]
+        self.assertLessEqual(sum(quicker) / len(quicker), gap + 0.001, f"{baud} baud")
 
     def test_at_both_rates(self):
         failures = []
