@@ -2,11 +2,14 @@
 
 namespace spindle::commands {
 
-Context calm_context(const Context& context) {
+namespace {
+
+Context with(const Context& context, Clock& clock, const Interrupt& interrupt,
+             const device::OpenTransport& open) {
   return {.io = context.io,
-          .clock = context.calm.clock,
-          .interrupt = context.calm.interrupt,
-          .open = context.calm.open,
+          .clock = clock,
+          .interrupt = interrupt,
+          .open = open,
           .calm = context.calm,
           .serve = context.serve,
           .end_waits = context.end_waits,
@@ -17,6 +20,16 @@ Context calm_context(const Context& context) {
           .tools = context.tools,
           .renderer = context.renderer,
           .common = context.common};
+}
+
+}  // namespace
+
+Context calm_context(const Context& context) {
+  return with(context, context.calm.clock, context.calm.interrupt, context.calm.open);
+}
+
+Context with_lines(const Context& context, const device::OpenTransport& open) {
+  return with(context, context.clock, context.interrupt, open);
 }
 
 void Outcome::fail(const Error& error) {

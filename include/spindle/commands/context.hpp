@@ -72,6 +72,9 @@ struct Context {
 /// The same context with a clock and lines that signals do not end.
 Context calm_context(const Context& context);
 
+/// The same context with other lines, which must outlive it.
+Context with_lines(const Context& context, const device::OpenTransport& open);
+
 /// How a command that handled several things ended.
 class Outcome {
  public:
