@@ -40,6 +40,10 @@ Context calm_context(const Context& context) {
   return made_of({calm.clock, calm.interrupt, calm.open, context.renderer}, context);
 }
 
+Context with_lines(const Context& context, const device::OpenTransport& open) {
+  return made_of({context.clock, context.interrupt, open, context.renderer}, context);
+}
+
 Context with_renderer(const Context& context, report::Renderer& renderer) {
   return made_of({context.clock, context.interrupt, context.open, renderer}, context);
 }

@@ -12,6 +12,7 @@
 #include "motor_records.hpp"
 #include "progress.hpp"
 #include "records.hpp"
+#include "shared_lines.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
@@ -235,15 +236,15 @@ std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools) {
   return motors ? motor_columns(shown) : news_columns(shown);
 }
 
-Result<void> watch_one(WatchedTool& tool, Stage& stage, const WatchOptions& options,
-                       const Context& context) {
+Result<void> watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, Stage& stage,
+                       const WatchOptions& options, const Context& context) {
   const catalogue::Profile unknown;
   std::optional<NewsRecords> records;
   records.emplace(tool.target(), unknown, catalogue::CodeTables());
   const auto open = [&] {
     const TimePoint until = stage.until();
     const TimePoint now = context.clock.now();
-    auto link = tool.open(until > now ? until - now : Duration::zero());
+    auto link = tool.open(until > now ? until - now : Duration::zero(), open_transport);
     if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
     return link;
   };
@@ -264,9 +265,13 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
       return tl::unexpected(std::move(checked.error()));
     }
   }
+  std::vector<Target> targets;
+  for (const WatchedTool& tool : *tools) targets.push_back(tool.target());
+  SharedLines lines(targets, context);
+  const device::OpenTransport open_transport = lines.opener();
   Stage stage(options, tools->size(), columns_for(*tools), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
-    auto watched = watch_one(tool, stage, options, context);
+    auto watched = watch_one(tool, open_transport, stage, options, context);
     stage.leave(watched);
   });
   return stage.finish();

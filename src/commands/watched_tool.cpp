@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "side_by_side.hpp"
+#include "shared_lines.hpp"
 
 namespace spindle::commands {
 
@@ -41,8 +41,9 @@ Result<void> WatchedTool::find_profile(const Context& context) {
   return learn(target_.profile);
 }
 
-Result<device::Watcher::Link> WatchedTool::open(Duration patience) {
-  Context hurried = *context_;
+Result<device::Watcher::Link> WatchedTool::open(Duration patience,
+                                                const device::OpenTransport& open_transport) {
+  Context hurried = with_lines(*context_, open_transport);
   const catalogue::LinkFacts facts =
       known_ == nullptr ? catalogue::LinkFacts() : known_->profile.link;
   const Duration usual = hurried.common.connect_timeout.value_or(facts.connect);
@@ -59,36 +60,21 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience) {
   return device::Watcher::Link{std::move(*device), std::move(identity)};
 }
 
-namespace {
-
-/// A watch holds its line for as long as it lasts.
-Result<void> check_lines(const std::vector<Target>& targets) {
-  for (const auto& line : by_line(targets)) {
-    if (line.size() == 1) continue;
-    return tl::unexpected(Error{
-        .code = Errc::usage,
-        .message = fmt::format("{} and {} are on one serial line, which only one watch can have",
-                               targets[line[0]].shown, targets[line[1]].shown),
-        .hint = "watch one of them at a time"});
-  }
-  return {};
-}
-
-}  // namespace
-
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
                                                ProfileShelf& shelf, const Context& context) {
   auto resolved = resolve_targets(targets, context);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
-  if (auto apart = check_lines(*resolved); !apart) return tl::unexpected(std::move(apart.error()));
   std::vector<WatchedTool> tools;
+  std::vector<catalogue::LinkFacts> facts;
   tools.reserve(resolved->size());
-  for (Target& target : *resolved) {
-    auto tool = WatchedTool::make(std::move(target), shelf, context);
+  for (const Target& target : *resolved) {
+    auto tool = WatchedTool::make(target, shelf, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
+    const KnownProfile* known = tool->known();
+    facts.push_back(known == nullptr ? catalogue::LinkFacts() : known->profile.link);
     tools.push_back(std::move(*tool));
   }
-  return tools;
+  return check_same_settings(*resolved, facts).map([&] { return std::move(tools); });
 }
 
 }  // namespace spindle::commands

@@ -45,7 +45,8 @@ class WatchedTool {
 
   /// Opens the tool and makes sure that its registers are those of the profile. Connecting takes no
   /// longer than `patience`.
-  Result<device::Watcher::Link> open(Duration patience);
+  Result<device::Watcher::Link> open(Duration patience,
+                                     const device::OpenTransport& open_transport);
 
  private:
   WatchedTool(Target target, ProfileShelf& shelf, const Context& context)
@@ -60,7 +61,7 @@ class WatchedTool {
   const KnownProfile* known_ = nullptr;
 };
 
-/// Resolves targets, asking none of them.
+/// Resolves targets, asking none of them. Those of one line have the same settings.
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
                                                ProfileShelf& shelf, const Context& context);
 

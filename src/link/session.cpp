@@ -77,7 +77,27 @@ Session::~Session() {
   if (trace_.bytes) trace_.bytes(Direction::received, {});
 }
 
+/// The line is ours as long as this lives. Whoever has it next keeps the silence that we owe.
+class Session::Turn {
+ public:
+  explicit Turn(Session& session) : session_(&session) {
+    const TimePoint used_until = session_->transport_->begin_turn();
+    session_->last_activity_ = std::max(session_->last_activity_, used_until);
+  }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+  ~Turn() { session_->transport_->end_turn(session_->last_activity_); }
+
+ private:
+  Session* session_;
+};
+
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
+  const Turn turn(*this);
+  return ask(request);
+}
+
+Result<modbus::Pdu> Session::ask(const modbus::Pdu& request) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
   if (quarantined_until_ && !is_repeated_by_answer(request)) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
@@ -137,11 +157,12 @@ void Session::learn_echo(const Outstanding& outstanding) {
 Result<void> Session::find_echo(const modbus::Pdu& request) {
   const bool loopback = request.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
   if (!is_rtu() || !loopback || echo_ != LocalEcho::automatic) return {};
-  return transact(modbus::read_request(modbus::RegisterTable::holding, {}, 1))
+  return ask(modbus::read_request(modbus::RegisterTable::holding, {}, 1))
       .map([](const modbus::Pdu&) {});
 }
 
 Result<void> Session::broadcast(const modbus::Pdu& request) {
+  const Turn turn(*this);
   if (quarantined_until_) {
     if (auto left = leave_quarantine(); !left) return left;
   }
@@ -356,6 +377,7 @@ Result<void> Session::leave_quarantine() {
 
 void Session::settle() {
   if (!abandoned_) return;
+  const Turn turn(*this);
   transport_->shield();
   const TimePoint until = clock_->now() + longest_settling;
   while (abandoned_) {

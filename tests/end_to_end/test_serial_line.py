@@ -206,6 +206,57 @@ class PortTest(unittest.TestCase):
             bus.finish()
             self.assertEqual(bus.bad_frames(), 0)
 
+    def watch(self, bus, units, *arguments):
+        """A watch of several units in a process of its own."""
+        urls = [f"{bus.url}{'&' if '?' in bus.url else '?'}unit={unit}" for unit in units]
+        return support.Running("watch", *urls, "@holding:2", *arguments, "--profile", str(DRIVE), "--json")
+
+    def test_units_of_one_line_are_watched_together(self):
+        for where in ("--pty", "--port"):
+            with self.subTest(where), Bus("--units", 3, where=where) as bus:
+                with self.watch(bus, (1, 2, 3), "--all", "--interval", "50ms", "--count", 30) as watching:
+                    watched = watching.finish()
+                self.assertEqual(watched.status, 0, watched)
+                self.assertEqual({link["state"] for link in watched.records("link")}, {"connected"}, watched)
+                told = [record["target"][-1] for record in watched.records("change")]
+                self.assertEqual(len(told), 30)
+                for unit in "123":
+                    self.assertGreaterEqual(told.count(unit), 8, watched)
+                bus.finish()
+                self.assertEqual(bus.bad_frames(), 0)
+
+    def test_a_unit_that_is_not_there_keeps_nobody_from_the_others(self):
+        with Bus("--units", 1) as bus:
+            with self.watch(bus, (1, 9), "--all", "--timeout", "100ms", "--duration", "3s") as watching:
+                watched = watching.finish()
+            self.assertEqual(watched.status, 0, watched)
+            self.assertEqual({record["target"][-1] for record in watched.records("change")}, {"1"}, watched)
+            self.assertGreaterEqual(len(watched.records("change")), 3, watched)
+            lost = [link for link in watched.records("link") if link["state"] == "lost"]
+            self.assertEqual({link["target"][-1] for link in lost}, {"9"}, watched)
+
+    def test_a_line_that_is_gone_is_gone_for_all_its_units(self):
+        with Bus("--units", 2) as bus:
+            with self.watch(bus, (1, 2), "--no-reconnect") as watching:
+                for _ in range(2):
+                    self.assertIn('"connected"', watching.line())
+                bus.kill()
+                watched = watching.finish()
+            self.assertEqual(watched.status, 5, watched)
+            lost = [link["target"][-1] for link in watched.records("link") if link["state"] == "lost"]
+            self.assertEqual(sorted(lost), ["1", "2"], watched)
+
+    def test_ctrl_c_ends_all_units_of_a_line(self):
+        with Bus("--units", 2, "--fault", "lost") as bus:
+            with self.watch(bus, (1, 2), "--timeout", "20s") as watching:
+                for _ in range(2):
+                    self.assertIn('"connected"', watching.line())
+                watching.send_signal(signal.SIGINT)
+                watched = watching.finish()
+            self.assertEqual(watched.status, 130, watched)
+            self.assertEqual(watched.records()[-1]["type"], "summary", watched)
+            self.assertLess(watched.seconds, 5, watched)
+
 
 class GapTest(unittest.TestCase):
     """A thousand requests of every kind, judged by the log of a server that is deaf to short gaps."""
@@ -224,9 +275,10 @@ class GapTest(unittest.TestCase):
         self.assertEqual(sum(way == ">" for _, way, _ in heard), self.COUNT)
         gaps = [(at - before) / 1e9 for (before, _, _), (at, way, _) in zip(heard, heard[1:]) if way == ">"]
         self.assertGreaterEqual(min(gaps), gap, f"{baud} baud")
-        # A busy machine lets either side sleep now and then; the slowest tenth is its doing.
-        usual = sorted(gaps)[:len(gaps) * 9 // 10]
-        self.assertLessEqual(sum(usual) / len(usual), gap + 0.001, f"{baud} baud")
+        # A busy machine lets either side sleep at times, and never makes a gap shorter: a client that waits
+        # for too long does so in the quicker half, too.
+        quicker = sorted(gaps)[:len(gaps) // 2]
+        self.assertLessEqual(sum(quicker) / len(quicker), gap + 0.001, f"{baud} baud")
 
     def test_at_both_rates(self):
         failures = []

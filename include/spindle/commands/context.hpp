@@ -75,6 +75,9 @@ Context calm_context(const Context& context);
 /// The same context with another renderer, which must outlive it.
 Context with_renderer(const Context& context, report::Renderer& renderer);
 
+/// The same context with other lines, which must outlive it.
+Context with_lines(const Context& context, const device::OpenTransport& open);
+
 /// How a command that handled several things ended.
 class Outcome {
  public:

@@ -10,6 +10,8 @@ struct SerialSettings {
   unsigned baud = 9600;
   Parity parity = Parity::even;
   unsigned stop_bits = 1;
+
+  bool operator==(const SerialSettings&) const = default;
 };
 
 /// What the endpoint says, and where it says nothing the profile's: rate, parity ('N', 'E' or 'O')

@@ -106,7 +106,9 @@ class Session {
 
  private:
   struct Outstanding;
+  class Turn;
 
+  Result<modbus::Pdu> ask(const modbus::Pdu& request);
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
   Result<modbus::Pdu> send_and_await(Outstanding& outstanding);
   Result<void> send(const modbus::Adu& adu, ByteView bytes);

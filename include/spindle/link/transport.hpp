@@ -27,6 +27,13 @@ class Transport {
   /// From now on an interrupt no longer ends a wait: for the last words that leave a tool safe
   /// (disarm, stop).
   virtual void shield() = 0;
+
+  /// Where others of this program have the same line: waits until none of them awaits an answer,
+  /// and keeps them from it until end_turn(). Returns when they used it last. A line of one's own
+  /// is always free.
+  virtual TimePoint begin_turn() { return {}; }
+  /// `used_until` is what the next one learns from begin_turn().
+  virtual void end_turn(TimePoint used_until) { static_cast<void>(used_until); }
 };
 
 }  // namespace spindle::link

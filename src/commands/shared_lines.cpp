@@ -1,0 +1,52 @@
+#include "shared_lines.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "side_by_side.hpp"
+#include "spindle/link/serial_settings.hpp"
+
+namespace spindle::commands {
+
+SharedLines::SharedLines(const std::vector<Target>& targets, const Context& context)
+    : open_(&context.open) {
+  for (const auto& line : by_line(targets)) {
+    if (line.size() == 1) continue;
+    lines_.emplace(shared_line(targets[line.front()].endpoint),
+                   std::make_unique<link::SharedLine>(context.clock));
+  }
+}
+
+device::OpenTransport SharedLines::opener() {
+  return [this](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
+                Duration connect_timeout) {
+    const auto open = [&] { return (*open_)(endpoint, facts, connect_timeout); };
+    const auto line = lines_.find(shared_line(endpoint));
+    return line == lines_.end() ? open() : line->second->join(open);
+  };
+}
+
+Result<void> check_same_settings(const std::vector<Target>& targets,
+                                 const std::vector<catalogue::LinkFacts>& facts) {
+  const auto settings = [&](std::size_t index) {
+    const catalogue::SerialFacts& serial = facts[index].serial;
+    const link::Endpoint& endpoint = targets[index].endpoint;
+    return std::pair(link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits),
+                     endpoint.switching);
+  };
+  for (const auto& line : by_line(targets)) {
+    for (const std::size_t index : line) {
+      if (settings(index) == settings(line.front())) continue;
+      return tl::unexpected(
+          Error{.code = Errc::usage,
+                .message = fmt::format("{} and {} are on one serial line, but their rate, parity, "
+                                       "stop bits or rs485 differ",
+                                       targets[line.front()].shown, targets[index].shown),
+                .hint = "a line has one setting: mend what stands behind '?' in their URLs"});
+    }
+  }
+  return {};
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "spindle/commands/target.hpp"
+#include "spindle/link/shared_line.hpp"
+
+namespace spindle::commands {
+
+/// The serial lines on which several tools of one command are, so that all of them can be connected
+/// at the same time. Must outlive what it opens.
+class SharedLines {
+ public:
+  /// Opens nothing. Every other target has a line of its own.
+  SharedLines(const std::vector<Target>& targets, const Context& context);
+
+  /// Like `open` of the context; on a shared line all get a share of one opening, with the settings
+  /// of whoever came first.
+  [[nodiscard]] device::OpenTransport opener();
+
+ private:
+  std::map<std::string, std::unique_ptr<link::SharedLine>> lines_ = {};
+  const device::OpenTransport* open_;
+};
+
+/// Refuses two tools of one line that do not mean the same rate, parity and stop bits. `facts` are
+/// those of the targets' profiles, in their order.
+Result<void> check_same_settings(const std::vector<Target>& targets,
+                                 const std::vector<catalogue::LinkFacts>& facts);
+
+}  // namespace spindle::commands

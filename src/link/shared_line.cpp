@@ -1,0 +1,86 @@
+#include "spindle/link/shared_line.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace spindle::link {
+namespace {
+
+/// Whether the line itself is gone; a wait that ended is nothing to it.
+bool ends_line(const Error& error) {
+  return error.code != Errc::no_answer && error.code != Errc::interrupted &&
+         error.code != Errc::terminated;
+}
+
+}  // namespace
+
+class SharedLine::Share : public Transport {
+ public:
+  /// Called with the line's mutex locked.
+  explicit Share(SharedLine& line) : line_(&line), opened_(line.opened_) { ++line_->shares_; }
+  Share(const Share&) = delete;
+  Share& operator=(const Share&) = delete;
+  ~Share() override {
+    const std::lock_guard lock(line_->mutex_);
+    if (opened_ == line_->opened_ && --line_->shares_ == 0) line_->transport_.reset();
+  }
+
+  TimePoint begin_turn() override {
+    turn_ = std::unique_lock(line_->turn_);
+    return line_->used_until_;
+  }
+  void end_turn(TimePoint used_until) override {
+    line_->used_until_ = std::max(line_->used_until_, used_until);
+    turn_.unlock();
+  }
+
+  Result<void> send(ByteView bytes, TimePoint deadline) override {
+    return transport().and_then(
+        [&](Transport* open) { return judged(open->send(bytes, deadline)); });
+  }
+
+  Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
+    if (!turn_.owns_lock()) {  // what comes now is for somebody else
+      return line_->clock_->sleep_until(deadline).map([] { return std::size_t{0}; });
+    }
+    return transport().and_then(
+        [&](Transport* open) { return judged(open->receive(into, deadline)); });
+  }
+
+  void shield() override {}
+
+ private:
+  /// Stays as long as this share is in its turn: only then it can find out that the line is broken.
+  Result<Transport*> transport() const {
+    const std::lock_guard lock(line_->mutex_);
+    if (opened_ == line_->opened_ && line_->transport_) return line_->transport_.get();
+    return tl::unexpected(line_->broken_.value_or(Error{.code = Errc::closed}));
+  }
+
+  template <typename Value>
+  Result<Value> judged(Result<Value> done) {
+    if (done || !ends_line(done.error())) return done;
+    const std::lock_guard lock(line_->mutex_);
+    line_->broken_ = done.error();
+    line_->transport_.reset();
+    return done;
+  }
+
+  SharedLine* line_;
+  std::size_t opened_;
+  std::unique_lock<FairLock> turn_ = {};
+};
+
+Result<std::unique_ptr<Transport>> SharedLine::join(const Open& open) {
+  const std::lock_guard lock(mutex_);
+  if (transport_ == nullptr) {
+    auto opened = open();
+    if (!opened) return opened;
+    transport_ = std::move(*opened);
+    shares_ = 0;
+    ++opened_;
+  }
+  return std::make_unique<Share>(*this);
+}
+
+}  // namespace spindle::link
