@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "change_log.hpp"
@@ -77,6 +78,19 @@ Summary summary_of(const Outcome& outcome, Reach reach, const std::string& targe
           .target = target};
 }
 
+/// Why a deed that was begun did not succeed.
+std::optional<Error> failure_of(const Deed& deed, const Result<device::ActionResult>& result,
+                                const Target& target) {
+  if (result == device::ActionResult::not_confirmed) return not_confirmed(deed, target);
+  if (result) return std::nullopt;
+  Error error = result.error();
+  if (is_interruption(error)) {
+    error.name = deed.action.name;
+    error.hint = "whether it was done is not known: look at the tool";
+  }
+  return error;
+}
+
 /// Whether their notes were told when somebody was asked.
 enum class Notes : std::uint8_t { to_tell, told };
 
@@ -87,20 +101,22 @@ Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Notes 
   Listing listing(context, deed_columns());
   ChangeLog log("do", tool, context);
   for (const Deed& deed : deeds) {
-    if (notes == Notes::to_tell) tell_notes(deed, tool.target, context);
-    const auto result = perform_deed(deed, tool, context);
-    log.add(logged(deed, result));
-    if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
     std::optional<Error> error;
-    if (!result) error = result.error();
-    if (result == device::ActionResult::not_confirmed) error = not_confirmed(deed, tool.target);
-    if (!error) {
-      outcome.succeed();
-      continue;
+    if (context.interrupt.signalled()) {
+      error = tool.target.blamed(context.interrupt.error());
+    } else {
+      if (notes == Notes::to_tell) tell_notes(deed, tool.target, context);
+      const auto result = perform_deed(deed, tool, context);
+      log.add(logged(deed, result));
+      if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
+      error = failure_of(deed, result, tool.target);
     }
-    outcome.fail(*error);
-    listing.add(*error);
-    break;
+    if (error) {
+      outcome.fail(*error);
+      listing.add(*error);
+      break;
+    }
+    outcome.succeed();
   }
   return finish(listing, outcome, summary_of(outcome, tool.target.reach, tool.target.shown),
                 context);

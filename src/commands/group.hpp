@@ -71,7 +71,7 @@ Result<void> play(const std::vector<Performance<Handled>>& performances, Context
   std::vector<const Tape*> tapes;
   tapes.reserve(performances.size());
   for (const auto& performance : performances) tapes.push_back(performance.tape.get());
-  return play(std::span<const Tape* const>(tapes), context);
+  return play(tapes, context.renderer);
 }
 
 /// How all of them ended; a tool's own outcome is found by `outcome_of(handled)`.

@@ -95,19 +95,19 @@ std::vector<report::Column> with_target(std::span<const report::Column> columns)
   return all;
 }
 
-Result<void> play(std::span<const Tape* const> tapes, Context& context) {
+Result<void> play(std::span<const Tape* const> tapes, report::Renderer& renderer) {
   std::size_t sections = 0;
   for (const Tape* tape : tapes) sections = std::max(sections, tape->sections().size());
-  Player player(context.renderer);
+  Player player(renderer);
   Result<void> played;
   for (std::size_t place = 0; played && place < sections; ++place) {
-    played = play_section(tapes, place, player, context.renderer);
+    played = play_section(tapes, place, player, renderer);
   }
   for (const Tape* tape : tapes) {
     for (const Tape::Line& summary : tape->summaries()) {
       if (!played) return played;
-      played = context.renderer.summary(
-          summary.record, fmt::format("{}: {}", summary.record.target, summary.plain));
+      played = renderer.summary(summary.record,
+                                fmt::format("{}: {}", summary.record.target, summary.plain));
     }
   }
   return played;

@@ -5,7 +5,6 @@
 #include <variant>
 #include <vector>
 
-#include "spindle/commands/context.hpp"
 #include "spindle/report/renderer.hpp"
 
 namespace spindle::commands {
@@ -57,6 +56,6 @@ std::vector<report::Column> with_target(std::span<const report::Column> columns)
 /// Shows the tapes of several tools: list by list, each with the tools in the order given and a
 /// column for their names; a note that several tools have is told once. Then their summaries, each
 /// under the tool's name.
-Result<void> play(std::span<const Tape* const> tapes, Context& context);
+Result<void> play(std::span<const Tape* const> tapes, report::Renderer& renderer);
 
 }  // namespace spindle::commands
