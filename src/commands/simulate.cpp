@@ -149,12 +149,11 @@ void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Cont
 }
 
 Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& context) {
-  return context.renderer.summary(
-      summary_record({{"connections", number(static_cast<std::int64_t>(traffic.connections))},
-                      {"requests", number(static_cast<std::int64_t>(traffic.requests))}},
-                     outcome.status(), {}, context.clock),
-      fmt::format("{}, {}", counted(traffic.connections, "connection"),
-                  counted(traffic.requests, "request")));
+  return context.renderer.summary(summary_record({{"connections", count(traffic.connections)},
+                                                  {"requests", count(traffic.requests)}},
+                                                 outcome.status(), {}, context.clock),
+                                  fmt::format("{}, {}", counted(traffic.connections, "connection"),
+                                              counted(traffic.requests, "request")));
 }
 
 }  // namespace
