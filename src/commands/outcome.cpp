@@ -3,20 +3,8 @@
 namespace spindle::commands {
 
 Context calm_context(const Context& context) {
-  return {.io = context.io,
-          .clock = context.calm.clock,
-          .interrupt = context.calm.interrupt,
-          .open = context.calm.open,
-          .calm = context.calm,
-          .serve = context.serve,
-          .end_waits = context.end_waits,
-          .disk = context.disk,
-          .state_folder = context.state_folder,
-          .version = context.version,
-          .profiles = context.profiles,
-          .tools = context.tools,
-          .renderer = context.renderer,
-          .common = context.common};
+  const Calm& calm = context.calm;
+  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context};
 }
 
 void Outcome::fail(const Error& error) {
