@@ -80,7 +80,7 @@ report::Record alarm_record(const std::string& list, std::size_t index,
           .target = target.shown,
           .time = clock.wall(),
           .fields = {{"list", list},
-                     {"index", number(static_cast<std::int64_t>(index))},
+                     {"index", count(index)},
                      {"code", number(code), value.to_string()},
                      {"text", text_or_null(meaning)},
                      {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
@@ -215,7 +215,7 @@ Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
   const Outcome& outcome = findings.outcome;
   return context.renderer
       .summary(summary_record({{"present", number(findings.present.number == Decimal(0) ? 0 : 1)},
-                               {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                               {"failed", count(outcome.failed())}},
                               outcome.status(), target->shown, context.clock),
                sentence_of(findings))
       .map([&] { return outcome; });

@@ -162,7 +162,6 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
       listing.add(error);
     }
   }
-  const auto count = [](std::size_t things) { return number(static_cast<std::int64_t>(things)); };
   auto drawn = listing.end();
   if (drawn) {
     drawn = context.renderer.summary(

@@ -2,34 +2,13 @@
 
 namespace spindle::commands {
 
-namespace {
-
-Context with(const Context& context, Clock& clock, const Interrupt& interrupt,
-             const device::OpenTransport& open) {
-  return {.io = context.io,
-          .clock = clock,
-          .interrupt = interrupt,
-          .open = open,
-          .calm = context.calm,
-          .serve = context.serve,
-          .end_waits = context.end_waits,
-          .disk = context.disk,
-          .state_folder = context.state_folder,
-          .version = context.version,
-          .profiles = context.profiles,
-          .tools = context.tools,
-          .renderer = context.renderer,
-          .common = context.common};
-}
-
-}  // namespace
-
 Context calm_context(const Context& context) {
-  return with(context, context.calm.clock, context.calm.interrupt, context.calm.open);
+  const Calm& calm = context.calm;
+  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context};
 }
 
 Context with_lines(const Context& context, const device::OpenTransport& open) {
-  return with(context, context.clock, context.interrupt, open);
+  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open}, context};
 }
 
 void Outcome::fail(const Error& error) {

@@ -62,8 +62,8 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
       .and_then([&] {
         return context.renderer.summary(
             summary_record({{options.reach == Reach::everybody ? "sent" : "stopped",
-                             number(static_cast<std::int64_t>(outcome.succeeded()))},
-                            {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                             count(outcome.succeeded())},
+                            {"failed", count(outcome.failed())}},
                            outcome.status(), {}, context.clock),
             fmt::format("{} {}, {} failed{}", outcome.succeeded(),
                         options.reach == Reach::everybody ? "sent, not acknowledged" : "stopped",

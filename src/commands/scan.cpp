@@ -111,13 +111,12 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
   }
   show_progress({}, context);
   if (outcome.succeeded() == 0) outcome.negate();
-  const auto found = static_cast<std::int64_t>(outcome.succeeded());
   return listing.end()
       .and_then([&] {
         return context.renderer.summary(
-            summary_record({{"asked", number(asked)}, {"found", number(found)}}, outcome.status(),
-                           bus->shown, context.clock),
-            fmt::format("{} asked, {} found", asked, found));
+            summary_record({{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
+                           outcome.status(), bus->shown, context.clock),
+            fmt::format("{} asked, {} found", asked, outcome.succeeded()));
       })
       .map([&] { return outcome; });
 }
