@@ -24,13 +24,12 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROFILE = ROOT / "tests" / "end_to_end" / "drive.yaml"
 
 
-class Bus:
-    def __init__(self, build, folder, baud, gap):
+class Line:
+    """A program that serves a line on a pseudo terminal, and the log of what went over it."""
+
+    def __init__(self, folder, command, **streams):
         self._log = folder / "log"
-        self._process = subprocess.Popen(
-            [build / "tests" / "spindle_peer_serial_bank", "--pty", folder / "line", "--baud", str(baud),
-             "--gap", str(round(gap * 1e6)), "--delay", str(round(DELAY * 1e6)), "--log", self._log],
-            stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **streams)
         self.url = self._process.stdout.readline().strip()
 
     def __enter__(self):
@@ -42,34 +41,38 @@ class Bus:
         self._process.stdout.close()
 
     def heard(self):
-        """(seconds, '>' or '<', bytes) in order; complete once the bus has ended."""
-        lines = re.findall(r"^(\d+) ([<>]) (.*)$", self._log.read_text(), re.MULTILINE)
-        return [(int(at) / 1e9, way, bytes.fromhex(text)) for at, way, text in lines]
+        """(seconds, '>' or '<', bytes) in order; complete once the program has ended."""
+        lines = re.findall(self.LOGGED, self._log.read_text(), re.MULTILINE)
+        return [(self.seconds(at), way.strip("-"), bytes.fromhex(text)) for at, way, text in lines]
 
 
-class Driver:
+class Bus(Line):
+    LOGGED = r"^(\d+) ([<>]) (.*)$"
+
+    def __init__(self, build, folder, baud, gap):
+        super().__init__(folder, [
+            build / "tests" / "spindle_peer_serial_bank", "--pty", folder / "line", "--baud", str(baud),
+            "--gap", str(round(gap * 1e6)), "--delay", str(round(DELAY * 1e6)), "--log", folder / "log"])
+
+    @staticmethod
+    def seconds(at):
+        return int(at) / 1e9
+
+
+class Driver(Line):
     """The simulated BLV driver. Its log counts milliseconds, which is enough for what takes hundreds."""
 
+    LOGGED = r"^(\S+)Z client \d+ (->|<-) ([0-9A-F ]+)$"
+
     def __init__(self, program, folder, baud):
-        self._log = folder / "log"
-        with open(self._log, "wb") as log:
-            self._process = subprocess.Popen(
-                [program, "simulate", "orientalmotor-blv", "--pty", folder / "line", "--baud", str(baud), "-v"],
-                stdout=subprocess.PIPE, stderr=log, text=True)
-        self.url = self._process.stdout.readline().strip()
+        with open(folder / "log", "wb") as log:
+            super().__init__(folder, [
+                program, "simulate", "orientalmotor-blv", "--pty", folder / "line", "--baud", str(baud), "-v"],
+                stderr=log)
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._process.terminate()
-        self._process.wait(10)
-        self._process.stdout.close()
-
-    def heard(self):
-        lines = re.findall(r"^(\S+)Z client \d+ (->|<-) ([0-9A-F ]+)$", self._log.read_text(), re.MULTILINE)
-        return [(datetime.datetime.fromisoformat(at).timestamp(), way[1 if way == "->" else 0], bytes.fromhex(text))
-                for at, way, text in lines]
+    @staticmethod
+    def seconds(at):
+        return datetime.datetime.fromisoformat(at).timestamp()
 
 
 def needed_for(heard, baud, gap):

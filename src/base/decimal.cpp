@@ -16,10 +16,11 @@ constexpr std::uint64_t magnitude(std::int64_t value) {
   return value < 0 ? 0U - bits : bits;
 }
 
-std::optional<std::int64_t> with_sign(std::uint64_t value, bool negative) {
+// `sign` as of sign_of().
+std::optional<std::int64_t> with_sign(std::uint64_t value, int sign) {
   constexpr auto largest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  if (value > largest + (negative ? 1U : 0U)) return std::nullopt;
-  return static_cast<std::int64_t>(negative ? 0U - value : value);
+  if (value > largest + (sign < 0 ? 1U : 0U)) return std::nullopt;
+  return static_cast<std::int64_t>(sign < 0 ? 0U - value : value);
 }
 
 int count_digits(std::uint64_t value) {
@@ -89,8 +90,8 @@ std::optional<Digits> read_digits(std::string_view whole, std::string_view fract
 }  // namespace
 
 std::optional<Decimal> Decimal::parse(std::string_view text) {
-  const bool negative = text.starts_with('-');
-  if (negative || text.starts_with('+')) text.remove_prefix(1);
+  const int sign = text.starts_with('-') ? -1 : 1;
+  if (sign < 0 || text.starts_with('+')) text.remove_prefix(1);
 
   const std::size_t point = text.find('.');
   const std::string_view whole = text.substr(0, point);
@@ -101,7 +102,7 @@ std::optional<Decimal> Decimal::parse(std::string_view text) {
 
   const auto digits = read_digits(whole, fraction);
   if (!digits) return std::nullopt;
-  const auto mantissa = with_sign(digits->value, negative);
+  const auto mantissa = with_sign(digits->value, sign);
   if (!mantissa) return std::nullopt;
   return Decimal(*mantissa, -digits->decimals);
 }
@@ -137,7 +138,7 @@ std::optional<std::int64_t> Decimal::divided_by(const Decimal& unit) const {
 
   const auto result = tens < 0 ? scale_down(value, -tens) : scale_up(value, divisor, tens);
   if (!result) return std::nullopt;
-  return with_sign(*result, (mantissa_ < 0) != (unit.mantissa_ < 0));
+  return with_sign(*result, sign_of(mantissa_) * sign_of(unit.mantissa_));
 }
 
 bool operator==(const Decimal& a, const Decimal& b) {

@@ -483,50 +483,56 @@ void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
   option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
 }
 
+/// Leaves it as it is where nothing is given.
 template <typename Number>
 Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
-                         std::optional<Number>& into) {
+                         Number& into) {
   if (text.empty()) return {};
   return to_number(name, text, 0, maximum).map([&](std::uint64_t number) {
     into = static_cast<Number>(number);
   });
 }
 
+template <typename Number>
+Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
+                         std::optional<Number>& into) {
+  if (text.empty()) return {};
+  return fill_number(name, text, maximum, into.emplace());
+}
+
 Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
   commands::SimulateOptions& options = typed.options;
   if (options.profile.empty()) return tl::unexpected(missing("simulate", "PROFILE"));
+  sim::BmOptions& bm = options.tool.bm;
   auto filled =
-      fill_number("--identity-bytes", typed.identity_bytes, 255, options.identity_bytes)
+      fill_number("--identity-bytes", typed.identity_bytes, 255, bm.identity_bytes)
+          .and_then([&] { return fill_number("--firmware", typed.firmware, 0xFFFF, bm.firmware); })
+          .and_then([&] { return fill_number("--serial", typed.serial, 0xFFFF'FFFF, bm.serial); })
+          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, bm.tool_model); })
           .and_then(
-              [&] { return fill_number("--firmware", typed.firmware, 0xFFFF, options.firmware); })
-          .and_then(
-              [&] { return fill_number("--serial", typed.serial, 0xFFFF'FFFF, options.serial); })
-          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, options.model); })
-          .and_then([&] {
-            return fill_number("--ng-every", typed.ng_every, 1'000'000, options.ng_every);
-          })
-          .and_then([&] { return fill_number("--burst", typed.burst, 10'000, options.burst); });
+              [&] { return fill_number("--ng-every", typed.ng_every, 1'000'000, bm.ng_every); })
+          .and_then([&] { return fill_number("--burst", typed.burst, 10'000, bm.burst); });
   if (!filled) return tl::unexpected(std::move(filled.error()));
   if (!typed.units.empty()) {
     auto units = to_units(typed.units);
     if (!units) return tl::unexpected(std::move(units.error()));
-    options.units = std::move(*units);
+    options.tool.units = std::move(*units);
   }
   if (!typed.baud.empty()) {
     const auto baud = to_number("--baud", typed.baud, 1, 4'000'000);
     if (!baud) return tl::unexpected(baud.error());
-    options.baud = static_cast<unsigned>(*baud);
+    options.tool.baud = static_cast<unsigned>(*baud);
   }
   if (typed.no_gap) options.gaps = sim::LineModel::Gaps::ignored;
   const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
   if (!rundown_every) return tl::unexpected(rundown_every.error());
-  options.rundown_every = *rundown_every;
-  if ((options.ng_every || options.burst) && !options.rundown_every) {
+  bm.rundown_every = *rundown_every;
+  const bool work_is_described = !typed.ng_every.empty() || !typed.burst.empty();
+  if (work_is_described && !bm.rundown_every) {
     return tl::unexpected(
         usage("--ng-every and --burst need --rundown-every", "such as --rundown-every 5s"));
   }
-  if (options.burst == 0U)
-    return tl::unexpected(usage("--burst 0 would be no result", "at least 1"));
+  if (bm.burst == 0) return tl::unexpected(usage("--burst 0 would be no result", "at least 1"));
   return commands::simulate(options, context);
 }
 

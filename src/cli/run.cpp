@@ -103,20 +103,19 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles(profile_folders(world));
   const std::string state = state_folder(world);
-  commands::Context context{.io = world.io,
-                            .clock = world.clock,
-                            .interrupt = world.interrupt,
-                            .open = world.open,
-                            .calm = world.calm,
-                            .serve = world.serve,
-                            .end_waits = world.end_waits,
-                            .disk = world.disk,
-                            .state_folder = state,
-                            .version = version,
-                            .profiles = profiles,
-                            .tools = *tools,
-                            .renderer = renderer,
-                            .common = invocation.common};
+  commands::Context context{
+      {.clock = world.clock, .interrupt = world.interrupt, .open = world.open},
+      {.io = world.io,
+       .calm = world.calm,
+       .serve = world.serve,
+       .end_waits = world.end_waits,
+       .disk = world.disk,
+       .state_folder = state,
+       .version = version,
+       .profiles = profiles,
+       .tools = *tools,
+       .common = invocation.common},
+      {.renderer = renderer}};
   if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
     return tl::unexpected(std::move(begun.error()));
   }

@@ -81,7 +81,7 @@ report::Record alarm_record(const std::string& list, std::size_t index,
           .target = target.shown,
           .time = clock.wall(),
           .fields = {{"list", list},
-                     {"index", number(static_cast<std::int64_t>(index))},
+                     {"index", count(index)},
                      {"code", number(code), value.to_string()},
                      {"text", text_or_null(meaning)},
                      {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
@@ -200,8 +200,7 @@ std::string sentence_of(const Findings& findings) {
 
 Summary summary_of(std::size_t present, const Outcome& outcome, std::string sentence,
                    const std::string& target) {
-  return {.counts = {{"present", number(static_cast<std::int64_t>(present))},
-                     {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+  return {.counts = {{"present", count(present)}, {"failed", count(outcome.failed())}},
           .sentence = std::move(sentence),
           .target = target};
 }
@@ -292,8 +291,9 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
   }
   return play(performances, context)
       .and_then([&] {
-        return tell(summary_of(present, outcome, sentence_of(remaining, failed, targets.size()), {}),
-                    outcome, context);
+        return tell(
+            summary_of(present, outcome, sentence_of(remaining, failed, targets.size()), {}),
+            outcome, context);
       })
       .map([&] { return outcome; });
 }

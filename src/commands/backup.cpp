@@ -147,18 +147,16 @@ class Saving {
   std::atomic<std::size_t> done_ = 0;
 };
 
-report::Cell count_cell(std::size_t things) { return number(static_cast<std::int64_t>(things)); }
-
 report::Record saved_record(const Saved& saved, const Clock& clock) {
   return {.type = "backup",
           .target = saved.target.shown,
           .time = clock.wall(),
           .fields = {{"file", saved.path},
-                     {"parameters", count_cell(saved.taken.snapshot.entries.size())},
-                     {"missing", count_cell(saved.taken.snapshot.missing.size())},
-                     {"absent", count_cell(saved.count(Missing::absent))},
-                     {"unreadable", count_cell(saved.count(Missing::unreadable))},
-                     {"left_out", count_cell(saved.count(Missing::left_out))}}};
+                     {"parameters", count(saved.taken.snapshot.entries.size())},
+                     {"missing", count(saved.taken.snapshot.missing.size())},
+                     {"absent", count(saved.count(Missing::absent))},
+                     {"unreadable", count(saved.count(Missing::unreadable))},
+                     {"left_out", count(saved.count(Missing::left_out))}}};
 }
 
 /// Tells how every tool came out. A backup that lacks what could not be read is a failure.
@@ -180,11 +178,10 @@ Result<Outcome> tell(const std::vector<Result<Saved>>& results, Context& context
   }
   const auto saved = static_cast<std::size_t>(std::count_if(
       results.begin(), results.end(), [](const auto& result) { return result.has_value(); }));
-  return finish(
-      listing, outcome,
-      {.counts = {{"saved", count_cell(saved)}, {"failed", count_cell(results.size() - saved)}},
-       .sentence = fmt::format("{} saved, {} failed", saved, results.size() - saved)},
-      context);
+  return finish(listing, outcome,
+                {.counts = {{"saved", count(saved)}, {"failed", count(results.size() - saved)}},
+                 .sentence = fmt::format("{} saved, {} failed", saved, results.size() - saved)},
+                context);
 }
 
 /// Standard output holds the backup and nothing else.

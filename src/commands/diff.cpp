@@ -164,7 +164,6 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
       listing.add(error);
     }
   }
-  const auto count = [](std::size_t things) { return number(static_cast<std::int64_t>(things)); };
   return finish(listing, outcome,
                 {.counts = {{"different", count(comparison.differences.size())},
                             {"same", count(comparison.same)}},

@@ -46,7 +46,7 @@ Result<std::vector<Deed>> check_deeds(const DoOptions& options, const Profile& p
 }
 
 Summary listed(const Outcome& outcome, const std::string& target) {
-  return {.counts = {{"actions", number(static_cast<std::int64_t>(outcome.succeeded()))}},
+  return {.counts = {{"actions", count(outcome.succeeded())}},
           .sentence = counted(outcome.succeeded(), "action"),
           .target = target};
 }
@@ -70,9 +70,8 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
 
 Summary summary_of(const Outcome& outcome, Reach reach, const std::string& target) {
   const bool everybody = reach == Reach::everybody;
-  return {.counts = {{everybody ? "sent" : "done",
-                      number(static_cast<std::int64_t>(outcome.succeeded()))},
-                     {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+  return {.counts = {{everybody ? "sent" : "done", count(outcome.succeeded())},
+                     {"failed", count(outcome.failed())}},
           .sentence = fmt::format("{} {}, {} failed", outcome.succeeded(),
                                   everybody ? "sent, not acknowledged" : "done", outcome.failed()),
           .target = target};

@@ -4,7 +4,14 @@
 
 #include <algorithm>
 
+#include "records.hpp"
+
 namespace spindle::commands {
+
+std::string log_word(std::string_view result, const device::StopReport& stop) {
+  if (stop.result == device::StopResult::unconfirmed) return "stop-not-confirmed";
+  return std::string(result.empty() ? "no-result" : result);
+}
 
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
     : tool_(&tool), context_(&context), calm_context_(calm_context(context)) {}
@@ -40,6 +47,10 @@ void GuardedRun::fail(const Error& error) {
   errors_.push_back(error);
 }
 
+void GuardedRun::fail_following(const Error& error) {
+  if (error.code != Errc::closed_pipe) fail(tool_->target.blamed(error));
+}
+
 void GuardedRun::fail(const device::StopReport& unconfirmed) {
   outcome_ = {};
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(unconfirmed.tried).count();
@@ -58,6 +69,25 @@ Result<void> GuardedRun::tell_errors() {
     if (told) told = std::move(written);
   }
   return told;
+}
+
+Result<void> GuardedRun::summarise(const device::StopReport& stop, const RunEnd& run_end) {
+  const bool stopped = stop.result == device::StopResult::confirmed;
+  return context_->renderer.summary(
+      summary_record({{"result", text_or_null(run_end.result)}, {"stop_confirmed", stopped}},
+                     outcome_.status(), tool_->target.shown, context_->clock),
+      fmt::format("{} {}", run_end.subject,
+                  stopped ? "stands still" : "may still run: the stop could not be confirmed"));
+}
+
+Result<Outcome> GuardedRun::end(Listing& listing, const device::StopReport& stop,
+                                const RunEnd& run_end) {
+  if (stop.result == device::StopResult::unconfirmed) fail(stop);
+  const auto listed = listing.end();
+  const auto told = tell_errors();
+  if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
+  if (!listed || !told) return outcome_;
+  return summarise(stop, run_end).map([&] { return outcome_; });
 }
 
 }  // namespace spindle::commands

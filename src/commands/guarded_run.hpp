@@ -1,15 +1,27 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "listing.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
 
 namespace spindle::commands {
 
+/// How a run ended, in words.
+struct RunEnd {
+  std::string result;   ///< for records, such as "fastening-ok" or "ran"; empty: none
+  std::string subject;  ///< begins the sentence on whether it stands still: "OK; the tool"
+};
+
+/// What the change log says of a run. That its stop could not be confirmed matters more than its
+/// result.
+std::string log_word(std::string_view result, const device::StopReport& stop);
+
 /// What every guarded run has in common, whatever runs: a line for stopping that signals do not
-/// end, the one changing line on a terminal, and its errors.
+/// end, the one changing line on a terminal, its errors, and what is told at its end.
 class GuardedRun {
  public:
   GuardedRun(OpenTool& tool, Context& context);
@@ -26,14 +38,21 @@ class GuardedRun {
 
   /// Remembers an error for the end; it also makes the outcome.
   void fail(const Error& error);
+  /// What ended the following of a run. That nobody reads any more is no failure of the run.
+  void fail_following(const Error& error);
+
+  [[nodiscard]] Outcome& outcome() { return outcome_; }
+
+  /// Ends the list of what happened; then come the errors and the summary.
+  Result<Outcome> end(Listing& listing, const device::StopReport& stop, const RunEnd& run_end);
+
+ private:
   /// A stop that could not be confirmed: nothing else matters as much.
   void fail(const device::StopReport& unconfirmed);
   /// Each on its own: they reach people even where nobody reads the records any more.
   Result<void> tell_errors();
+  Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
-  [[nodiscard]] Outcome& outcome() { return outcome_; }
-
- private:
   OpenTool* tool_;
   Context* context_;
   Context calm_context_;  ///< lines that are opened on it refer to it

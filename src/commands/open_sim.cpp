@@ -8,7 +8,6 @@
 
 #include "spindle/link/serial_settings.hpp"
 #include "spindle/sim/blv_driver.hpp"
-#include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 
 namespace spindle::commands {
@@ -57,18 +56,10 @@ Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profi
                                 .hint = "its profile has neither 'run' nor 'events'",
                                 .name = profile.id});
   }
-  if (auto known = check_identity_bytes(profile, options.identity_bytes); !known) {
+  if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
     return tl::unexpected(std::move(known.error()));
   }
-  return sim::make_bm_tool(profile, start,
-                           {.identity_bytes = options.identity_bytes,
-                            .firmware = options.firmware,
-                            .serial = options.serial,
-                            .tool_model = options.model,
-                            .faults = options.faults,
-                            .rundown_every = options.rundown_every,
-                            .ng_every = options.ng_every,
-                            .burst = options.burst});
+  return sim::make_bm_tool(profile, start, options.bm);
 }
 
 }  // namespace

@@ -8,44 +8,19 @@ bool ends_all(ExitStatus status) {
   return status == ExitStatus::interrupted || status == ExitStatus::terminated;
 }
 
-/// What differs from one context to another.
-struct Parts {
-  Clock& clock;
-  const Interrupt& interrupt;
-  const device::OpenTransport& open;
-  report::Renderer& renderer;
-};
-
-Context made_of(const Parts& parts, const Context& context) {
-  return {.io = context.io,
-          .clock = parts.clock,
-          .interrupt = parts.interrupt,
-          .open = parts.open,
-          .calm = context.calm,
-          .serve = context.serve,
-          .end_waits = context.end_waits,
-          .disk = context.disk,
-          .state_folder = context.state_folder,
-          .version = context.version,
-          .profiles = context.profiles,
-          .tools = context.tools,
-          .renderer = parts.renderer,
-          .common = context.common};
-}
-
 }  // namespace
 
 Context calm_context(const Context& context) {
   const Calm& calm = context.calm;
-  return made_of({calm.clock, calm.interrupt, calm.open, context.renderer}, context);
+  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context, context};
 }
 
 Context with_lines(const Context& context, const device::OpenTransport& open) {
-  return made_of({context.clock, context.interrupt, open, context.renderer}, context);
+  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open}, context, context};
 }
 
 Context with_renderer(const Context& context, report::Renderer& renderer) {
-  return made_of({context.clock, context.interrupt, context.open, renderer}, context);
+  return {context, context, {.renderer = renderer}};
 }
 
 void Outcome::fail(const Error& error) { note_failures(1, error.status()); }

@@ -44,8 +44,7 @@ struct Statistics {
 
 Summary summary_of(const Statistics& statistics, const std::string& target) {
   const std::vector<Duration>& times = statistics.times;
-  Summary summary{.counts = {{"sent", number(statistics.sent)},
-                             {"received", number(static_cast<std::int64_t>(times.size()))}},
+  Summary summary{.counts = {{"sent", number(statistics.sent)}, {"received", count(times.size())}},
                   .sentence = fmt::format("{} sent, {} received", statistics.sent, times.size()),
                   .target = target};
   report::Cell minimum;

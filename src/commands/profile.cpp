@@ -25,8 +25,8 @@ Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
           .time = clock.wall(),
           .fields = {{"profile", profile.id},
                      {"title", profile.title},
-                     {"parameters", number(static_cast<std::int64_t>(profile.parameters.size()))},
-                     {"actions", number(static_cast<std::int64_t>(profile.actions.size()))},
+                     {"parameters", count(profile.parameters.size())},
+                     {"actions", count(profile.actions.size())},
                      {"file", profile.path}}};
 }
 

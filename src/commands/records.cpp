@@ -86,12 +86,6 @@ std::string unit_of(const Parameter& parameter, const Target& target) {
   return parameter.unit == "torque" ? target.torque_unit : parameter.unit;
 }
 
-Cell text_or_null(std::string text) {
-  return text.empty() ? Cell(std::monostate()) : Cell(std::move(text));
-}
-
-Cell number(std::int64_t value) { return Decimal(value); }
-
 Cell milliseconds(Duration duration) {
   const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(duration);
   return Decimal(micros.count(), -3);

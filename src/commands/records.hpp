@@ -9,11 +9,13 @@
 
 namespace spindle::commands {
 
+using report::count;
+using report::number;
+using report::text_or_null;
+
 /// The unit as shown: the tool's own torque unit where a parameter is a torque, empty when unknown.
 std::string unit_of(const catalogue::Parameter& parameter, const Target& target);
 
-report::Cell text_or_null(std::string text);
-report::Cell number(std::int64_t value);
 /// Milliseconds with microseconds behind the point.
 report::Cell milliseconds(Duration duration);
 

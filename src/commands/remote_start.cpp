@@ -177,31 +177,23 @@ class RemoteRun {
     }
     log_run(followed, kind, stop);
     judge(followed, kind);
-    if (stop.result == device::StopResult::unconfirmed) guarded_.fail(stop);
-    const auto listed = listing.end();
-    const auto told = guarded_.tell_errors();
-    const Outcome& outcome = guarded_.outcome();
-    if (outcome.failed() == 0 && !listed) return tl::unexpected(listed.error());
-    if (!listed || !told) return outcome;
-    return summarise(kind, stop).map([&] { return outcome; });
+    return guarded_.end(listing, stop,
+                        {.result = kind, .subject = fmt::format("{}; the tool", words_of(kind))});
   }
 
   void log_run(const Result<device::FollowedRun>& followed, const std::string& kind,
                const device::StopReport& stop) {
-    const bool stopped = stop.result != device::StopResult::unconfirmed;
     const bool refused = !followed && followed.error().code == Errc::exception_response;
-    std::string result = refused ? "refused" : "no-result";
-    if (!kind.empty()) result = kind;
+    const std::string result = kind.empty() && refused ? "refused" : kind;
     log_.add({.name = plan_->start.name,
               .register_address = plan_->start.address.value,
               .new_value = Decimal(*plan_->start.value),
-              .result = stopped ? result : "stop-not-confirmed"});
+              .result = log_word(result, stop)});
   }
 
   void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
     if (!followed) {
-      if (followed.error().code != Errc::closed_pipe)
-        guarded_.fail(tool_->target.blamed(followed.error()));
+      guarded_.fail_following(followed.error());
       return;
     }
     if (followed->ending == RunEnding::ignored && kind.empty()) {
@@ -221,15 +213,6 @@ class RemoteRun {
     }
     guarded_.outcome().succeed();
     if (kind == "fastening-ng" || kind == "error") guarded_.outcome().negate();
-  }
-
-  Result<void> summarise(const std::string& kind, const device::StopReport& stop) {
-    const bool stopped = stop.result == device::StopResult::confirmed;
-    return context_->renderer.summary(
-        summary_record({{"result", text_or_null(kind)}, {"stop_confirmed", stopped}},
-                       guarded_.outcome().status(), tool_->target.shown, context_->clock),
-        fmt::format("{}; the tool {}", words_of(kind),
-                    stopped ? "stands still" : "may still run: the stop could not be confirmed"));
   }
 
   const RemoteStartOptions* options_;

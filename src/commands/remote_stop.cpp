@@ -60,9 +60,8 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   }
   const bool everybody = options.reach == Reach::everybody;
   return finish(listing, outcome,
-                {.counts = {{everybody ? "sent" : "stopped",
-                             number(static_cast<std::int64_t>(outcome.succeeded()))},
-                            {"failed", number(static_cast<std::int64_t>(outcome.failed()))}},
+                {.counts = {{everybody ? "sent" : "stopped", count(outcome.succeeded())},
+                            {"failed", count(outcome.failed())}},
                  .sentence = fmt::format(
                      "{} {}, {} failed{}", outcome.succeeded(),
                      everybody ? "sent, not acknowledged" : "stopped", outcome.failed(),

@@ -123,7 +123,6 @@ Result<void> show_plan(const RestoreTask& task, const Target& target, Context& c
 }
 
 Result<Outcome> end_dry_run(const RestoreTask& task, const Target& target, Context& context) {
-  const auto count = [](std::size_t things) { return number(static_cast<std::int64_t>(things)); };
   Outcome outcome;
   outcome.succeed();
   const std::size_t unchanged = task.plan.count(Skip::equal);

@@ -22,8 +22,6 @@ using device::PutBack;
 using report::Align;
 using report::Column;
 
-report::Cell count_cell(std::size_t things) { return number(static_cast<std::int64_t>(things)); }
-
 report::Record write_record(const Parameter& parameter, const Value& before, const Value& now,
                             std::string_view result, const Target& target, const Clock& clock) {
   return {.type = result == "planned" ? "plan" : "write",
@@ -344,11 +342,11 @@ Result<Outcome> RestoreRun::end() {
   std::string sentence = fmt::format("{} written, {} unchanged", written_, unchanged);
   if (!errors_.empty()) sentence += fmt::format(", {} rolled back", rolled_back_);
   return context_->renderer
-      .summary(summary_record({{"planned", count_cell(planned)},
-                               {"written", count_cell(written_)},
-                               {"unchanged", count_cell(unchanged)},
-                               {"skipped", count_cell(task_->plan.skipped.size() - unchanged)},
-                               {"rolled_back", count_cell(rolled_back_)},
+      .summary(summary_record({{"planned", count(planned)},
+                               {"written", count(written_)},
+                               {"unchanged", count(unchanged)},
+                               {"skipped", count(task_->plan.skipped.size() - unchanged)},
+                               {"rolled_back", count(rolled_back_)},
                                {"saved_state", text_or_null(saved_)}},
                               outcome_.status(), tool_->target.shown, context_->clock),
                sentence)

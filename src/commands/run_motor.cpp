@@ -372,30 +372,21 @@ class MotorRun {
     }
     log_run(followed, stop);
     judge(followed, known);
-    if (stop.result == device::StopResult::unconfirmed) guarded_.fail(stop);
-    const auto listed = listing.end();
-    const auto told = guarded_.tell_errors();
-    const Outcome& outcome = guarded_.outcome();
-    if (outcome.failed() == 0 && !listed) return tl::unexpected(listed.error());
-    if (!listed || !told) return outcome;
-    return summarise(followed, stop).map([&] { return outcome; });
+    const std::string_view result = result_of(followed);
+    return guarded_.end(listing, stop,
+                        {.result = std::string(result),
+                         .subject = result == "ran" ? "ran; the motor" : "the motor"});
   }
 
   void log_run(const Result<MotorEnding>& followed, const device::StopReport& stop) {
-    const bool stopped = stop.result != device::StopResult::unconfirmed;
-    const std::string_view result = result_of(followed);
     log_.add({.name = "start",
               .new_value = Decimal(start_word()),
-              .result = !stopped         ? "stop-not-confirmed"
-                        : result.empty() ? "no-result"
-                                         : std::string(result)});
+              .result = log_word(result_of(followed), stop)});
   }
 
   void judge(const Result<MotorEnding>& followed, const catalogue::CodeTables& tables) {
     if (!followed) {
-      if (followed.error().code != Errc::closed_pipe) {
-        guarded_.fail(tool_->target.blamed(followed.error()));
-      }
+      guarded_.fail_following(followed.error());
       return;
     }
     switch (*followed) {
@@ -453,16 +444,6 @@ class MotorRun {
         return "too-fast";
     }
     return "";
-  }
-
-  Result<void> summarise(const Result<MotorEnding>& followed, const device::StopReport& stop) {
-    const bool stopped = stop.result == device::StopResult::confirmed;
-    const std::string result(result_of(followed));
-    return context_->renderer.summary(
-        summary_record({{"result", text_or_null(result)}, {"stop_confirmed", stopped}},
-                       guarded_.outcome().status(), tool_->target.shown, context_->clock),
-        fmt::format("{}the motor {}", result == "ran" ? "ran; " : "",
-                    stopped ? "stands still" : "may still run: the stop could not be confirmed"));
   }
 
   const RemoteStartOptions* options_;

@@ -111,10 +111,9 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
   }
   show_progress({}, context);
   if (outcome.succeeded() == 0) outcome.negate();
-  const auto found = static_cast<std::int64_t>(outcome.succeeded());
   return finish(listing, outcome,
-                {.counts = {{"asked", number(asked)}, {"found", number(found)}},
-                 .sentence = fmt::format("{} asked, {} found", asked, found),
+                {.counts = {{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
+                 .sentence = fmt::format("{} asked, {} found", asked, outcome.succeeded()),
                  .target = bus->shown},
                 context);
 }

@@ -47,8 +47,6 @@ std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
   return "";
 }
 
-report::Cell count(std::size_t things) { return number(static_cast<std::int64_t>(things)); }
-
 }  // namespace
 
 std::string_view to_text(Ending ending) {

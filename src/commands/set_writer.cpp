@@ -25,8 +25,7 @@ Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
   }
   tell_effects(steps, tool_->target, *context_);
   const SetCounts& counts = result_.counts;
-  return end({.counts = {{"sent", number(static_cast<std::int64_t>(counts.changed))},
-                         {"failed", number(static_cast<std::int64_t>(counts.failed))}},
+  return end({.counts = {{"sent", count(counts.changed)}, {"failed", count(counts.failed)}},
               .sentence = fmt::format("{} sent, not acknowledged", counts.changed),
               .target = tool_->target.shown});
 }

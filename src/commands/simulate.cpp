@@ -37,8 +37,8 @@ Error misplaced(std::string message, std::string hint) {
 /// What only makes sense on a serial line, by the name of its option; empty: nothing was asked for.
 std::string_view serial_option(const SimulateOptions& options) {
   if (!options.pty.empty()) return "--pty";
-  if (!options.units.empty()) return "--units";
-  if (options.baud) return "--baud";
+  if (!options.tool.units.empty()) return "--units";
+  if (options.tool.baud) return "--baud";
   return options.gaps == sim::LineModel::Gaps::ignored ? "--no-gap" : "";
 }
 
@@ -86,8 +86,8 @@ std::string url_of(const link::Endpoint& place, const SimulateOptions& options) 
   if (place.medium == link::Medium::tcp) return link::to_url(place);
   std::string url = place.medium == link::Medium::serial ? fmt::format("rtu://{}", place.device)
                                                          : link::to_url(place);
-  url += fmt::format("?unit={}", options.units.empty() ? 1 : options.units.front().value);
-  if (options.baud) url += fmt::format("&baud={}", *options.baud);
+  url += fmt::format("?unit={}", options.tool.units.empty() ? 1 : options.tool.units.front().value);
+  if (options.tool.baud) url += fmt::format("&baud={}", *options.tool.baud);
   return url;
 }
 
@@ -99,8 +99,8 @@ sim::ServeOptions serve_options(const link::Endpoint& place, const catalogue::Pr
                           .pty = place.device,
                           .faults = std::move(faults)};
   if (profile.link.framing == modbus::Framing::tcp) return serve;
-  serve.baud = options.baud.value_or(profile.link.serial.baud);
-  serve.line = {.character_time = simulated_character_time(profile.link, options.baud),
+  serve.baud = options.tool.baud.value_or(profile.link.serial.baud);
+  serve.line = {.character_time = simulated_character_time(profile.link, options.tool.baud),
                 .gaps = options.gaps};
   return serve;
 }
@@ -149,12 +149,11 @@ void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Cont
 }
 
 Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& context) {
-  return context.renderer.summary(
-      summary_record({{"connections", number(static_cast<std::int64_t>(traffic.connections))},
-                      {"requests", number(static_cast<std::int64_t>(traffic.requests))}},
-                     outcome.status(), {}, context.clock),
-      fmt::format("{}, {}", counted(traffic.connections, "connection"),
-                  counted(traffic.requests, "request")));
+  return context.renderer.summary(summary_record({{"connections", count(traffic.connections)},
+                                                  {"requests", count(traffic.requests)}},
+                                                 outcome.status(), {}, context.clock),
+                                  fmt::format("{}, {}", counted(traffic.connections, "connection"),
+                                              counted(traffic.requests, "request")));
 }
 
 }  // namespace
@@ -164,18 +163,9 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   if (!faults) return tl::unexpected(std::move(faults.error()));
   auto outages = parse_each("--outage", options.outages, sim::parse_outage);
   if (!outages) return tl::unexpected(std::move(outages.error()));
-  auto tool = make_simulated_tool(options.profile,
-                                  {.identity_bytes = options.identity_bytes,
-                                   .firmware = options.firmware,
-                                   .serial = options.serial,
-                                   .model = options.model,
-                                   .units = options.units,
-                                   .baud = options.baud,
-                                   .faults = *faults,
-                                   .rundown_every = options.rundown_every,
-                                   .ng_every = options.ng_every.value_or(0),
-                                   .burst = options.burst.value_or(1)},
-                                  context);
+  SimulatedToolOptions wanted = options.tool;
+  wanted.bm.faults = *faults;
+  auto tool = make_simulated_tool(options.profile, wanted, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   auto place = place_of(options, tool->profile);
   if (!place) return tl::unexpected(std::move(place.error()));

@@ -78,8 +78,8 @@ device::LinkOptions link_options(const Target& target, const catalogue::Profile&
 SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
   SimulatedToolOptions options;
   if (simulated_operator == SimulatedOperator::working) {
-    options.rundown_every = std::chrono::seconds(2);
-    options.ng_every = 4;
+    options.bm.rundown_every = std::chrono::seconds(2);
+    options.bm.ng_every = 4;
   }
   return options;
 }

@@ -134,9 +134,6 @@ class Stage {
   }
 
   Result<void> summarise() {
-    const auto count = [](std::size_t number_of) {
-      return number(static_cast<std::int64_t>(number_of));
-    };
     return context_->renderer.summary(
         summary_record({{"events", count(events_)},
                         {"ok", count(ok_)},

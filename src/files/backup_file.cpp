@@ -188,22 +188,11 @@ std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Findin
   return list->items.size();
 }
 
-/// Bytes in hexadecimal digits, separated by blanks.
+/// Bytes in hexadecimal digits, separated by one blank or more.
 Bytes read_hex(const YamlNode& node, Findings& findings) {
-  constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
-  Bytes bytes;
-  if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
-  for (const std::string_view pair : split(node.text, ' ')) {
-    if (pair.empty()) continue;
-    const auto byte =
-        pair.size() == 2 ? parse_unsigned(fmt::format("0x{}", pair), last_byte) : std::nullopt;
-    if (!byte) {
-      findings.add(node.at, fmt::format("'{}' is not a byte of two hexadecimal digits", pair));
-      return {};
-    }
-    bytes.push_back(static_cast<std::uint8_t>(*byte));
-  }
-  return bytes;
+  std::vector<std::string_view> words = split(node.text, ' ');
+  std::erase(words, "");
+  return to_bytes(node, words, findings);
 }
 
 SnapshotIdentity read_identity(const YamlNode& node, Findings& findings) {

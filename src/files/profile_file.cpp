@@ -318,26 +318,11 @@ void read_section(YamlMap& map, std::string_view key, ReadSection read, Origin& 
 
 // ---- simulation ----
 
-Bytes read_hex(const YamlNode& node, Findings& findings) {
-  Bytes bytes;
-  if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
-  for (const std::string_view pair : split(node.text, ' ')) {
-    const auto byte =
-        pair.size() == 2 ? parse_unsigned(fmt::format("0x{}", pair), last_byte) : std::nullopt;
-    if (!byte) {
-      findings.add(node.at, fmt::format("'{}' is not a byte of two hexadecimal digits", pair));
-      return {};
-    }
-    bytes.push_back(static_cast<std::uint8_t>(*byte));
-  }
-  return bytes;
-}
-
 void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& facts,
                              Findings& findings) {
   YamlMap map(node, findings);
   if (const YamlNode* bytes = map.get("bytes", Need::required)) {
-    facts.identity = read_hex(*bytes, findings);
+    facts.identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
   }
   facts.identity_bytes =
       map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));

@@ -186,23 +186,24 @@ bool is_abstract(const std::string& path) {
   return layer && (*layer)->head.abstract;
 }
 
-Error with_check_hint(Error error, const std::string& path) {
-  error.hint = fmt::format("'spindle profile check {}' lists every fault", path);
-  return error;
+std::vector<ProfileEntry> list_profiles(const std::vector<std::string>& folders) {
+  std::vector<ProfileEntry> entries;
+  for (auto& [id, path] : profile_files(folders)) {
+    if (!is_abstract(path)) entries.push_back({id, path});
+  }
+  return entries;
 }
 
-}  // namespace
-
-Result<std::string> ProfileStore::locate(std::string_view name_or_file) const {
+Result<std::string> locate(std::string_view name_or_file, const std::vector<std::string>& folders) {
   if (is_path(name_or_file)) return std::string(name_or_file);
   if (is_catalogue_name(name_or_file)) {
-    for (const std::string& folder : folders_) {
+    for (const std::string& folder : folders) {
       std::string path = in_folder(folder, name_or_file);
       if (is_file(path)) return path;
     }
   }
   std::vector<std::string> ids;
-  for (const ProfileEntry& entry : list()) ids.push_back(entry.id);
+  for (const ProfileEntry& entry : list_profiles(folders)) ids.push_back(entry.id);
   std::string hint = suggestion(name_or_file, ids);
   if (hint.empty()) hint = "'spindle profile list' shows those that exist";
   return tl::unexpected(Error{.code = Errc::unknown_name,
@@ -211,16 +212,44 @@ Result<std::string> ProfileStore::locate(std::string_view name_or_file) const {
                               .name = std::string(name_or_file)});
 }
 
-Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
-  const auto path = locate(name_or_file);
-  if (!path) return tl::unexpected(path.error());
+/// A profile's files, read, with what was found wrong in them so far.
+struct OpenChain {
+  explicit OpenChain(std::string file) : path(std::move(file)) {}
+  OpenChain(OpenChain&&) = default;  // a copy would point into the library of the first one
+
+  std::string path;
   Library library;
+  Chain chain;  ///< points into the library
   Findings findings;
-  const auto chain = read_chain(*path, Documents::first, folders_, library, findings);
-  if (!chain) return tl::unexpected(chain.error());
-  Profile profile = build(*chain, findings);
-  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
-  if (chain->front()->head.abstract) {
+
+  /// Error `bad_file` as soon as anything is wrong.
+  [[nodiscard]] Result<void> check() const {
+    if (findings.empty()) return {};
+    Error error = findings.error();
+    error.hint = fmt::format("'spindle profile check {}' lists every fault", path);
+    return tl::unexpected(std::move(error));
+  }
+};
+
+Result<OpenChain> open_chain(std::string_view name_or_file, Documents documents,
+                             const std::vector<std::string>& folders) {
+  auto path = locate(name_or_file, folders);
+  if (!path) return tl::unexpected(std::move(path.error()));
+  OpenChain open(std::move(*path));
+  auto chain = read_chain(open.path, documents, folders, open.library, open.findings);
+  if (!chain) return tl::unexpected(std::move(chain.error()));
+  open.chain = std::move(*chain);
+  return open;
+}
+
+}  // namespace
+
+Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
+  auto open = open_chain(name_or_file, Documents::first, folders_);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  Profile profile = build(open->chain, open->findings);
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  if (open->chain.front()->head.abstract) {
     return tl::unexpected(Error{.code = Errc::bad_file,
                                 .message = "is only a base for other profiles",
                                 .hint = "'spindle profile list' shows those of products",
@@ -231,16 +260,12 @@ Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
 
 Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
-  const auto path = locate(name_or_file);
-  if (!path) return tl::unexpected(path.error());
-  Library library;
-  Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
-  if (!chain) return tl::unexpected(chain.error());
-  const YamlNode* part = nearest_simulation(*chain, findings);
+  auto open = open_chain(name_or_file, Documents::all, folders_);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  const YamlNode* part = nearest_simulation(open->chain, open->findings);
   catalogue::SimulationFacts facts;
-  if (part != nullptr) facts = read_simulation(*part, findings);
-  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
+  if (part != nullptr) facts = read_simulation(*part, open->findings);
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
   if (part != nullptr) return facts;
   return tl::unexpected(
       Error{.code = Errc::bad_file,
@@ -256,40 +281,26 @@ Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view nam
 }
 
 Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view name_or_file) const {
-  const auto path = locate(name_or_file);
-  if (!path) return tl::unexpected(path.error());
-  Library library;
-  Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
-  if (!chain) return tl::unexpected(chain.error());
-  catalogue::CodeTables codes = collect_texts(*chain, findings);
-  if (!findings.empty()) return tl::unexpected(with_check_hint(findings.error(), *path));
+  auto open = open_chain(name_or_file, Documents::all, folders_);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  catalogue::CodeTables codes = collect_texts(open->chain, open->findings);
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
   return codes;
 }
 
 Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
-  const auto path = locate(name_or_file);
-  if (!path) return tl::unexpected(path.error());
-  Library library;
-  Findings findings;
-  const auto chain = read_chain(*path, Documents::all, folders_, library, findings);
-  if (!chain) return tl::unexpected(chain.error());
-  const Profile profile = build(*chain, findings);
-  collect_texts(*chain, findings);
-  if (const YamlNode* part = nearest_simulation(*chain, findings)) {
-    read_simulation(*part, findings);
-    check_simulation(profile, *part, findings);
+  auto open = open_chain(name_or_file, Documents::all, folders_);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  const Profile profile = build(open->chain, open->findings);
+  collect_texts(open->chain, open->findings);
+  if (const YamlNode* part = nearest_simulation(open->chain, open->findings)) {
+    read_simulation(*part, open->findings);
+    check_simulation(profile, *part, open->findings);
   }
-  return findings.list();
+  return open->findings.list();
 }
 
-std::vector<ProfileEntry> ProfileStore::list() const {
-  std::vector<ProfileEntry> entries;
-  for (auto& [id, path] : profile_files(folders_)) {
-    if (!is_abstract(path)) entries.push_back({id, path});
-  }
-  return entries;
-}
+std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(folders_); }
 
 std::vector<Profile> ProfileStore::load_all() const {
   std::vector<Profile> profiles;

@@ -66,6 +66,23 @@ std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
   return NumberRange{*from, *to};
 }
 
+Bytes to_bytes(const YamlNode& node, const std::vector<std::string_view>& words,
+               Findings& findings) {
+  constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
+  Bytes bytes;
+  if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
+  for (const std::string_view pair : words) {
+    const auto byte =
+        pair.size() == 2 ? parse_unsigned(fmt::format("0x{}", pair), last_byte) : std::nullopt;
+    if (!byte) {
+      findings.add(node.at, fmt::format("'{}' is not a byte of two hexadecimal digits", pair));
+      return {};
+    }
+    bytes.push_back(static_cast<std::uint8_t>(*byte));
+  }
+  return bytes;
+}
+
 std::optional<std::int64_t> parse_integer(std::string_view text) {
   const bool negative = text.starts_with('-');
   if (negative) text.remove_prefix(1);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "files/yaml_reader.hpp"
+#include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
 
@@ -31,6 +32,10 @@ std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t max
 std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
                                     Findings& findings);
 bool expect(const YamlNode& node, YamlNode::Kind kind, Findings& findings);
+/// The words of the value, each of which is to be a byte of two hexadecimal digits; no byte at all
+/// where one of them is not.
+Bytes to_bytes(const YamlNode& node, const std::vector<std::string_view>& words,
+               Findings& findings);
 
 /// A whole integer with an optional minus sign, such as the key of a label.
 std::optional<std::int64_t> parse_integer(std::string_view text);

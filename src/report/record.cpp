@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace spindle::report {
 namespace {
@@ -30,6 +31,14 @@ struct CellText {
 };
 
 }  // namespace
+
+Cell text_or_null(std::string text) {
+  return text.empty() ? Cell(std::monostate()) : Cell(std::move(text));
+}
+
+Cell number(std::int64_t value) { return Decimal(value); }
+
+Cell count(std::size_t things) { return number(static_cast<std::int64_t>(things)); }
 
 const Field* Record::find(std::string_view key) const {
   const auto found =

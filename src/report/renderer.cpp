@@ -4,15 +4,6 @@
 #include "renderers.hpp"
 
 namespace spindle::report {
-namespace {
-
-Cell text_or_null(std::string text) {
-  return text.empty() ? Cell(std::monostate{}) : Cell(std::move(text));
-}
-
-Cell number(std::int64_t value) { return Decimal(value); }
-
-}  // namespace
 
 std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk) {
   switch (format) {

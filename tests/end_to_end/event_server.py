@@ -31,8 +31,9 @@ class Chance:
         return self.random.random() < probability
 
 
-class EventServer:
+class EventServer(support.Port):
     def __init__(self, chance=None, first=1961, serial=1021100042, firmware=2103, expires=10.0, port=0):
+        super().__init__(port)
         self.tool = hostile_server.Tool(serial=serial, firmware=firmware)
         self.number = first
         self.requests = []  # (time, request)
@@ -46,23 +47,11 @@ class EventServer:
         self._recent = []
         self._client = None
         self._lock = threading.RLock()
-        self._listening = socket.create_server(("127.0.0.1", port))
-        self.port = self._listening.getsockname()[1]
-        self.url = f"tcp://127.0.0.1:{self.port}"
-        self._threads = []
         self._store(0)
 
-    def __enter__(self):
-        self._begin(self._accept)
-        return self
-
     def __exit__(self, *_):
-        with contextlib.suppress(OSError):
-            self._listening.shutdown(socket.SHUT_RDWR)
-        self._listening.close()
         self.cut()
-        for thread in self._threads:
-            thread.join(support.DEADLINE)
+        super().__exit__()
 
     # --- what happens to the tool ---
 
@@ -162,21 +151,12 @@ class EventServer:
         except OSError:
             self._client = None
 
-    def _begin(self, what, *arguments):
-        thread = threading.Thread(target=what, args=arguments, daemon=True)
-        self._threads.append(thread)
-        thread.start()
-
-    def _accept(self):
-        with contextlib.suppress(OSError):
-            while True:
-                client, _ = self._listening.accept()
-                client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                with self._lock:
-                    self._client = client
-                    self._armed_until = 0.0
-                    self._held = b""
-                self._begin(self._serve, client)
+    def _meet(self, client):
+        with self._lock:
+            self._client = client
+            self._armed_until = 0.0
+            self._held = b""
+        super()._meet(client)
 
     def _serve(self, client):
         buffer = bytearray()

@@ -202,10 +202,11 @@ class Held:
     past_repetition: bool
 
 
-class HostileServer:
+class HostileServer(support.Port):
     """Serves one tool with the habit of one row, and remembers all that was asked."""
 
     def __init__(self, row):
+        super().__init__()
         self.row = row
         self.tool = Tool(**row.get("tool", {}))
         self.requests = []
@@ -217,38 +218,13 @@ class HostileServer:
         self._held = []
         self._lock = threading.Lock()
         self._stopping = threading.Event()
-        self._connections = []
-        self._threads = []
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.url = f"tcp://127.0.0.1:{self._listening.getsockname()[1]}"
 
     def __enter__(self):
-        if self.row.get("accept") != "never":
-            self._begin(self._accept)
-        return self
+        return self if self.row.get("accept") == "never" else super().__enter__()
 
     def __exit__(self, *_):
         self._stopping.set()
-        for opened in [self._listening, *self._connections]:
-            with contextlib.suppress(OSError):
-                opened.shutdown(socket.SHUT_RDWR)
-        for thread in self._threads:
-            thread.join(support.DEADLINE)
-        for opened in [self._listening, *self._connections]:
-            opened.close()
-
-    def _begin(self, what, *arguments):
-        thread = threading.Thread(target=what, args=arguments, daemon=True)
-        self._threads.append(thread)
-        thread.start()
-
-    def _accept(self):
-        with contextlib.suppress(OSError):
-            while True:
-                connection, _ = self._listening.accept()
-                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._connections.append(connection)
-                self._begin(self._serve, connection)
+        super().__exit__()
 
     def _serve(self, connection):
         try:

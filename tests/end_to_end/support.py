@@ -321,28 +321,55 @@ def host_and_port(url):
     return host.strip("[]"), int(port)
 
 
-class Recorder:
-    """Passes one client's bytes to a server and back, and keeps every request that it sees."""
+class Port:
+    """A port of this machine whose clients are served, each in a thread of its own, as long as the with
+    statement lasts. Whoever derives from it says in `_serve` what a client gets."""
 
-    def __init__(self, url):
-        self._upstream = host_and_port(url)
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.url = f"tcp://127.0.0.1:{self._listening.getsockname()[1]}"
-        self.requests = []
-        self._sockets = []
-        self._threads = [threading.Thread(target=self._accept, daemon=True)]
+    def __init__(self, port=0):
+        self._listening = socket.create_server(("127.0.0.1", port))
+        self.port = self._listening.getsockname()[1]
+        self.url = f"tcp://127.0.0.1:{self.port}"
+        self._connections = []
+        self._threads = []
 
     def __enter__(self):
-        self._threads[0].start()
+        self._begin(self._accept)
         return self
 
     def __exit__(self, *_):
-        for opened in [self._listening, *self._sockets]:
+        for opened in [self._listening, *self._connections]:
             with contextlib.suppress(OSError):
                 opened.shutdown(socket.SHUT_RDWR)
-            opened.close()
         for thread in self._threads:
             thread.join(DEADLINE)
+        for opened in [self._listening, *self._connections]:
+            opened.close()
+
+    def _begin(self, what, *arguments):
+        thread = threading.Thread(target=what, args=arguments, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                connection, _ = self._listening.accept()
+                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._connections.append(connection)
+                self._meet(connection)
+
+    def _meet(self, connection):
+        """Nobody else is accepted meanwhile."""
+        self._begin(self._serve, connection)
+
+
+class Recorder(Port):
+    """Passes one client's bytes to a server and back, and keeps every request that it sees."""
+
+    def __init__(self, url):
+        super().__init__()
+        self._upstream = host_and_port(url)
+        self.requests = []
 
     def lead_to(self, url):
         """Connections from now on lead to another server."""
@@ -351,16 +378,12 @@ class Recorder:
     def count(self, *functions):
         return sum(request.function in functions for request in self.requests)
 
-    def _accept(self):
+    def _serve(self, client):
         with contextlib.suppress(OSError):
-            while True:
-                client, _ = self._listening.accept()
-                server = socket.create_connection(self._upstream)
-                self._sockets += [client, server]
-                for source, sink, sees in ((client, server, True), (server, client, False)):
-                    pump = threading.Thread(target=self._pump, args=(source, sink, sees), daemon=True)
-                    self._threads.append(pump)
-                    pump.start()
+            server = socket.create_connection(self._upstream)
+            self._connections.append(server)
+            self._begin(self._pump, server, client, False)
+            self._pump(client, server, True)
 
     def _pump(self, source, sink, sees_requests):
         buffer = bytearray()

@@ -351,36 +351,21 @@ class EndingTest(RemoteStartTest):
             self.assert_stopped(station, finished)
 
 
-class Single:
+class Single(support.Port):
     """Passes one client at a time to a server; freeze() lets the present one wait in vain."""
 
     def __init__(self, url):
+        super().__init__()
         self._upstream = support.host_and_port(url)
-        self._listening = socket.create_server(("127.0.0.1", 0))
-        self.url = f"tcp://127.0.0.1:{self._listening.getsockname()[1]}"
         self._frozen = threading.Event()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        with contextlib.suppress(OSError):
-            self._listening.shutdown(socket.SHUT_RDWR)
-        self._listening.close()
-        self._thread.join(support.DEADLINE)
 
     def freeze(self):
         self._frozen.set()
 
-    def _serve(self):
-        with contextlib.suppress(OSError):
-            while True:
-                client, _ = self._listening.accept()
-                with client, socket.create_connection(self._upstream) as server:
-                    self._pass_on(client, server)
-                self._frozen.clear()
+    def _meet(self, client):
+        with client, socket.create_connection(self._upstream) as server:
+            self._pass_on(client, server)
+        self._frozen.clear()
 
     def _pass_on(self, client, server):
         with contextlib.suppress(OSError):

@@ -10,7 +10,6 @@ import os
 import pty
 import select
 import signal
-import socket
 import threading
 import time
 import unittest
@@ -407,22 +406,14 @@ class ReconnectingTest(unittest.TestCase):
     def test_connection_that_never_serves_is_not_hammered(self):
         """A server that hangs up on everybody is asked ever more seldom."""
         accepted = []
-        listening = socket.create_server(("127.0.0.1", 0))
 
-        def hang_up():
-            with contextlib.suppress(OSError):
-                while True:
-                    client, _ = listening.accept()
-                    accepted.append(time.monotonic())
-                    client.close()
+        class HangingUp(support.Port):
+            def _meet(self, client):
+                accepted.append(time.monotonic())
+                client.close()
 
-        thread = threading.Thread(target=hang_up, daemon=True)
-        thread.start()
-        url = f"tcp://127.0.0.1:{listening.getsockname()[1]}"
-        finished = support.run("watch", url, *JSON, "--duration", "2s")
-        listening.shutdown(socket.SHUT_RDWR)
-        listening.close()
-        thread.join()
+        with HangingUp() as server:
+            finished = support.run("watch", server.url, *JSON, "--duration", "2s")
         self.assertEqual(finished.status, 0, finished)
         self.assertIn(len(accepted), range(3, 6))  # 0, 0.25, 0.75, 1.75 s and a fifth less
 

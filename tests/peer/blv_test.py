@@ -1,17 +1,14 @@
 """Other people's programs against the simulated BLV driver: mbpoll and pymodbus as clients that know
 nothing of it, and Wireshark's dissector over what spindle and the driver say to each other."""
 
-import importlib.util
 import re
-import subprocess
 import unittest
 
 import support
 from support import SPINDLE, spindle
 
 support.need_program("mbpoll", "tshark", "text2pcap")
-for module in ("pymodbus", "serial"):
-    support.need(f"python3-{module}", importlib.util.find_spec(module))
+support.need_module("pymodbus", "serial")
 
 from pymodbus.client import ModbusSerialClient  # noqa: E402  needs what was just asked for
 from pymodbus.utilities import checkCRC  # noqa: E402
@@ -21,7 +18,7 @@ import tshark_test  # noqa: E402
 COMMAND = 125  # lower half of the driver input command
 
 
-class Drivers:
+class Drivers(support.Process):
     """Simulated drivers on a pseudo terminal, and a log of what went over it."""
 
     def __init__(self, *options):
@@ -29,10 +26,9 @@ class Drivers:
         self.path = folder / "line"
         self._log = folder / "log"
         with open(self._log, "wb") as log:
-            self._process = subprocess.Popen(
-                [SPINDLE, "simulate", "orientalmotor-blv", "--pty", str(self.path), "--units", "1-3", "-v",
-                 *options], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True)
-        if not self._process.stdout.readline():
+            super().__init__(SPINDLE, "simulate", "orientalmotor-blv", "--pty", self.path, "--units", "1-3", "-v",
+                             *options, errors=log)
+        if not self.first_line():
             raise RuntimeError(f"the drivers are not served: {self._log.read_text()}")
 
     def unit(self, number):
@@ -40,11 +36,6 @@ class Drivers:
 
     def ask(self, command, unit, *arguments):
         return spindle(command, self.unit(unit), "--profile", "orientalmotor-blv", *arguments)
-
-    def stop(self):
-        self._process.terminate()
-        self._process.wait(support.PATIENCE)
-        self._process.stdout.close()
 
     def segments(self):
         """As (direction, bytes): 'O' from the client."""
@@ -72,16 +63,13 @@ class Mbpoll(DriversTest):
         self.drivers = self.start("--no-gap")
 
     def mbpoll(self, *arguments, unit=2, values=()):
-        return support.run("mbpoll", "-m", "rtu", "-a", unit, "-b", "9600", "-P", "even", "-0", "-1", "-q",
-                           "-t", "4", *arguments, self.drivers.path, *values)
-
-    def registers(self, outcome):
-        return [(int(at), int(value)) for at, value in re.findall(r"\[(\d+)\]:\s+(\d+)", outcome.out)]
+        return support.mbpoll("rtu", "-a", unit, "-b", "9600", "-P", "even", "-t", "4", *arguments,
+                              self.drivers.path, *values)
 
     def test_reads(self):
         outcome = self.mbpoll("-r", "1152", "-c", "6")
         self.assert_ends(outcome, 0)
-        self.assertEqual(self.registers(outcome), [(1152, 0), (1153, 0), (1154, 0), (1155, 0), (1156, 0), (1157, 1000)])
+        self.assertEqual(support.registers(outcome), {1152: 0, 1153: 0, 1154: 0, 1155: 0, 1156: 0, 1157: 1000})
 
     def test_writes_one_register_and_pairs(self):
         self.assert_ends(self.mbpoll("-r", "1157", values=["1200"]), 0)  # function 06
@@ -106,7 +94,7 @@ class Mbpoll(DriversTest):
         self.assert_ends(self.drivers.ask("remote-stop", 2), 0)
         self.assertNotIn("MOVE", str(self.value(self.drivers, 2, "status.driver-output")))
         outcome = self.mbpoll("-r", COMMAND)
-        self.assertEqual(self.registers(outcome), [(COMMAND, 0x22)])
+        self.assertEqual(support.registers(outcome), {COMMAND: 0x22})
 
     def test_what_it_changed_is_found_and_put_back(self):
         file = support.scratch_folder() / "before.yaml"
@@ -121,8 +109,8 @@ class Mbpoll(DriversTest):
         same = self.drivers.ask("diff", 2, file)
         self.assert_ends(same, 0)
         self.assertEqual(same.of_type("diff"), [])
-        self.assertEqual(self.registers(self.mbpoll("-r", "1157")), [(1157, 1000)])
-        self.assertEqual(self.registers(self.mbpoll("-r", "646", "-c", "2")), [(646, 0), (647, 300)])
+        self.assertEqual(support.registers(self.mbpoll("-r", "1157")), {1157: 1000})
+        self.assertEqual(support.registers(self.mbpoll("-r", "646", "-c", "2")), {646: 0, 647: 300})
 
 
 class Pymodbus(DriversTest):

@@ -1,29 +1,18 @@
 """libmodbus on both ends: spindle against its server, its client against our simulator."""
 
-import struct
 import unittest
 
 import support
-from support import PROGRAMS, modbus_request, spindle
+from support import PROGRAMS, spindle
 
 
-def start(identity):
-    return support.Server(PROGRAMS / "spindle_peer_libmodbus_server", identity)
+SERVER = PROGRAMS / "spindle_peer_libmodbus_server"
 
 
-def stored(server, address):
-    """What the server holds, read without spindle."""
-    answer = modbus_request(server.port, struct.pack(">BHH", 3, address, 1))
-    return struct.unpack(">BBH", answer)[2]
-
-
-class DogaServer(support.PeerTest):
+class DogaServer(support.ServedTest):
     """libmodbus with the identity of a BM."""
 
-    def setUp(self):
-        self.server = start("doga")
-        self.addCleanup(self.server.stop)
-        self.url = self.server.url
+    COMMAND = (SERVER, "doga")
 
     def test_is_identified(self):
         outcome = spindle("identify", self.url)
@@ -51,12 +40,12 @@ class DogaServer(support.PeerTest):
                           "preset.1.torque-limit=10.00")
         self.assert_ends(outcome, 0)
         self.assertEqual([write["result"] for write in outcome.of_type("write")], ["written"] * 2)
-        self.assertEqual((stored(self.server, 2), stored(self.server, 3)), (271, 1000))
+        self.assertEqual((self.server.stored(2), self.server.stored(3)), (271, 1000))
 
     def test_refuses_what_the_server_does_not_allow(self):
         outcome = spindle("set", self.url, "--profile", "doga-bm", "preset.1.target-torque=20.01")
         self.assert_error(outcome, 2, name="preset.1.target-torque")
-        self.assertEqual(stored(self.server, 2), 102)
+        self.assertEqual(self.server.stored(2), 102)
 
     def test_pings(self):
         outcome = spindle("ping", self.url, "-c", "3", "--interval", "1ms")
@@ -67,13 +56,10 @@ class DogaServer(support.PeerTest):
         self.assert_error(spindle("get", self.url, "@holding:5000"), 6, exception=2)
 
 
-class StockServer(support.PeerTest):
+class StockServer(support.ServedTest):
     """libmodbus with its own identity."""
 
-    def setUp(self):
-        self.server = start("stock")
-        self.addCleanup(self.server.stop)
-        self.url = self.server.url
+    COMMAND = (SERVER, "stock")
 
     def test_is_nobody_we_know(self):
         outcome = spindle("identify", self.url)
@@ -90,14 +76,14 @@ class StockServer(support.PeerTest):
     def test_names_are_refused(self):
         self.assert_error(spindle("get", self.url, "--profile", "doga-bm", "preset.1.speed"), 8)
         self.assert_error(spindle("set", self.url, "--profile", "doga-bm", "preset.1.speed=5"), 8)
-        self.assertEqual(stored(self.server, 8), 108)
+        self.assertEqual(self.server.stored(8), 108)
 
 
 class Client(support.PeerTest):
     """libmodbus as a client of the simulated tool."""
 
     def test_finds_nothing_wrong(self):
-        with support.simulator() as tool:
+        with support.Server(*support.SIMULATOR) as tool:
             outcome = support.run(PROGRAMS / "spindle_peer_libmodbus_client", tool.port)
         self.assert_ends(outcome, 0)
         self.assertEqual(outcome.out, "")

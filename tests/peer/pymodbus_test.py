@@ -1,33 +1,20 @@
 """spindle against a server on pymodbus: identity, names, limits, writes, exceptions."""
 
-import importlib.util
-import struct
 import unittest
 
 import support
-from support import HERE, modbus_request, spindle
+from support import HERE, spindle
 
-for module in ("pymodbus", "serial_asyncio"):
-    support.need(f"python3-{module.replace('_', '-')}", importlib.util.find_spec(module))
-
-
-def start(identity):
-    return support.Server("/usr/bin/python3", HERE / "pymodbus_server.py", identity)
+support.need_module("pymodbus", "serial_asyncio")
 
 
-def stored(server, address):
-    """What the server holds, read without spindle."""
-    answer = modbus_request(server.port, struct.pack(">BHH", 3, address, 1))
-    return struct.unpack(">BBH", answer)[2]
+SERVER = ("/usr/bin/python3", HERE / "pymodbus_server.py")
 
 
-class DogaTool(support.PeerTest):
+class DogaTool(support.ServedTest):
     """The register map of the manual with the manual's identity."""
 
-    def setUp(self):
-        self.server = start("doga")
-        self.addCleanup(self.server.stop)
-        self.url = self.server.url
+    COMMAND = (*SERVER, "doga")
 
     def test_is_identified(self):
         outcome = spindle("identify", self.url)
@@ -86,15 +73,15 @@ class DogaTool(support.PeerTest):
         changed = writes["preset.2.target-torque"]
         self.assertEqual((changed["old"], changed["new"], changed["result"]), (2.02, 3.1, "written"))
         self.assertEqual(writes["preset.2.speed"]["result"], "unchanged")
-        self.assertEqual(stored(self.server, 17), 310)
-        self.assertEqual(stored(self.server, 23), 208)
+        self.assertEqual(self.server.stored(17), 310)
+        self.assertEqual(self.server.stored(23), 208)
 
     def test_refuses_what_the_server_does_not_allow(self):
         outcome = spindle("set", self.url, "--profile", "doga-bm", "preset.2.speed=900",
                           "preset.2.target-torque=20.01")
         error = self.assert_error(outcome, 2, name="preset.2.target-torque")
         self.assertIn("2017", error["message"])
-        self.assertEqual((stored(self.server, 17), stored(self.server, 23)), (202, 208))
+        self.assertEqual((self.server.stored(17), self.server.stored(23)), (202, 208))
 
     def test_pings(self):
         outcome = spindle("ping", self.url, "-c", "5", "--interval", "1ms")
@@ -120,13 +107,10 @@ class DogaTool(support.PeerTest):
         self.assert_error(outcome, 6, exception=2)
 
 
-class StockServer(support.PeerTest):
+class StockServer(support.ServedTest):
     """pymodbus as it answers FC 17 by itself: not a tool of ours."""
 
-    def setUp(self):
-        self.server = start("stock")
-        self.addCleanup(self.server.stop)
-        self.url = self.server.url
+    COMMAND = (*SERVER, "stock")
 
     def test_is_nobody_we_know(self):
         outcome = spindle("identify", self.url)
@@ -149,7 +133,7 @@ class StockServer(support.PeerTest):
     def test_nothing_is_written(self):
         outcome = spindle("set", self.url, "--profile", "doga-bm", "preset.1.target-torque=1.50")
         self.assert_error(outcome, 8)
-        self.assertEqual(stored(self.server, 2), 102)
+        self.assertEqual(self.server.stored(2), 102)
 
 
 if __name__ == "__main__":

@@ -1,18 +1,15 @@
 """Other people's programs on serial lines: spindle against pymodbus's RTU server behind socat, mbpoll
 against our simulated line, and Wireshark's dissector over what went over it."""
 
-import importlib.util
 import re
-import subprocess
 import time
 import unittest
 
 import support
-from support import HERE, PROGRAMS, spindle
+from support import HERE, PROGRAMS, Process, spindle
 
 support.need_program("socat", "mbpoll", "tshark", "text2pcap")
-for module in ("pymodbus", "serial", "serial_asyncio"):
-    support.need(f"python3-{module.replace('_', '-')}", importlib.util.find_spec(module))
+support.need_module("pymodbus", "serial", "serial_asyncio")
 
 import tshark_test  # noqa: E402  needs what was just asked for
 
@@ -25,23 +22,6 @@ def wait_for(condition, what):
         if time.monotonic() > end:
             raise RuntimeError(f"waited in vain: {what}")
         time.sleep(0.01)
-
-
-class Process:
-    """A program that is stopped by its own pid."""
-
-    def __init__(self, *command):
-        self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE,
-                                        stderr=subprocess.DEVNULL, text=True)
-
-    def first_line(self):
-        return self.process.stdout.readline().strip()
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-            self.process.wait(support.PATIENCE)
-        self.process.stdout.close()
 
 
 class Pymodbus(support.PeerTest):
@@ -123,17 +103,13 @@ class Mbpoll(support.PeerTest):
         return line
 
     def mbpoll(self, line, *arguments, values=()):
-        return support.run("mbpoll", "-m", "rtu", "-a", "2", "-b", "9600", "-P", "none", "-0", "-1", "-q",
-                           "-t", "4", *arguments, line.path, *values)
-
-    def registers(self, outcome):
-        return {int(at): int(value) for at, value in re.findall(r"\[(\d+)\]:\s+(\d+)", outcome.out)}
+        return support.mbpoll("rtu", "-a", "2", "-b", "9600", "-P", "none", "-t", "4", *arguments, line.path, *values)
 
     def test_reads_and_writes_a_line_without_gaps(self):
         line = self.start("--units", "3", "--no-gap")
         outcome = self.mbpoll(line, "-r", "100", "-c", "4")
         self.assert_ends(outcome, 0)
-        self.assertEqual(self.registers(outcome), {100: 100, 101: 101, 102: 102, 103: 103})
+        self.assertEqual(support.registers(outcome), {100: 100, 101: 101, 102: 102, 103: 103})
         self.assert_ends(self.mbpoll(line, "-r", "1157", values=["1000"]), 0)
         self.assert_ends(self.mbpoll(line, "-r", "1160", values=["7", "8", "9"]), 0)
         seen = spindle("get", f"{line.url}?unit=2", "--profile", DRIVE, "@holding:1157", "@holding:1161")

@@ -1,8 +1,10 @@
 """What the peer tests share: running spindle, servers on free ports, and a recording proxy."""
 
+import importlib.util
 import json
 import os
 import pathlib
+import re
 import select
 import shutil
 import socket
@@ -45,6 +47,11 @@ def need_program(*names):
         need(name, shutil.which(name))
 
 
+def need_module(*names):
+    for name in names:
+        need(f"python3-{name.replace('_', '-')}", importlib.util.find_spec(name))
+
+
 class Outcome:
     """What one run of a program gave."""
 
@@ -83,23 +90,20 @@ def spindle(*arguments):
     return run(SPINDLE, "--json", *arguments)
 
 
-class Server:
-    """A program that prints where it listens (a port, or a URL that ends in one) and serves until
-    it is stopped."""
+class Process:
+    """A program that runs until it is stopped, by its own pid."""
 
-    def __init__(self, *command):
-        self.process = subprocess.Popen(
-            [str(word) for word in command], stdout=subprocess.PIPE, text=True)
-        line = self.process.stdout.readline().strip()
-        if not line:
-            raise RuntimeError(f"{command[0]} does not say where it listens")
-        self.port = int(line.rpartition(":")[2])
-        self.url = f"tcp://127.0.0.1:{self.port}"
+    def __init__(self, *command, errors=None):
+        self._process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL,
+                                         stdout=subprocess.PIPE, stderr=errors, text=True)
+
+    def first_line(self):
+        return self._process.stdout.readline().strip()
 
     def stop(self):
-        self.process.terminate()
-        self.process.wait(PATIENCE)
-        self.process.stdout.close()
+        self._process.terminate()
+        self._process.wait(PATIENCE)
+        self._process.stdout.close()
 
     def __enter__(self):
         return self
@@ -108,8 +112,35 @@ class Server:
         self.stop()
 
 
-def simulator(*options):
-    return Server(SPINDLE, "simulate", "doga-bm", "--quiet", *options)
+class Server(Process):
+    """A program that prints where it listens: a port, or a URL that ends in one."""
+
+    def __init__(self, *command):
+        super().__init__(*command)
+        line = self.first_line()
+        if not line:
+            raise RuntimeError(f"{command[0]} does not say where it listens")
+        self.port = int(line.rpartition(":")[2])
+        self.url = f"tcp://127.0.0.1:{self.port}"
+
+    def stored(self, address):
+        """What it holds, read without spindle."""
+        answer = modbus_request(self.port, struct.pack(">BHH", 3, address, 1))
+        return struct.unpack(">BBH", answer)[2]
+
+
+SIMULATOR = (SPINDLE, "simulate", "doga-bm", "--quiet")
+
+
+def mbpoll(mode, *arguments):
+    """Addresses from 0, once, without its banner."""
+    return run("mbpoll", "-m", mode, "-0", "-1", "-q", *arguments)
+
+
+def registers(polled):
+    """Of lines such as '[2]: \\t271' or '[2]: \\t65535 (-1)'."""
+    return {int(address): int(value)
+            for address, value in re.findall(r"\[(\d+)\]:\s+(\d+)", polled.out)}
 
 
 class Recorder:
@@ -186,3 +217,14 @@ class PeerTest(unittest.TestCase):
         for key, value in members.items():
             self.assertEqual(errors[0].get(key), value, f"{key} in {errors[0]}")
         return errors[0]
+
+
+class ServedTest(PeerTest):
+    """Each test has a server of its own, which COMMAND starts."""
+
+    COMMAND = SIMULATOR
+
+    def setUp(self):
+        self.server = Server(*self.COMMAND)
+        self.addCleanup(self.server.stop)
+        self.url = self.server.url

@@ -136,7 +136,7 @@ class Tcp(support.PeerTest):
 
     @classmethod
     def setUpClass(cls):
-        with support.simulator() as tool:
+        with support.Server(*support.SIMULATOR) as tool:
             cls.dialogues = {name: Dialogue(tool, command, arguments)
                              for name, (command, arguments, _) in SCENARIOS.items()}
             cls.refused = Dialogue(tool, ["get"], ["@holding:564"])

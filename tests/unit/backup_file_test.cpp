@@ -184,6 +184,11 @@ TEST_CASE("values may be edited where value and raw agree, or one of them is lef
   }
 }
 
+TEST_CASE("the identity's bytes may stand further apart, or be none") {
+  CHECK(fault_after("raw: \"00 A5\"", "raw: \" 00   A5 \"") == "nothing");
+  CHECK(fault_after("raw: \"00 A5\"", "raw: \"\"") == "nothing");
+}
+
 TEST_CASE("a value outside the profile's labels is what the tool held, not a fault") {
   CHECK(fault_after("raw: 0, value: \"TC/AM\"", "raw: 9, value: 9") == "nothing");
 }

@@ -33,20 +33,18 @@ struct Bench {
   }
 
   Context context() {
-    return {.io = io,
-            .clock = clock,
-            .interrupt = interrupt,
-            .open = open,
-            .calm = calm,
-            .serve = serve,
-            .end_waits = end_waits,
-            .disk = disk,
-            .state_folder = state_folder,
-            .version = "1.2.3",
-            .profiles = profiles,
-            .tools = tools,
-            .renderer = *renderer,
-            .common = common};
+    return {{.clock = clock, .interrupt = interrupt, .open = open},
+            {.io = io,
+             .calm = calm,
+             .serve = serve,
+             .end_waits = end_waits,
+             .disk = disk,
+             .state_folder = state_folder,
+             .version = "1.2.3",
+             .profiles = profiles,
+             .tools = tools,
+             .common = common},
+            {.renderer = *renderer}};
   }
 
   Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& endpoint) {

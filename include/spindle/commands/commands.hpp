@@ -7,6 +7,7 @@
 
 #include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
+#include "spindle/sim/bm_tool.hpp"
 
 /// One options struct and one function a verb. None of them prints, exits or parses a command line.
 namespace spindle::commands {
@@ -155,22 +156,21 @@ struct RestoreOptions {
 };
 Result<Outcome> restore(const RestoreOptions& options, Context& context);
 
+/// What may be chosen of a simulated tool.
+struct SimulatedToolOptions {
+  sim::BmOptions bm = {};
+  std::vector<modbus::UnitId> units = {};       ///< of a serial tool; none: as many as usual
+  std::optional<unsigned> baud = std::nullopt;  ///< of its line; empty: the profile's
+};
+
 struct SimulateOptions {
   std::string profile;
-  std::string listen;                 ///< URL; empty: a free port of this computer
-  std::string pty;                    ///< path of the pseudo terminal to make instead
-  std::vector<modbus::UnitId> units;  ///< of a serial tool; none: as many as usual
-  std::optional<unsigned> baud;       ///< of its line
+  std::string listen;  ///< URL; empty: a free port of this computer
+  std::string pty;     ///< path of the pseudo terminal to make instead
+  SimulatedToolOptions tool;
   sim::LineModel::Gaps gaps = sim::LineModel::Gaps::enforced;
-  std::vector<std::string> faults;
-  std::optional<unsigned> identity_bytes;
-  std::optional<std::uint16_t> firmware;
-  std::optional<std::uint32_t> serial;
-  std::optional<std::uint16_t> model;
-  std::optional<Duration> rundown_every;  ///< an operator's; empty: nobody works with the tool
-  std::optional<unsigned> ng_every;       ///< every so many of them end NG
-  std::optional<unsigned> burst;          ///< results that each of them brings, all at once
-  std::vector<std::string> outages;       ///< KIND=TIME@every:TIME
+  std::vector<std::string> faults;   ///< of the tool and of its line
+  std::vector<std::string> outages;  ///< KIND=TIME@every:TIME
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
 

@@ -51,12 +51,16 @@ struct Calm {
   std::function<void()> stay_awake = {};
 };
 
-/// Everything a command may touch.
-struct Context {
-  report::Streams& io;
+/// The part of a context that signals end.
+struct Waiting {
   Clock& clock;
   const Interrupt& interrupt;
   const device::OpenTransport& open;  ///< real lines; simulated tools are opened by commands
+};
+
+/// The part of a context that signals leave alone.
+struct Surroundings {
+  report::Streams& io;
   const Calm& calm;
   const sim::Serve& serve;
   const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
@@ -65,9 +69,16 @@ struct Context {
   std::string_view version;         ///< of spindle
   const files::ProfileStore& profiles;
   const files::Tools& tools;
-  report::Renderer& renderer;
   CommonOptions common;
 };
+
+/// The part of a context that differs from one tool of a group to the next.
+struct Telling {
+  report::Renderer& renderer;
+};
+
+/// Everything a command may touch.
+struct Context : Waiting, Surroundings, Telling {};
 
 /// The same context with a clock and lines that signals do not end.
 Context calm_context(const Context& context);

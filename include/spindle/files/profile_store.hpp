@@ -56,8 +56,6 @@ class ProfileStore {
   [[nodiscard]] std::vector<ProfileEntry> list() const;
 
  private:
-  [[nodiscard]] Result<std::string> locate(std::string_view name_or_file) const;
-
   std::vector<std::string> folders_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -25,6 +26,12 @@ enum class Tone : std::uint8_t { plain, good, bad };
 
 /// One fact of a record: null, number, text, truth, words, texts, or an object of texts.
 using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Texts, Pairs>;
+
+/// Null where the text is empty.
+Cell text_or_null(std::string text);
+Cell number(std::int64_t value);
+/// How many things there are, or which of them.
+Cell count(std::size_t things);
 
 struct Field {
   std::string key;  ///< snake_case, as in the contract's table of record types
