@@ -6,6 +6,7 @@
 #include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 
@@ -256,8 +257,9 @@ Result<Readiness<std::vector<Deed>>> agree_to_reset(const std::vector<Target>& t
 }
 
 std::string sentence_of(std::size_t present, std::size_t failed, std::size_t of) {
-  const std::string found = present == 0 ? std::string("no alarm present")
-                                         : fmt::format("alarms on {} of {} tools", present, of);
+  const std::string found = present == 0
+                                ? std::string("no alarm present")
+                                : fmt::format("alarms on {} of {}", present, counted(of, "tool"));
   return found + failed_in_words(failed, of);
 }
 
@@ -303,7 +305,8 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, Reach::one, context);
   if (!targets) return tl::unexpected(targets.error());
-  if (targets->size() > 1) return examine_group(*targets, options, context);
+  const bool asks = options.reset == AlarmReset::yes && asks_as_group(options.target, Reach::one);
+  if (asks || targets->size() > 1) return examine_group(*targets, options, context);
   return examine(targets->front(), options, Asked::no, context).map([](const Findings& findings) {
     return findings.outcome;
   });

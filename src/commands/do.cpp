@@ -138,7 +138,7 @@ Result<Outcome> list_for_group(const std::vector<Target>& targets, const DoOptio
                 [](const Target& target, Context& own) { return list_actions(target, own); });
   const Outcome outcome = outcome_of_all(performances);
   Summary summary = listed(outcome, {});
-  summary.sentence += fmt::format(" of {} tools", targets.size());
+  summary.sentence += " of " + counted(targets.size(), "tool");
   return play(performances, context)
       .and_then([&] { return tell(std::move(summary), outcome, context); })
       .map([&] { return outcome; });
@@ -169,7 +169,7 @@ Result<Outcome> perform_on_group(const std::vector<Target>& targets, const DoOpt
   Outcome outcome = outcome_of_all(performances);
   outcome.add(ready->lost);
   Summary summary = summary_of(outcome, Reach::one, {});
-  summary.sentence += fmt::format(" on {} tools", targets.size());
+  summary.sentence += " on " + counted(targets.size(), "tool");
   return play(performances, context)
       .and_then([&] { return tell(std::move(summary), outcome, context); })
       .map([&] { return outcome; });
@@ -180,13 +180,13 @@ Result<Outcome> perform_on_group(const std::vector<Target>& targets, const DoOpt
 Result<Outcome> perform(const DoOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, options.reach, context);
   if (!targets) return tl::unexpected(targets.error());
-  const bool alone = targets->size() == 1;
   if (options.actions.empty()) {
-    return alone ? list_actions(targets->front(), context)
-                 : list_for_group(*targets, options, context);
+    return targets->size() == 1 ? list_actions(targets->front(), context)
+                                : list_for_group(*targets, options, context);
   }
-  return alone ? perform_on_one(targets->front(), options, context)
-               : perform_on_group(*targets, options, context);
+  return asks_as_group(options.target, options.reach)
+             ? perform_on_group(*targets, options, context)
+             : perform_on_one(targets->front(), options, context);
 }
 
 }  // namespace spindle::commands

@@ -2,6 +2,8 @@
 
 #include <fmt/ranges.h>
 
+#include "spindle/base/text.hpp"
+
 namespace spindle::commands {
 
 Result<std::vector<Target>> resolve_one_or_group(const std::string& text, Reach reach,
@@ -20,13 +22,17 @@ Result<std::vector<Target>> resolve_one_or_group(const std::string& text, Reach 
   return targets;
 }
 
+bool asks_as_group(const std::string& text, Reach reach) {
+  return text.starts_with('@') && reach == Reach::one;
+}
+
 std::string tools_in_words(const std::vector<std::string>& names, std::size_t of) {
-  const std::string all = names.size() == of ? "" : fmt::format("of {} ", of);
-  return fmt::format("{} {}tools ({})", names.size(), all, fmt::join(names, ", "));
+  const std::string some = names.size() == of ? "" : fmt::format("{} of ", names.size());
+  return fmt::format("{}{} ({})", some, counted(of, "tool"), fmt::join(names, ", "));
 }
 
 std::string failed_in_words(std::size_t failed, std::size_t of) {
-  return failed == 0 ? "" : fmt::format("; {} of {} tools failed", failed, of);
+  return failed == 0 ? "" : fmt::format("; {} of {} failed", failed, counted(of, "tool"));
 }
 
 Error of_tool(const Target& target, Error error) {
@@ -53,8 +59,8 @@ bool refuses_all(const Error& error) {
 
 Result<Outcome> refuse_all(const Outcome& refused, Summary summary, std::size_t of,
                            Context& context) {
-  summary.sentence =
-      fmt::format("nothing was done: this does not fit {} of {} tools", refused.failed(), of);
+  summary.sentence = fmt::format("nothing was done: this does not fit {} of {}", refused.failed(),
+                                 counted(of, "tool"));
   return tell(std::move(summary), refused, context).map([&] { return refused; });
 }
 

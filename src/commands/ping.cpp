@@ -8,6 +8,7 @@
 #include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 
@@ -156,22 +157,22 @@ Statistics ping_member(const Target& target, const PingOptions& options, Stage& 
 Result<Outcome> ping_group(const std::vector<Target>& targets, const PingOptions& options,
                            Context& context) {
   Stage stage(group_columns, context);
-  const auto counted = side_by_side(targets, options.jobs, [&](const Target& target) {
+  const auto parts = side_by_side(targets, options.jobs, [&](const Target& target) {
     return ping_member(target, options, stage, context);
   });
   if (auto ended = stage.listing().end(); !ended) return tl::unexpected(std::move(ended.error()));
   Statistics all;
   for (std::size_t index = 0; index < targets.size(); ++index) {
     const std::string& name = targets[index].shown;
-    Summary summary = summary_of(counted[index], name);
+    Summary summary = summary_of(parts[index], name);
     summary.sentence = fmt::format("{}: {}", name, summary.sentence);
-    if (auto told = tell(std::move(summary), counted[index].outcome, context); !told) {
+    if (auto told = tell(std::move(summary), parts[index].outcome, context); !told) {
       return tl::unexpected(std::move(told.error()));
     }
-    all.add(counted[index]);
+    all.add(parts[index]);
   }
   Summary summary = summary_of(all, {});
-  summary.sentence = fmt::format("{} tools: {}", targets.size(), summary.sentence);
+  summary.sentence = fmt::format("{}: {}", counted(targets.size(), "tool"), summary.sentence);
   return tell(std::move(summary), all.outcome, context).map([&] { return all.outcome; });
 }
 

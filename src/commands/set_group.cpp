@@ -103,7 +103,7 @@ Result<Outcome> end_dry_run(const Ready& ready, std::size_t of, Context& context
     }
   }
   Summary summary = plan_summary(counts_of(ready), {});
-  summary.sentence += fmt::format(" on {} tools{}; nothing was written (dry run)", of,
+  summary.sentence += fmt::format(" on {}{}; nothing was written (dry run)", counted(of, "tool"),
                                   failed_in_words(ready.lost.failed(), of));
   return tell(std::move(summary), outcome, context).map([&] { return outcome; });
 }
@@ -211,7 +211,7 @@ Result<Outcome> write_all(const Ready& ready, const SetOptions& options, std::si
     if (!result || result->outcome.failed() > 0) ++failed;
   }
   Summary summary = set_summary(counts, {});
-  summary.sentence += fmt::format(" on {} tools{}", of, failed_in_words(failed, of));
+  summary.sentence += fmt::format(" on {}{}", counted(of, "tool"), failed_in_words(failed, of));
   return play(performances, context)
       .and_then([&] { return tell(std::move(summary), outcome, context); })
       .map([&] { return outcome; });
