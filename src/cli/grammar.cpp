@@ -140,7 +140,7 @@ void add_common_options(CLI::App& app, Typed& typed) {
   option(&app, "--retries", typed.retries, "N", "how often a read without an answer is repeated");
   flag(&app, "-y,--yes", typed.yes, "answer every question with yes");
   flag(&app, "--no-input", typed.no_input, "never ask; what would have to be asked is refused");
-  flag(&app, "-q,--quiet", typed.quiet, "no summary and no notes on stderr");
+  flag(&app, "-q,--quiet", typed.quiet, "no summary, notes and progress on stderr");
   flag(&app, "-v,--verbose", typed.verbose, "every frame and decision on stderr");
   option(&app, "--trace", typed.trace, "FILE", "every frame into a pcapng file for Wireshark");
   option(&app, "--color", typed.color, "WHEN", "auto, always or never");
@@ -987,6 +987,7 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   if (typed.yes) common.consent = commands::Consent::given;
   common.trace_file = typed.trace;
   if (typed.verbose) common.verbosity = commands::Verbosity::frames;
+  if (typed.quiet || typed.verbose) common.progress = report::Showing::unwanted;
   return {};
 }
 

@@ -117,7 +117,7 @@ class RemoteRun {
     const device::FollowOptions following = limit_run();
     auto followed = guard.start().and_then([&] { return follower.follow(following); });
     const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    guarded_.clear_state();  // not before the stop: a terminal may keep its writer waiting
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);

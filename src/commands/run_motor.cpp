@@ -177,7 +177,7 @@ class MotorRun {
       return device::follow_motor(tool_->device, plan_->motor, stopper_, following, news_);
     });
     const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    guarded_.clear_state();  // not before the stop: a terminal may keep its writer waiting
     note_stop(stop);
     restore_watchdog(stop);
     return report(followed, stop);

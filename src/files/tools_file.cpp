@@ -29,8 +29,8 @@ bool is_tool_name(std::string_view text) {
 void check_name(const YamlEntry& entry, Findings& findings) {
   if (is_tool_name(entry.key)) return;
   findings.add(entry.key_at,
-               fmt::format("name '{}' is not made of letters, digits, '_', '.' and '-', beginning "
-                           "with a letter or digit",
+               fmt::format("name '{}' is not made of the letters a to z and A to Z, digits, '_', "
+                           "'.' and '-', beginning with a letter or digit",
                            entry.key));
 }
 
