@@ -43,7 +43,7 @@ std::string path_of(const Target& target, const BackupOptions& options) {
 Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOptions& options,
                           const Context& context) {
   if (!options.file.empty() && !options.folder.empty()) {
-    return tl::unexpected(bad_request("--file and --dir exclude each other"));
+    return tl::unexpected(bad_request("--file and --dir exclude each other", "give one of them"));
   }
   if (!options.file.empty() && targets.size() > 1) {
     return tl::unexpected(
@@ -57,7 +57,8 @@ Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOption
     const auto [owner, is_new] = owners.emplace(path, target.shown);
     if (!is_new) {
       return tl::unexpected(bad_request(fmt::format("'{}' and '{}' would both be written to {}",
-                                                    owner->second, target.shown, path)));
+                                                    owner->second, target.shown, path),
+                                        "back them up one by one, each into a --file of its own"));
     }
     const bool taken = path != standard_output && context.disk.exists(path);
     if (taken && options.overwrite == Overwrite::refuse) {

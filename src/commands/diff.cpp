@@ -176,8 +176,9 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
 
 Result<Outcome> diff(const DiffOptions& options, Context& context) {
   if (options.a == defaults && options.b == defaults) {
-    return tl::unexpected(
-        Error{.code = Errc::usage, .message = "one side must be a tool or a backup"});
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "one side must be a tool or a backup",
+                                .hint = "write for example 'spindle diff station3 defaults'"});
   }
   const auto a = understand(options.a, context);
   if (!a) return tl::unexpected(a.error());

@@ -36,6 +36,7 @@ Result<RunPlan> plan_run(const RemoteStartOptions& options, const Profile& profi
   if (!profile.events || start->confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "a run of this product can not be followed",
+                                .hint = "its profile lacks 'events', or 'confirm' of its start",
                                 .name = profile.id});
   }
   auto alarm_reset = profile.find_action("alarm-reset");

@@ -126,8 +126,10 @@ Result<Tools> read_tools_file(const std::string& path, Findings& findings) {
 Result<Tools> load_tools(const std::string& path) {
   Findings findings;
   auto tools = read_tools_file(path, findings);
-  if (tools && !findings.empty()) return tl::unexpected(findings.error());
-  return tools;
+  if (!tools || findings.empty()) return tools;
+  Error error = findings.error();
+  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
+  return tl::unexpected(std::move(error));
 }
 
 Result<CheckedTools> check_tools(const std::string& path) {

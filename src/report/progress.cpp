@@ -125,7 +125,7 @@ std::size_t Progress::room() const {
 }
 
 bool Progress::is_due() const {
-  return !drawn_at_ || clock_->now() - *drawn_at_ >= shortest_between_drawings;
+  return !is_drawn_ || clock_->now() - drawn_at_ >= shortest_between_drawings;
 }
 
 void Progress::draw(std::string_view text) {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -40,7 +39,8 @@ class Progress {
 
   /// "station3: reading 312 of 725, 540/s, 1 s left". Rate and remaining time are left out while
   /// they would be guesses: in the first second, and before all that went on side by side came to
-  /// an end twice. Drawn at most ten times a second, but always at the beginning and at the end.
+  /// an end twice. Drawn at most ten times a second, but always at the beginning, at the end, and
+  /// where something else took the line away.
   void advance(const Step& step);
 
   /// A state, in words: at once.
@@ -73,7 +73,7 @@ class Progress {
   std::function<void(std::string_view)> err_ = {};
   std::mutex mutex_ = {};
   Work work_ = {};
-  std::optional<TimePoint> drawn_at_ = std::nullopt;
+  TimePoint drawn_at_ = {};
   bool is_drawn_ = false;
 };
 
