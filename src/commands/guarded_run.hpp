@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "listing.hpp"
+#include "progress.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
 
@@ -32,9 +33,10 @@ class GuardedRun {
   /// Error `closed_pipe` when nobody reads the output any more.
   Result<void> check_reader() const;
 
-  /// The one line on a terminal that changes while something goes on.
-  void show_state(std::string_view text);
+  /// On a terminal, while something goes on.
   void show_running(Duration elapsed, std::string_view more = {});
+
+  void clear_state() { progress_.clear(); }
 
   /// Remembers an error for the end; it also makes the outcome.
   void fail(const Error& error);
@@ -55,6 +57,7 @@ class GuardedRun {
 
   OpenTool* tool_;
   Context* context_;
+  ProgressLine progress_;
   Context calm_context_;  ///< lines that are opened on it refer to it
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};

@@ -36,6 +36,7 @@ Result<RunPlan> plan_run(const RemoteStartOptions& options, const Profile& profi
   if (!profile.events || start->confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "a run of this product can not be followed",
+                                .hint = "its profile lacks 'events', or 'confirm' of its start",
                                 .name = profile.id});
   }
   auto alarm_reset = profile.find_action("alarm-reset");
@@ -117,7 +118,7 @@ class RemoteRun {
     const device::FollowOptions following = limit_run();
     auto followed = guard.start().and_then([&] { return follower.follow(following); });
     const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    guarded_.clear_state();  // not before the stop: a terminal may keep its writer waiting
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);

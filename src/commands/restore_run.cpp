@@ -112,7 +112,6 @@ Result<Outcome> RestoreRun::run() {
   listing_.emplace(*context_, restore_columns());
   write_all();
   if (errors_.empty()) verify();
-  progress_.clear();
   return end();
 }
 
@@ -149,8 +148,8 @@ void RestoreRun::write_all() {
       fail(done.error());
     }
     if (!errors_.empty()) return roll_back();
-    progress_.show(
-        fmt::format("{}: written, {} of {}", tool_->target.shown, ++written_, writes.size()));
+    progress_.advance(
+        {.what = tool_->target.shown + ": writing", .done = ++written_, .total = writes.size()});
   }
 }
 
@@ -192,10 +191,8 @@ void RestoreRun::verify() {
 
 /// A tool may change one parameter when another one is written, so everything is read once more.
 void RestoreRun::compare_everything() {
-  const auto now =
-      take_snapshot(*tool_, Secrets::include, *context_, [&](std::size_t done, std::size_t total) {
-        progress_.show(fmt::format("{}: verifying, {} of {}", tool_->target.shown, done, total));
-      });
+  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
+                                 progress_.counter(tool_->target.shown + ": verifying"));
   if (!now) {
     fail(now.error());
     return roll_back();
@@ -249,7 +246,6 @@ void RestoreRun::roll_back() {
   if (!complete) outcome_ = {};  // what the tool holds matters more than why it came to that
   for (const device::PutBackReport& report : reports) report_put_back(report);
   if (complete) check_rolled_back(rollback);
-  progress_.clear();
 }
 
 void RestoreRun::report_put_back(const device::PutBackReport& report) {

@@ -81,7 +81,7 @@ Result<void> add_setting(std::string_view option, const std::string& pattern, st
 
 Result<void> plan_watchdog(Duration wanted, MotorPlan& plan) {
   if (!plan.watchdog_parameter) {
-    return tl::unexpected(bad_option("--watchdog", "this product has none"));
+    return tl::unexpected(bad_option("--watchdog", "this product has none", "leave it out"));
   }
   if (wanted < shortest_watchdog) {
     return tl::unexpected(bad_option(
@@ -110,9 +110,9 @@ Result<MotorPlan> plan_run(const RemoteStartOptions& options, const Profile& pro
                  .watchdog_parameter = std::nullopt,
                  .watchdog = std::nullopt};
   if (plan.operation < run.first || plan.operation > run.last) {
-    return tl::unexpected(bad_option(
-        "--operation",
-        fmt::format("{} is not a number from {} to {}", plan.operation, run.first, run.last)));
+    return tl::unexpected(
+        bad_option("--operation", fmt::format("{} does not fit", plan.operation),
+                   fmt::format("it takes a number from {} to {}", run.first, run.last)));
   }
   if (auto watchdog = profile.find(run.watchdog)) plan.watchdog_parameter = std::move(*watchdog);
   auto planned = add_setting("--speed", run.speed, options.speed, profile, plan)
@@ -177,7 +177,7 @@ class MotorRun {
       return device::follow_motor(tool_->device, plan_->motor, stopper_, following, news_);
     });
     const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    guarded_.clear_state();  // not before the stop: a terminal may keep its writer waiting
     note_stop(stop);
     restore_watchdog(stop);
     return report(followed, stop);

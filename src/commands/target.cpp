@@ -257,7 +257,9 @@ Result<Target> resolve_target(const std::string& text, const Context& context) {
 
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context) {
   if (target.profile.empty()) return catalogue::Profile();
-  return context.profiles.load(target.profile);
+  auto profile = context.profiles.load(target.profile);
+  if (!profile) profile.error().asked_of = target.shown;
+  return profile;
 }
 
 /// Unit 0 on a serial line is everybody, and nobody answers.

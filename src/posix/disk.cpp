@@ -43,7 +43,10 @@ Error exists_already(const std::string& path) {
 }
 
 Error not_a_file(const std::string& path) {
-  return {.code = Errc::bad_file, .message = "this is no ordinary file", .name = path};
+  return {.code = Errc::bad_file,
+          .message = "this is no ordinary file",
+          .hint = "choose another path",
+          .name = path};
 }
 
 /// 0, or the errno of the write that failed.
@@ -62,9 +65,11 @@ int write_all(int descriptor, std::string_view text) {
 Result<std::string> read_file(const std::string& path) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file.valid()) {
-    return tl::unexpected(
-        errno == ENOENT ? Error{.code = Errc::bad_file, .message = "no such file", .name = path}
-                        : failed(path, "cannot be read", errno));
+    return tl::unexpected(errno == ENOENT ? Error{.code = Errc::bad_file,
+                                                  .message = "no such file",
+                                                  .hint = "check the path",
+                                                  .name = path}
+                                          : failed(path, "cannot be read", errno));
   }
   struct stat about = {};
   if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) {

@@ -11,6 +11,8 @@ import fcntl
 import json
 import os
 import pathlib
+import pty
+import select
 import selectors
 import shutil
 import signal
@@ -18,6 +20,7 @@ import socket
 import struct
 import subprocess
 import tempfile
+import termios
 import threading
 import time
 
@@ -229,6 +232,26 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
             stream.seek(0)
             texts.append(stream.read().decode("utf-8", "backslashreplace"))
     return Finished(arguments, status, *texts, seconds)
+
+
+def run_on_terminal(*arguments, columns=120, environment=None, timeout=DEADLINE):
+    """Runs spindle on a terminal of its own to its end; standard output is all that the terminal got."""
+    arguments = [str(argument) for argument in arguments]
+    began = time.monotonic()
+    pid, terminal = pty.fork()
+    if pid == 0:
+        fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        os.chdir(home().path)
+        os.execve(binary(), [binary(), *arguments], home().environment(**{"TERM": "xterm", **(environment or {})}))
+    shown = b""
+    with contextlib.suppress(OSError):  # the end of the terminal
+        while select.select([terminal], [], [], max(0.0, began + timeout - time.monotonic()))[0]:
+            shown += os.read(terminal, 65536)
+        os.kill(pid, signal.SIGKILL)
+    _, status = os.waitpid(pid, 0)
+    os.close(terminal)
+    seconds = time.monotonic() - began
+    return Finished(arguments, os.waitstatus_to_exitcode(status), shown.decode(), "", seconds)
 
 
 @contextlib.contextmanager
