@@ -19,6 +19,7 @@ namespace spindle::commands {
 namespace {
 
 using catalogue::Action;
+using catalogue::EventKind;
 using catalogue::Profile;
 using device::RunEnding;
 
@@ -86,11 +87,15 @@ Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
 }
 
 /// A result in the words of the table.
-std::string_view words_of(std::string_view kind) {
-  if (kind == "fastening-ok") return "OK";
-  if (kind == "fastening-ng") return "NG";
-  if (kind == "error") return "error";
-  return kind.empty() ? "no result" : "ended without OK or NG";
+std::string_view words_of(std::optional<EventKind> kind) {
+  if (kind == EventKind::fastening_ok) return "OK";
+  if (kind == EventKind::fastening_ng) return "NG";
+  if (kind == EventKind::error) return "error";
+  return kind ? "ended without OK or NG" : "no result";
+}
+
+std::string to_text(std::optional<EventKind> kind) {
+  return kind ? std::string(catalogue::to_text(*kind)) : std::string();
 }
 
 /// One remote start: what is told of it, and how it ended.
@@ -170,33 +175,34 @@ class RemoteRun {
     const NewsRecords records(tool_->target, *tool_->profile,
                               tables.value_or(catalogue::CodeTables()));
     Listing listing(*context_, news_columns(Tools::one));
-    std::string kind;
+    std::optional<EventKind> kind;
     if (event) {
       kind = records.kind_of(event->block);
       listing.add(records.event(*event));
     }
     log_run(followed, kind, stop);
     judge(followed, kind);
-    return guarded_.end(listing, stop,
-                        {.result = kind, .subject = fmt::format("{}; the tool", words_of(kind))});
+    return guarded_.end(
+        listing, stop,
+        {.result = to_text(kind), .subject = fmt::format("{}; the tool", words_of(kind))});
   }
 
-  void log_run(const Result<device::FollowedRun>& followed, const std::string& kind,
+  void log_run(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind,
                const device::StopReport& stop) {
     const bool refused = !followed && followed.error().code == Errc::exception_response;
-    const std::string result = kind.empty() && refused ? "refused" : kind;
+    const std::string result = !kind && refused ? "refused" : to_text(kind);
     log_.add({.name = plan_->start.name,
               .register_address = plan_->start.address.value,
               .new_value = Decimal(*plan_->start.value),
               .result = log_word(result, stop)});
   }
 
-  void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
+  void judge(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind) {
     if (!followed) {
       guarded_.fail_following(followed.error());
       return;
     }
-    if (followed->ending == RunEnding::ignored && kind.empty()) {
+    if (followed->ending == RunEnding::ignored && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::mismatch,
                                 .message = "the tool acknowledged the start, but does not run",
@@ -204,7 +210,7 @@ class RemoteRun {
                                 .name = plan_->start.name}));
       return;
     }
-    if (followed->ending == RunEnding::ended && kind.empty()) {
+    if (followed->ending == RunEnding::ended && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::no_answer,
                                 .message = "the tool ran, but never sent a result",
@@ -212,7 +218,7 @@ class RemoteRun {
       return;
     }
     guarded_.outcome().succeed();
-    if (kind == "fastening-ng" || kind == "error") guarded_.outcome().negate();
+    if (kind == EventKind::fastening_ng || kind == EventKind::error) guarded_.outcome().negate();
   }
 
   const RemoteStartOptions* options_;

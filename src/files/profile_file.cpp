@@ -192,6 +192,19 @@ void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& fin
   map.finish();
 }
 
+void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& findings) {
+  std::map<std::int64_t, std::string> names;
+  read_names(node, names, findings);
+  for (const auto& [number, name] : names) {
+    if (const auto kind = catalogue::parse_event_kind(name)) {
+      events.kinds.insert_or_assign(number, *kind);
+    } else {
+      const auto& known = catalogue::event_kind_texts;
+      findings.add_once(node->at, unknown_word("event kind", name, {known.begin(), known.end()}));
+    }
+  }
+}
+
 void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   const Need need = need_of(draft.profile.events.has_value());
@@ -203,7 +216,7 @@ void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) 
   assign(events.count, map.number<std::uint16_t>("count", need));
   assign(events.number, map.text("number", need));
   assign(events.kind, map.text("kind", need));
-  read_names(map.get("kinds"), events.kinds, findings);
+  read_kinds(map.get("kinds"), events, findings);
   map.finish();
 }
 
