@@ -40,10 +40,8 @@ std::size_t append_character(std::string& out, std::string_view text) {
   } else if (is_control(character.value)) {
     fmt::format_to(std::back_inserter(out), "\\u{:04x}",
                    static_cast<std::uint32_t>(character.value));
-  } else if (character.value == replacement_character) {
-    out += replacement_bytes;
   } else {
-    out += text.substr(0, character.length);
+    append_first(out, character, text);
   }
   return character.length;
 }
