@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "records.hpp"
 
 namespace spindle::commands {
@@ -14,14 +12,12 @@ std::string log_word(std::string_view result, const device::StopReport& stop) {
 }
 
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
-    : tool_(&tool), context_(&context), calm_context_(calm_context(context)) {}
+    : tool_(&tool), context_(&context), calm_line_(tool, context) {}
 
 device::RunGuard::Reopen GuardedRun::reopener() {
   return [this](Duration patience) {
     show_state("the link is lost; trying to stop the tool");
-    const Duration usual = context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-    calm_context_.common.connect_timeout = std::min(usual, patience);
-    return connect_device(tool_->target, *tool_->profile, calm_context_);
+    return calm_line_.connect(patience);
   };
 }
 

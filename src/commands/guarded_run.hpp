@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "calm_line.hpp"
 #include "listing.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
@@ -55,7 +56,7 @@ class GuardedRun {
 
   OpenTool* tool_;
   Context* context_;
-  Context calm_context_;  ///< lines that are opened on it refer to it
+  CalmLine calm_line_;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
 };
