@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "records.hpp"
 
 namespace spindle::commands {
@@ -9,6 +11,11 @@ namespace spindle::commands {
 std::string log_word(std::string_view result, const device::StopReport& stop) {
   if (stop.result == device::StopResult::unconfirmed) return "stop-not-confirmed";
   return std::string(result.empty() ? "no-result" : result);
+}
+
+Error not_ready(const Target& target, std::string message, std::string hint) {
+  return target.blamed(
+      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
 }
 
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)

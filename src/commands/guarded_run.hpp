@@ -21,6 +21,9 @@ struct RunEnd {
 /// result.
 std::string log_word(std::string_view result, const device::StopReport& stop);
 
+/// Why a tool was not started, or did not run to its end: an answer that is no.
+Error not_ready(const Target& target, std::string message, std::string hint);
+
 /// What every guarded run has in common, whatever runs: a line for stopping that signals do not
 /// end, the one changing line on a terminal, its errors, and what is told at its end.
 class GuardedRun {

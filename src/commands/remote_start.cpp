@@ -62,11 +62,6 @@ Result<void> ask_to_start(const RunPlan& plan, const Target& target, const Conte
   return ask_for_hazards(deeds, target, context);
 }
 
-Error not_ready(const Target& target, std::string message, std::string hint) {
-  return target.blamed(
-      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
-}
-
 /// No alarm, not running. Whether it is locked can not be read on every product.
 Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
   const auto alarm_free =
