@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calm_line.hpp"
@@ -30,14 +31,22 @@ class GuardedRun {
  public:
   GuardedRun(OpenTool& tool, Context& context);
 
-  /// A line that signals do not end, for a stop after the first one broke.
-  device::RunGuard::Reopen reopener();
+  /// Starts, follows and stops, whatever happens meanwhile: the pair of what `follow` says and how
+  /// the stop went. `limit` is asked before the start is sent; `follow` gets what it says.
+  template <typename Limit, typename Follow>
+  auto run(device::GuardedMotion motion, Limit limit, Follow follow) {
+    if (context_->calm.stay_awake) context_->calm.stay_awake();
+    device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
+    const auto limits = limit();
+    auto followed = guard.start().and_then([&] { return follow(limits); });
+    const device::StopReport stop = guard.stop();
+    show_state("");  // not before the stop: a terminal may keep its writer waiting
+    return std::pair(std::move(followed), stop);
+  }
 
   /// Error `closed_pipe` when nobody reads the output any more.
   Result<void> check_reader() const;
 
-  /// The one line on a terminal that changes while something goes on.
-  void show_state(std::string_view text);
   void show_running(Duration elapsed, std::string_view more = {});
 
   /// Remembers an error for the end; it also makes the outcome.
@@ -51,10 +60,14 @@ class GuardedRun {
   Result<Outcome> end(Listing& listing, const device::StopReport& stop, const RunEnd& run_end);
 
  private:
+  /// A line that signals do not end, for a stop after the first one broke.
+  device::RunGuard::Reopen reopener();
   /// A stop that could not be confirmed: nothing else matters as much.
   void fail(const device::StopReport& unconfirmed);
   /// Each on its own: they reach people even where nobody reads the records any more.
   Result<void> tell_errors();
+  /// The one line on a terminal that changes while something goes on.
+  void show_state(std::string_view text);
   Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
   OpenTool* tool_;

@@ -112,12 +112,9 @@ class RemoteRun {
     if (auto prepared = follower.prepare(); !prepared) {
       return tl::unexpected(std::move(prepared.error()));
     }
-    if (context_->calm.stay_awake) context_->calm.stay_awake();
-    device::RunGuard guard(tool_->device, plan_->start, guarded_.reopener(), context_->calm.clock);
-    const device::FollowOptions following = limit_run();
-    auto followed = guard.start().and_then([&] { return follower.follow(following); });
-    const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    auto [followed, stop] = guarded_.run(
+        device::motion_of(plan_->start), [this] { return limit_run(); },
+        [&](const device::FollowOptions& limits) { return follower.follow(limits); });
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);

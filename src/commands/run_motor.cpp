@@ -47,14 +47,11 @@ class MotorRun {
     if (auto ready = setup_.prepare(); !ready) return tl::unexpected(std::move(ready.error()));
     const std::uint16_t word = start_word();
     stopper_.started(word, setup_.input_mode(), setup_.stopping());
-    if (context_->calm.stay_awake) context_->calm.stay_awake();
-    device::RunGuard guard(tool_->device, motion(word), guarded_.reopener(), context_->calm.clock);
-    const device::MotorFollowOptions following = limit_run();
-    auto followed = guard.start().and_then([&] {
-      return device::follow_motor(tool_->device, plan_->motor, stopper_, following, news_);
-    });
-    const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    const auto [followed, stop] = guarded_.run(
+        motion(word), [this] { return limit_run(); },
+        [this](const device::MotorFollowOptions& limits) {
+          return device::follow_motor(tool_->device, plan_->motor, stopper_, limits, news_);
+        });
     note_stop(stop);
     if (stop.result == device::StopResult::confirmed) setup_.restore_watchdog();
     return report(followed, stop);
