@@ -103,7 +103,7 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       task_(&task),
       tool_(&tool),
       context_(&context),
-      calm_context_(calm_context(context)),
+      calm_line_(tool, context),
       log_("restore", tool, context),
       progress_(context) {}
 
@@ -215,9 +215,7 @@ void RestoreRun::compare_everything() {
 device::Rollback::Reopen RestoreRun::reopener() {
   return [this](Duration patience) -> Result<device::Device> {
     progress_.show("the link is lost; trying to put the tool back");
-    const Duration usual = context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-    calm_context_.common.connect_timeout = std::min(usual, patience);
-    auto opened = connect_device(tool_->target, *tool_->profile, calm_context_);
+    auto opened = calm_line_.connect(patience);
     if (!opened) return opened;
     auto known = opened->require_known_registers().and_then([&] { return same_tool(*opened); });
     if (!known) return tl::unexpected(std::move(known.error()));

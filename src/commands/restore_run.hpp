@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calm_line.hpp"
 #include "change_log.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
@@ -59,7 +60,7 @@ class RestoreRun {
   const RestoreTask* task_;
   OpenTool* tool_;
   Context* context_;
-  Context calm_context_;  ///< lines that are opened on it refer to it
+  CalmLine calm_line_;
   ChangeLog log_;
   ProgressLine progress_;
   std::optional<Listing> listing_ = std::nullopt;

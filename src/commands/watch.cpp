@@ -89,10 +89,10 @@ class Stage {
  private:
   report::Record record_of(const device::EventNews& news, const NewsRecords& records) {
     report::Record record = records.event(news);
-    const std::string kind = records.kind_of(news.block);
+    const catalogue::EventKind kind = records.kind_of(news.block);
     ++events_;
-    if (kind == "fastening-ok") ++ok_;
-    if (kind == "fastening-ng") ++ng_;
+    if (kind == catalogue::EventKind::fastening_ok) ++ok_;
+    if (kind == catalogue::EventKind::fastening_ng) ++ng_;
     last_event_ = context_->clock.now();
     return record;
   }

@@ -23,10 +23,8 @@ std::size_t append_printable(std::string& out, std::string_view text) {
     if (is_byte) fmt::format_to(std::back_inserter(out), "\\x{:02x}", value);
     if (!is_byte && is_short) fmt::format_to(std::back_inserter(out), "\\u{:04x}", value);
     if (!is_short) fmt::format_to(std::back_inserter(out), "\\U{:08x}", value);
-  } else if (character.value == replacement_character) {
-    out += replacement_bytes;
   } else {
-    out += text.substr(0, character.length);
+    append_first(out, character, text);
   }
   return character.length;
 }

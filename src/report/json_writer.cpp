@@ -50,10 +50,8 @@ std::size_t append_character(std::string& out, std::string_view text) {
     out += escape;
   } else if (steers(character.value)) {
     append_escaped(out, character.value);
-  } else if (character.value == replacement_character) {
-    out += replacement_bytes;
   } else {
-    out += text.substr(0, character.length);
+    append_first(out, character, text);
   }
   return character.length;
 }
