@@ -82,9 +82,7 @@ Result<Content> read_tool(const Side& side, const Context& context) {
   if (!tool) return tl::unexpected(std::move(tool.error()));
   ProgressLine progress(context);
   auto taken =
-      take_snapshot(*tool, Secrets::include, context, [&](std::size_t done, std::size_t total) {
-        progress.show(fmt::format("{}: reading, {} of {}", side.text, done, total));
-      });
+      take_snapshot(*tool, Secrets::include, context, progress.counting(side.text + ": reading"));
   if (!taken) return tl::unexpected(std::move(taken.error()));
   return Content{std::move(taken->snapshot), std::move(taken->unreadable), tool->device.profile()};
 }

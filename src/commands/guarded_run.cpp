@@ -19,11 +19,11 @@ Error not_ready(const Target& target, std::string message, std::string hint) {
 }
 
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
-    : tool_(&tool), context_(&context), calm_line_(tool, context) {}
+    : tool_(&tool), context_(&context), calm_line_(tool, context), progress_(context) {}
 
 device::RunGuard::Reopen GuardedRun::reopener() {
   return [this](Duration patience) {
-    show_state("the link is lost; trying to stop the tool");
+    progress_.show("the link is lost; trying to stop the tool");
     return calm_line_.connect(patience);
   };
 }
@@ -34,15 +34,9 @@ Result<void> GuardedRun::check_reader() const {
   return tl::unexpected(Error{.code = Errc::closed_pipe});
 }
 
-void GuardedRun::show_state(std::string_view text) {
-  const report::Streams& io = context_->io;
-  const bool ready = !io.err_is_ready || io.err_is_ready();
-  if (io.err_is_terminal && ready) io.err(fmt::format("\r\x1b[K{}", text));
-}
-
 void GuardedRun::show_running(Duration elapsed, std::string_view more) {
   const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count() / 100;
-  show_state(fmt::format("running {}.{} s{}", tenths / 10, tenths % 10, more));
+  progress_.show(fmt::format("running {}.{} s{}", tenths / 10, tenths % 10, more));
 }
 
 void GuardedRun::fail(const Error& error) {

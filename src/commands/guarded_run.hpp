@@ -7,6 +7,7 @@
 
 #include "calm_line.hpp"
 #include "listing.hpp"
+#include "progress.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
 
@@ -40,13 +41,14 @@ class GuardedRun {
     const auto limits = limit();
     auto followed = guard.start().and_then([&] { return follow(limits); });
     const device::StopReport stop = guard.stop();
-    show_state("");  // not before the stop: a terminal may keep its writer waiting
+    progress_.clear();  // not before the stop: a terminal may keep its writer waiting
     return std::pair(std::move(followed), stop);
   }
 
   /// Error `closed_pipe` when nobody reads the output any more.
   Result<void> check_reader() const;
 
+  /// On the one line of a terminal that changes.
   void show_running(Duration elapsed, std::string_view more = {});
 
   /// Remembers an error for the end; it also makes the outcome.
@@ -66,13 +68,12 @@ class GuardedRun {
   void fail(const device::StopReport& unconfirmed);
   /// Each on its own: they reach people even where nobody reads the records any more.
   Result<void> tell_errors();
-  /// The one line on a terminal that changes while something goes on.
-  void show_state(std::string_view text);
   Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
   OpenTool* tool_;
   Context* context_;
   CalmLine calm_line_;
+  ProgressLine progress_;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
 };

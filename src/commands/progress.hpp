@@ -1,8 +1,12 @@
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cstddef>
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "spindle/commands/context.hpp"
 
@@ -20,6 +24,12 @@ class ProgressLine {
   void show(std::string_view text) {
     const std::lock_guard lock(mutex_);
     draw(text);
+  }
+  /// Shows "WHAT, 3 of 20" whenever it is told how far something has come; must not outlive this.
+  link::Progress counting(std::string what) {
+    return [this, what = std::move(what)](std::size_t done, std::size_t total) {
+      show(fmt::format("{}, {} of {}", what, done, total));
+    };
   }
   /// To be called before anything else is printed.
   void clear() {

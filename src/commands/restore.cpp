@@ -175,10 +175,8 @@ Result<Wanted> understand(const files::BackupFile& file, const RestoreOptions& o
 Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& options,
                          Context& context) {
   ProgressLine progress(context);
-  auto present =
-      take_snapshot(tool, Secrets::include, context, [&](std::size_t done, std::size_t total) {
-        progress.show(fmt::format("{}: reading, {} of {}", tool.target.shown, done, total));
-      });
+  auto present = take_snapshot(tool, Secrets::include, context,
+                               progress.counting(tool.target.shown + ": reading"));
   if (!present) return tl::unexpected(std::move(present.error()));
   for (const Error& error : present->unreadable) {
     const auto* needed = wanted.backup.find(error.name);

@@ -192,10 +192,8 @@ void RestoreRun::verify() {
 
 /// A tool may change one parameter when another one is written, so everything is read once more.
 void RestoreRun::compare_everything() {
-  const auto now =
-      take_snapshot(*tool_, Secrets::include, *context_, [&](std::size_t done, std::size_t total) {
-        progress_.show(fmt::format("{}: verifying, {} of {}", tool_->target.shown, done, total));
-      });
+  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
+                                 progress_.counting(tool_->target.shown + ": verifying"));
   if (!now) {
     fail(now.error());
     return roll_back();
