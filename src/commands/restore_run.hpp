@@ -54,7 +54,9 @@ class RestoreRun {
             const catalogue::Value& now, std::string_view result);
   void fail(const Error& error);
   [[nodiscard]] std::string command_to_finish() const;
+  void tell_what_stays();
   Result<Outcome> end();
+  Result<void> summarise();
 
   const RestoreOptions* options_;
   const RestoreTask* task_;
