@@ -259,6 +259,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   if (!tools) return tl::unexpected(std::move(tools.error()));
   for (const WatchedTool& tool : *tools) {
     if (auto checked = check(options, tool, shelf, context); !checked) {
+      checked.error().asked_of = tool.target().shown;
       return tl::unexpected(std::move(checked.error()));
     }
   }
@@ -269,6 +270,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   Stage stage(options, tools->size(), columns_for(*tools), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, open_transport, stage, options, context);
+    if (!watched) watched.error().asked_of = tool.target().shown;
     stage.leave(watched);
   });
   return stage.finish();

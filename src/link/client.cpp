@@ -171,6 +171,7 @@ Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries) {
   auto response = session_->transact(request);
   for (unsigned retry = 0; retry < retries && !response && response.error().code == Errc::no_answer;
        ++retry) {
+    session_->tell_retry(request);
     response = session_->transact(request);
   }
   if (!response) return response;

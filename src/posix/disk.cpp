@@ -29,9 +29,26 @@ constexpr mode_t usual_file = 0666;  // less what the user masks
 /// Names of temporary files that may be taken by what a killed program left.
 constexpr unsigned most_attempts = 100;
 
+std::string hint_for(int code) {
+  switch (code) {
+    case ENOENT:
+      return "is its folder there?";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "check who may read and write there";
+    case ENOSPC:
+    case EDQUOT:
+      return "free some space, or choose another disk";
+    default:
+      return {};
+  }
+}
+
 Error failed(const std::string& path, std::string_view what, int code) {
   return {.code = Errc::bad_file,
           .message = fmt::format("{}: {}", what, std::generic_category().message(code)),
+          .hint = hint_for(code),
           .name = path};
 }
 

@@ -37,8 +37,8 @@ Result<void> write_out(std::string_view text) {
   if (failure == EPIPE) return tl::unexpected(Error{.code = Errc::closed_pipe});
   return tl::unexpected(Error{
       .code = Errc::internal,
-      .message = "cannot write the output: " + std::generic_category().message(failure),
-      .hint = "check the file or disk that the output goes to",
+      .message = "standard output cannot be written: " + std::generic_category().message(failure),
+      .hint = "check the file, disk or program that it goes to",
   });
 }
 

@@ -76,8 +76,10 @@ def spans(holds):
 def table():
     text = HEAD.format(version=unicodedata.unidata_version)
     for name, source, holds in TABLES:
-        rows = ", ".join(f"CodePoints{{0x{first:04X}, 0x{last:04X}}}" for first, last in spans(holds))
-        text += f"\n/// {source}\ninline constexpr std::array {name} = {{{rows},}};\n"
+        found = spans(holds)
+        rows = ", ".join(f"{{0x{first:04X}, 0x{last:04X}}}" for first, last in found)
+        head = f"inline constexpr std::array<CodePoints, {len(found)}> {name}"
+        text += f"\n/// {source}\n{head} = {{{{{rows},}}}};\n"
     return text + "\n}  // namespace spindle::report\n"
 
 

@@ -100,7 +100,7 @@ TEST_CASE("streams: a full disk is told in the system's words") {
     const Result<void> result = posix::write_out("x");
     const bool expected =
         !result && result.error().code == Errc::internal &&
-        result.error().message == "cannot write the output: No space left on device";
+        result.error().message == "standard output cannot be written: No space left on device";
     return expected ? 0 : 1;
   });
   CHECK(finish(child) == 0);
