@@ -12,8 +12,8 @@ int main(int count, char** arguments) {
   const spindle::Interrupt calm;
   SteadyClock calm_clock(calm);
   spindle::cli::World world{
-      .io = {write_out, write_err, line_reader(clock, signals.interrupt()), is_terminal(Stream::in),
-             is_terminal(Stream::out), is_terminal(Stream::err), out_is_open, err_is_ready},
+      .io = {write_out, write_err, line_reader(clock, signals.interrupt()), is_terminal(Std::in),
+             is_terminal(Std::out), is_terminal(Std::err), out_is_open, err_is_ready, err_columns},
       .clock = clock,
       .interrupt = signals.interrupt(),
       .open = line_opener(clock, signals.interrupt()),

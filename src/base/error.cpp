@@ -44,7 +44,8 @@ constexpr std::array errors = {
     ErrcInfo{Errc::out_of_range, ExitStatus::usage, "the value is outside the range", ""},
     ErrcInfo{Errc::read_only, ExitStatus::usage, "read-only, it cannot be written",
              "'spindle list' shows what can be written"},
-    ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed", ""},
+    ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed",
+             "answer 'y', or add --yes, when you are sure"},
     ErrcInfo{Errc::unverified, ExitStatus::usage,
              "nobody has verified this action on this product, nothing was sent",
              "check it on the tool, then give --accept-unverified or list it under 'verified' in "

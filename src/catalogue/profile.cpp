@@ -163,6 +163,16 @@ Result<Parameter> parse_raw(std::string_view text) {
 
 }  // namespace
 
+std::string_view to_text(EventKind kind) {
+  return event_kind_texts.at(static_cast<std::size_t>(kind));
+}
+
+std::optional<EventKind> parse_event_kind(std::string_view text) {
+  const auto* const known = std::find(event_kind_texts.begin(), event_kind_texts.end(), text);
+  if (known == event_kind_texts.end()) return std::nullopt;
+  return static_cast<EventKind>(known - event_kind_texts.begin());
+}
+
 modbus::RegisterTable table_of(const EventFacts& events) {
   constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
   return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;

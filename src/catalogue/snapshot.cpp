@@ -167,6 +167,7 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
     return tl::unexpected(Error{.code = Errc::out_of_range,
                                 .message = "the tool's own limits could not be read, so it is not "
                                            "written",
+                                .hint = "try again; 'spindle get --limits' shows what can be read",
                                 .name = parameter.name,
                                 .register_address = parameter.address.value});
   }

@@ -65,12 +65,24 @@ std::string list_labels(const Parameter& parameter) {
   return list;
 }
 
+std::string with_suggestion(std::string hint, const std::string& suggested) {
+  return suggested.empty() ? hint : hint + "; " + suggested;
+}
+
 Error not_a_label(const Parameter& parameter, std::string_view text) {
   std::vector<std::string> names;
   for (const Label& label : parameter.labels) names.push_back(label.text);
-  return fault(Errc::bad_value, parameter,
-               fmt::format("'{}' is none of its labels; it has {}", text, list_labels(parameter)),
-               suggestion(text, names));
+  return fault(
+      Errc::bad_value, parameter, fmt::format("'{}' is none of its labels", text),
+      with_suggestion(fmt::format("it has {}", list_labels(parameter)), suggestion(text, names)));
+}
+
+/// For somebody who typed a word, or a comma where a point is meant.
+Error not_a_number(const Parameter& parameter, std::string_view text) {
+  const bool has_decimals = parameter.encoding.scale.exponent() < 0;
+  return fault(Errc::bad_value, parameter, fmt::format("'{}' is not a number", text),
+               has_decimals ? "write it in digits with a decimal point, such as 2.5"
+                            : "write it in digits without separators, such as 2500");
 }
 
 bool is_set(std::int64_t integer, unsigned bit) {
@@ -103,9 +115,9 @@ std::string words_for(const Parameter& parameter, std::int64_t integer) {
 Error not_a_bit(const Parameter& parameter, std::string_view text) {
   std::vector<std::string> names;
   for (const BitName& name : parameter.bits) names.push_back(name.text);
-  return fault(Errc::bad_value, parameter,
-               fmt::format("'{}' is none of its bits; it has {}", text, fmt::join(names, ", ")),
-               suggestion(text, names));
+  return fault(
+      Errc::bad_value, parameter, fmt::format("'{}' is none of its bits", text),
+      with_suggestion(fmt::format("it has {}", fmt::join(names, ", ")), suggestion(text, names)));
 }
 
 /// "M1+FWD" or "M1,FWD" to its number.
@@ -162,7 +174,8 @@ Result<std::int64_t> to_steps(const Parameter& parameter, const Decimal& number)
   if (!steps) {
     return tl::unexpected(
         fault(Errc::bad_value, parameter,
-              fmt::format("{} is between two steps of {}", number.to_string(), scale.to_string())));
+              fmt::format("{} is between two steps of {}", number.to_string(), scale.to_string()),
+              fmt::format("round it to a multiple of {}", scale.to_string())));
   }
   return *steps;
 }
@@ -225,8 +238,7 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   } else if (!parameter.labels.empty()) {
     return tl::unexpected(not_a_label(parameter, text));
   } else {
-    return tl::unexpected(
-        fault(Errc::bad_value, parameter, fmt::format("'{}' is not a number", text)));
+    return tl::unexpected(not_a_number(parameter, text));
   }
   if (auto inside = check_range(parameter, number); !inside) {
     return tl::unexpected(std::move(inside.error()));

@@ -72,8 +72,8 @@ Error missing(std::string_view command, std::string_view argument) {
                fmt::format("'spindle {} --help' shows examples", command));
 }
 
-Error bad_option(std::string_view option, std::string_view value, std::string_view allowed) {
-  Error error = usage(fmt::format("'{}' is not {}", value, allowed));
+Error bad_option(std::string_view option, std::string message, std::string hint) {
+  Error error = usage(std::move(message), std::move(hint));
   error.code = Errc::bad_value;
   error.name = option;
   return error;
@@ -84,14 +84,17 @@ Result<std::uint64_t> to_number(std::string_view option, const std::string& text
   const auto number = parse_unsigned(text, maximum);
   if (number && *number >= minimum) return *number;
   return tl::unexpected(
-      bad_option(option, text, fmt::format("a number from {} to {}", minimum, maximum)));
+      bad_option(option, fmt::format("'{}' does not fit", text),
+                 fmt::format("it takes a number from {} to {}", minimum, maximum)));
 }
 
 Result<std::optional<Duration>> to_duration(std::string_view option, const std::string& text) {
   if (text.empty()) return std::nullopt;
   auto duration = parse_duration(text);
   if (duration && *duration > Duration::zero()) return *duration;
-  return tl::unexpected(bad_option(option, text, "a duration such as 500ms, 2s or 5min"));
+  const std::string_view why = duration ? "is too short" : "is not a duration";
+  return tl::unexpected(
+      bad_option(option, fmt::format("'{}' {}", text, why), "write it like 500ms, 2.5s or 5min"));
 }
 
 /// One of a few words, with a suggestion for a misspelt one.
@@ -103,9 +106,9 @@ Result<Choice> to_choice(std::string_view option, const std::string& text,
     if (word == text) return choice;
     words.emplace_back(word);
   }
-  Error error = bad_option(option, text, fmt::format("one of {}", fmt::join(words, ", ")));
-  error.hint = suggestion(text, words);
-  return tl::unexpected(std::move(error));
+  std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));
+  if (const std::string meant = suggestion(text, words); !meant.empty()) hint += "; " + meant;
+  return tl::unexpected(bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint)));
 }
 
 constexpr std::array<std::pair<std::string_view, report::Format>, 3> formats = {
@@ -140,12 +143,26 @@ void add_common_options(CLI::App& app, Typed& typed) {
   option(&app, "--retries", typed.retries, "N", "how often a read without an answer is repeated");
   flag(&app, "-y,--yes", typed.yes, "answer every question with yes");
   flag(&app, "--no-input", typed.no_input, "never ask; what would have to be asked is refused");
-  flag(&app, "-q,--quiet", typed.quiet, "no summary and no notes on stderr");
+  flag(&app, "-q,--quiet", typed.quiet, "no summary, notes and progress on stderr");
   flag(&app, "-v,--verbose", typed.verbose, "every frame and decision on stderr");
   option(&app, "--trace", typed.trace, "FILE", "every frame into a pcapng file for Wireshark");
   option(&app, "--color", typed.color, "WHEN", "auto, always or never");
   flag(&app, "-h,--help", typed.help, "show this help");
   flag(&app, "--version", typed.version, "show the version");
+}
+
+/// The tool that a command was wanted from, as typed; empty where it is none or several.
+template <typename TypedOptions>
+std::string asked_of(const TypedOptions& typed) {
+  const auto is_group = [](const std::string& target) { return target.starts_with('@'); };
+  if constexpr (requires { typed.options.target.size(); }) {
+    return is_group(typed.options.target) ? std::string() : typed.options.target;
+  }
+  if constexpr (requires { typed.options.targets.front().size(); }) {
+    const auto& targets = typed.options.targets;
+    if (targets.size() == 1 && !is_group(targets.front())) return targets.front();
+  }
+  return {};
 }
 
 /// Adds a command whose options struct CLI11 fills while `make_run` turns it into the deed. The
@@ -160,7 +177,12 @@ CLI::App* add_command(CLI::App& parent, Draft& draft, const Words& words, Option
   command->final_callback([&draft, &options, command, make_run] {
     if (draft.chosen != nullptr) return;  // a command below this one was named
     draft.chosen = command;
-    draft.run = [typed = options, make_run](Context& context) { return make_run(typed, context); };
+    draft.run = [typed = options, make_run](Context& context) -> Result<Outcome> {
+      return make_run(typed, context).map_error([&](Error error) {
+        if (error.asked_of.empty()) error.asked_of = asked_of(typed);
+        return error;
+      });
+    };
   });
   return command;
 }
@@ -446,8 +468,8 @@ Result<std::vector<modbus::UnitId>> to_units(const std::string& text) {
     const auto last =
         dash == std::string_view::npos ? first : parse_unsigned(range.substr(dash + 1), last_unit);
     if (!first || !last || *first == 0 || *last < *first) {
-      return tl::unexpected(
-          bad_option("--units", text, "units from 1 to 247, such as 1-31 or 1,5"));
+      return tl::unexpected(bad_option("--units", fmt::format("'{}' does not fit", text),
+                                       "it takes units from 1 to 247, such as 1-31 or 1,5"));
     }
     for (std::uint64_t unit = *first; unit <= *last; ++unit) {
       const modbus::UnitId id{static_cast<std::uint8_t>(unit)};
@@ -530,9 +552,11 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
   const bool work_is_described = !typed.ng_every.empty() || !typed.burst.empty();
   if (work_is_described && !bm.rundown_every) {
     return tl::unexpected(
-        usage("--ng-every and --burst need --rundown-every", "such as --rundown-every 5s"));
+        usage("--ng-every and --burst need --rundown-every", "add for example --rundown-every 5s"));
   }
-  if (bm.burst == 0) return tl::unexpected(usage("--burst 0 would be no result", "at least 1"));
+  if (bm.burst == 0) {
+    return tl::unexpected(usage("--burst 0 would be no result", "it takes 1 or more"));
+  }
   return commands::simulate(options, context);
 }
 
@@ -989,10 +1013,12 @@ Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseEr
     const std::string name = argument.substr(0, argument.find('='));
     const std::string bare = name.substr(std::min(name.size(), name.find_first_not_of('-')));
     if (bare.empty() || bare == name || what.find(bare) == std::string::npos) continue;
-    if (name != argument) return usage(fmt::format("'{}' takes no value", name));
-    return usage(fmt::format("'{}' needs a value", name));
+    if (name != argument)
+      return usage(fmt::format("'{}' takes no value", name), fmt::format("write {} alone", name));
+    return usage(fmt::format("'{}' needs a value", name), fmt::format("write {} VALUE", name));
   }
-  return usage("an option has no value, or one that it does not take");
+  return usage("an option has no value, or one that it does not take",
+               "'spindle --help' lists all options");
 }
 
 Result<void> understand_common(const Typed& typed, Invocation& invocation) {
@@ -1019,6 +1045,7 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   if (typed.yes) common.consent = commands::Consent::given;
   common.trace_file = typed.trace;
   if (typed.verbose) common.verbosity = commands::Verbosity::frames;
+  if (typed.quiet || typed.verbose) common.progress = report::Showing::unwanted;
   return {};
 }
 

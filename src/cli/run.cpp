@@ -76,13 +76,16 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   return files::load_tools(path);
 }
 
+/// A terminal that shows text and nothing else.
+bool is_dumb(const World& world) { return variable(world, "TERM") == "dumb"; }
+
 report::Color color_of(const World& world, ColorChoice choice) {
   if (choice == ColorChoice::always) return report::Color::on;
   if (choice == ColorChoice::never) return report::Color::off;
   if (!variable(world, "NO_COLOR").empty()) return report::Color::off;
   const std::string force = variable(world, "CLICOLOR_FORCE");
   if (!force.empty() && force != "0") return report::Color::on;
-  const bool able = world.io.out_is_terminal && variable(world, "TERM") != "dumb";
+  const bool able = world.io.out_is_terminal && !is_dumb(world);
   return able ? report::Color::on : report::Color::off;
 }
 
@@ -169,6 +172,7 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
   const report::Talk talk = invocation ? invocation->talk : report::Talk::normal;
   if (invocation) world.io.color = color_of(world, invocation->color);
+  if (invocation && is_dumb(world)) invocation->common.progress = report::Showing::unwanted;
   const auto renderer = report::make_renderer(format, world.io, talk);
   if (!invocation) return tell(invocation.error(), world, *renderer);
   if (invocation->asks == Invocation::Asks::version) {

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <atomic>
 #include <map>
 #include <utility>
 
@@ -44,7 +43,7 @@ std::string path_of(const Target& target, const BackupOptions& options) {
 Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOptions& options,
                           const Context& context) {
   if (!options.file.empty() && !options.folder.empty()) {
-    return tl::unexpected(bad_request("--file and --dir exclude each other"));
+    return tl::unexpected(bad_request("--file and --dir exclude each other", "give one of them"));
   }
   if (!options.file.empty() && targets.size() > 1) {
     return tl::unexpected(
@@ -58,7 +57,8 @@ Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOption
     const auto [owner, is_new] = owners.emplace(path, target.shown);
     if (!is_new) {
       return tl::unexpected(bad_request(fmt::format("'{}' and '{}' would both be written to {}",
-                                                    owner->second, target.shown, path)));
+                                                    owner->second, target.shown, path),
+                                        "back them up one by one, each into a --file of its own"));
     }
     const bool taken = path != standard_output && context.disk.exists(path);
     if (taken && options.overwrite == Overwrite::refuse) {
@@ -101,50 +101,42 @@ struct Saved {
 class Saving {
  public:
   Saving(const BackupOptions& options, const Paths& paths,
-         const std::map<std::string, catalogue::Profile>& profiles, std::size_t targets,
+         const std::map<std::string, catalogue::Profile>& profiles, ProgressLine& progress,
          const Context& context)
       : options_(&options),
         paths_(&paths),
         profiles_(&profiles),
-        targets_(targets),
-        context_(&context),
-        progress_(context) {}
+        progress_(&progress),
+        context_(&context) {}
 
   Result<Saved> save(const Target& target) {
     auto tool = open_tool(target, profiles_->at(target.profile), Need::named_registers, *context_);
     if (!tool) return tl::unexpected(std::move(tool.error()));
-    auto taken =
-        take_snapshot(*tool, options_->secrets, *context_,
-                      [&](std::size_t done, std::size_t total) { show(target, done, total); });
+    auto taken = take_snapshot(*tool, options_->secrets, *context_, reading(target));
     if (!taken) return tl::unexpected(std::move(taken.error()));
     const std::string& path = paths_->at(target.shown);
     auto written = write(path, files::render_backup(taken->snapshot));
     if (!written) return tl::unexpected(tool->target.blamed(std::move(written.error())));
-    ++done_;
     return Saved{tool->target, path, std::move(*taken)};
   }
-
-  void clear_progress() { progress_.clear(); }
 
  private:
   Result<void> write(const std::string& path, const std::string& text) {
     if (path != standard_output) return context_->disk.write(path, text, options_->overwrite);
-    progress_.clear();
     return context_->io.out(text);
   }
 
-  void show(const Target& target, std::size_t done, std::size_t total) {
-    progress_.show(targets_ == 1 ? fmt::format("{}: reading, {} of {}", target.shown, done, total)
-                                 : fmt::format("{} of {} tools", done_.load(), targets_));
+  /// Of several tools it is shown how many are done.
+  link::Progress reading(const Target& target) {
+    if (paths_->size() > 1) return {};
+    return progress_->counter(target.shown + ": reading");
   }
 
   const BackupOptions* options_;
   const Paths* paths_;
   const std::map<std::string, catalogue::Profile>* profiles_;
-  std::size_t targets_;
+  ProgressLine* progress_;
   const Context* context_;
-  ProgressLine progress_;
-  std::atomic<std::size_t> done_ = 0;
 };
 
 report::Record saved_record(const Saved& saved, const Clock& clock) {
@@ -206,10 +198,10 @@ Result<Outcome> backup(const BackupOptions& options, Context& context) {
     auto made = context.disk.make_folders(options.folder, Privacy::usual);
     if (!made) return tl::unexpected(std::move(made.error()));
   }
-  Saving saving(options, *paths, *profiles, targets->size(), context);
-  const auto results = side_by_side(*targets, options.jobs,
-                                    [&](const Target& target) { return saving.save(target); });
-  saving.clear_progress();
+  ProgressLine progress(context);
+  Saving saving(options, *paths, *profiles, progress, context);
+  const auto results = side_by_side(
+      *targets, options.jobs, [&](const Target& target) { return saving.save(target); }, &progress);
   if (options.file == standard_output) return tell_quietly(results.front());
   return tell(results, context);
 }

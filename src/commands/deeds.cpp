@@ -47,9 +47,9 @@ Result<std::int64_t> parse_action_value(const Action& action, std::string_view t
     return static_cast<std::int64_t>(*value);
   }
   if (!action.labels.empty()) return parse_label(action, text);
-  return tl::unexpected(bad_action_value(
-      action,
-      fmt::format("'{}' is not a number from {} to {}", text, action.minimum, action.maximum)));
+  return tl::unexpected(
+      bad_action_value(action, fmt::format("'{}' is none of its values", text),
+                       fmt::format("it takes {} to {}", action.minimum, action.maximum)));
 }
 
 bool is_weak(Evidence evidence) {

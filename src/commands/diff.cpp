@@ -84,9 +84,7 @@ Result<Content> read_tool(const Side& side, const Context& context) {
   if (!tool) return tl::unexpected(std::move(tool.error()));
   ProgressLine progress(context);
   auto taken =
-      take_snapshot(*tool, Secrets::include, context, [&](std::size_t done, std::size_t total) {
-        progress.show(fmt::format("{}: reading, {} of {}", side.text, done, total));
-      });
+      take_snapshot(*tool, Secrets::include, context, progress.counter(side.text + ": reading"));
   if (!taken) return tl::unexpected(std::move(taken.error()));
   return Content{std::move(taken->snapshot), std::move(taken->unreadable), tool->device.profile()};
 }
@@ -177,8 +175,9 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
 
 Result<Outcome> diff(const DiffOptions& options, Context& context) {
   if (options.a == defaults && options.b == defaults) {
-    return tl::unexpected(
-        Error{.code = Errc::usage, .message = "one side must be a tool or a backup"});
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "one side must be a tool or a backup",
+                                .hint = "write for example 'spindle diff station3 defaults'"});
   }
   const auto a = understand(options.a, context);
   if (!a) return tl::unexpected(a.error());

@@ -13,6 +13,7 @@
 namespace spindle::commands {
 namespace {
 
+using catalogue::EventKind;
 using report::Audience;
 using report::Cell;
 using report::Field;
@@ -33,9 +34,9 @@ Field only_shown(std::string key, std::string text, Tone tone = Tone::plain) {
           .tone = tone};
 }
 
-Field result_of(const std::string& kind) {
-  if (kind == "fastening-ok") return only_shown("result", "OK", Tone::good);
-  if (kind == "fastening-ng") return only_shown("result", "NG", Tone::bad);
+Field result_of(EventKind kind) {
+  if (kind == EventKind::fastening_ok) return only_shown("result", "OK", Tone::good);
+  if (kind == EventKind::fastening_ng) return only_shown("result", "NG", Tone::bad);
   return only_shown("result", "");
 }
 
@@ -73,28 +74,18 @@ std::string missed_text(std::optional<std::uint32_t> missed) {
 
 NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile,
                          catalogue::CodeTables tables)
-    : target_(&target), profile_(&profile), tables_(std::move(tables)) {
+    : target_(&target), tables_(std::move(tables)) {
   if (!profile.events) return;
-  const catalogue::EventFacts& events = *profile.events;
-  const auto table = catalogue::table_of(events);
-  for (const catalogue::Parameter& parameter : profile.parameters) {
-    const std::uint16_t address = parameter.address.value;
-    const bool inside = parameter.table == table && address >= events.first &&
-                        address < events.first + events.count;
-    if (!inside) continue;
-    const auto at = static_cast<std::size_t>(address - events.first);
-    fields_.push_back({key_of(parameter.name), &parameter, at});
-    if (parameter.name == events.kind) kind_at_ = at;
-  }
+  layout_.emplace(profile);
+  for (const auto& field : layout_->fields()) keys_.push_back(key_of(field.parameter->name));
 }
 
 Record NewsRecords::blank(std::string type, WallTime time) const {
   return {.type = std::move(type), .target = target_->shown, .time = time, .fields = {}};
 }
 
-std::string NewsRecords::kind_of(const Registers& block) const {
-  const auto kind = profile_->events->kinds.find(block[kind_at_]);
-  return kind == profile_->events->kinds.end() ? "other" : kind->second;
+EventKind NewsRecords::kind_of(const Registers& block) const {
+  return layout_->kind_of(block).value_or(EventKind::other);
 }
 
 std::string NewsRecords::error_text(std::int64_t code) const {
@@ -105,18 +96,18 @@ std::string NewsRecords::error_text(std::int64_t code) const {
 
 Record NewsRecords::event(const device::EventNews& news) const {
   Record record = blank("event", news.time);
-  const std::string kind = kind_of(news.block);
-  record.fields.reserve(fields_.size() + 6);
-  record.fields.push_back({"kind", kind});
+  const EventKind kind = kind_of(news.block);
+  record.fields.reserve(keys_.size() + 6);
+  record.fields.push_back({"kind", std::string(catalogue::to_text(kind))});
   record.fields.push_back({"source", std::string(to_text(news.source))});
   std::string text;
-  for (const EventField& field : fields_) {
-    const auto words = catalogue::register_count(field.parameter->encoding.kind);
-    const auto value =
-        catalogue::decode(*field.parameter, RegisterView(news.block).subspan(field.at, words));
+  for (std::size_t index = 0; index < keys_.size(); ++index) {
+    const auto& [parameter, at] = layout_->fields()[index];
+    const auto words = catalogue::register_count(parameter->encoding.kind);
+    const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
-    record.fields.push_back({field.key, value->number, value->to_string()});
-    if (field.key != "error") continue;
+    record.fields.push_back({keys_[index], value->number, value->to_string()});
+    if (keys_[index] != "error") continue;
     std::string meaning = error_text(value->number.mantissa());
     if (value->number.mantissa() != 0) {
       text = fmt::format("E{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ", meaning);

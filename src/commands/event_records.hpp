@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "spindle/catalogue/profile.hpp"
+#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/watcher.hpp"
 #include "spindle/report/renderer.hpp"
@@ -26,26 +26,19 @@ class NewsRecords {
   [[nodiscard]] report::Record gap(const device::GapNews& news, WallTime time) const;
   [[nodiscard]] report::Record link(const device::LinkNews& news, WallTime time) const;
 
-  /// The contract's name of an event's kind: "fastening-ok", …, "other".
-  [[nodiscard]] std::string kind_of(const Registers& block) const;
+  /// What an event says; `other` where the profile does not know.
+  [[nodiscard]] catalogue::EventKind kind_of(const Registers& block) const;
 
   /// Meaning of an error code; empty when it is 0 or unknown.
   [[nodiscard]] std::string error_text(std::int64_t code) const;
 
  private:
-  struct EventField {
-    std::string key;  ///< as in JSON
-    const catalogue::Parameter* parameter;
-    std::size_t at;  ///< index in the block
-  };
-
   [[nodiscard]] report::Record blank(std::string type, WallTime time) const;
 
   const Target* target_;
-  const catalogue::Profile* profile_;
+  std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
+  std::vector<std::string> keys_ = {};  ///< in JSON, side by side with the layout's fields
   catalogue::CodeTables tables_;
-  std::vector<EventField> fields_ = {};
-  std::size_t kind_at_ = 0;
 };
 
 /// Columns of a stream of news, drawn row by row.

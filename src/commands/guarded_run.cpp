@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <utility>
 
 #include "records.hpp"
 
@@ -13,15 +13,18 @@ std::string log_word(std::string_view result, const device::StopReport& stop) {
   return std::string(result.empty() ? "no-result" : result);
 }
 
+Error not_ready(const Target& target, std::string message, std::string hint) {
+  return target.blamed(
+      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
+}
+
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
-    : tool_(&tool), context_(&context), calm_context_(calm_context(context)) {}
+    : tool_(&tool), context_(&context), progress_(context), calm_line_(tool, context) {}
 
 device::RunGuard::Reopen GuardedRun::reopener() {
   return [this](Duration patience) {
-    show_state("the link is lost; trying to stop the tool");
-    const Duration usual = context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-    calm_context_.common.connect_timeout = std::min(usual, patience);
-    return connect_device(tool_->target, *tool_->profile, calm_context_);
+    progress_.show("the link is lost; trying to stop the tool");
+    return calm_line_.connect(patience);
   };
 }
 
@@ -31,15 +34,9 @@ Result<void> GuardedRun::check_reader() const {
   return tl::unexpected(Error{.code = Errc::closed_pipe});
 }
 
-void GuardedRun::show_state(std::string_view text) {
-  const report::Streams& io = context_->io;
-  const bool ready = !io.err_is_ready || io.err_is_ready();
-  if (io.err_is_terminal && ready) io.err(fmt::format("\r\x1b[K{}", text));
-}
-
 void GuardedRun::show_running(Duration elapsed, std::string_view more) {
   const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count() / 100;
-  show_state(fmt::format("running {}.{} s{}", tenths / 10, tenths % 10, more));
+  progress_.refresh(fmt::format("running {}.{} s{}", tenths / 10, tenths % 10, more));
 }
 
 void GuardedRun::fail(const Error& error) {

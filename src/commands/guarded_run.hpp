@@ -2,9 +2,12 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "calm_line.hpp"
 #include "listing.hpp"
+#include "progress.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
 
@@ -20,20 +23,32 @@ struct RunEnd {
 /// result.
 std::string log_word(std::string_view result, const device::StopReport& stop);
 
+/// Why a tool was not started, or did not run to its end: an answer that is no.
+Error not_ready(const Target& target, std::string message, std::string hint);
+
 /// What every guarded run has in common, whatever runs: a line for stopping that signals do not
 /// end, the one changing line on a terminal, its errors, and what is told at its end.
 class GuardedRun {
  public:
   GuardedRun(OpenTool& tool, Context& context);
 
-  /// A line that signals do not end, for a stop after the first one broke.
-  device::RunGuard::Reopen reopener();
+  /// Starts, follows and stops, whatever happens meanwhile: the pair of what `follow` says and how
+  /// the stop went. `limit` is asked before the start is sent; `follow` gets what it says.
+  template <typename Limit, typename Follow>
+  auto run(device::GuardedMotion motion, Limit limit, Follow follow) {
+    if (context_->calm.stay_awake) context_->calm.stay_awake();
+    device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
+    const auto limits = limit();
+    auto followed = guard.start().and_then([&] { return follow(limits); });
+    const device::StopReport stop = guard.stop();
+    progress_.clear();  // not before the stop: a terminal may keep its writer waiting
+    return std::pair(std::move(followed), stop);
+  }
 
   /// Error `closed_pipe` when nobody reads the output any more.
   Result<void> check_reader() const;
 
-  /// The one line on a terminal that changes while something goes on.
-  void show_state(std::string_view text);
+  /// On a terminal, while something goes on.
   void show_running(Duration elapsed, std::string_view more = {});
 
   /// Remembers an error for the end; it also makes the outcome.
@@ -47,6 +62,8 @@ class GuardedRun {
   Result<Outcome> end(Listing& listing, const device::StopReport& stop, const RunEnd& run_end);
 
  private:
+  /// A line that signals do not end, for a stop after the first one broke.
+  device::RunGuard::Reopen reopener();
   /// A stop that could not be confirmed: nothing else matters as much.
   void fail(const device::StopReport& unconfirmed);
   /// Each on its own: they reach people even where nobody reads the records any more.
@@ -55,7 +72,8 @@ class GuardedRun {
 
   OpenTool* tool_;
   Context* context_;
-  Context calm_context_;  ///< lines that are opened on it refer to it
+  ProgressLine progress_;
+  CalmLine calm_line_;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
 };

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "listing.hpp"
+#include "progress.hpp"
 #include "records.hpp"
 #include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
@@ -132,8 +133,10 @@ Result<Identified> identify_one(const Target& target, const Context& context) {
 Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
   const auto targets = resolve_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
+  ProgressLine progress(context);
   const auto results = side_by_side(
-      *targets, options.jobs, [&](const Target& target) { return identify_one(target, context); });
+      *targets, options.jobs, [&](const Target& target) { return identify_one(target, context); },
+      &progress);
   Outcome outcome;
   Listing listing(context, columns);
   for (const Result<Identified>& result : results) {

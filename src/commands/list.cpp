@@ -62,8 +62,11 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
 Result<Outcome> list(const ListOptions& options, Context& context) {
   const auto subject = subject_of(options, context);
   if (!subject) return tl::unexpected(subject.error());
-  const auto parameters = subject->profile.select(subject->patterns);
-  if (!parameters) return tl::unexpected(parameters.error());
+  auto parameters = subject->profile.select(subject->patterns);
+  if (!parameters) {
+    parameters.error().asked_of = subject->target;
+    return tl::unexpected(std::move(parameters.error()));
+  }
   Outcome outcome;
   const auto columns = parameter_columns(*parameters);
   Listing listing(context, columns);

@@ -1,44 +1,25 @@
 #pragma once
 
-#include <mutex>
-#include <string>
-#include <string_view>
+#include <cstddef>
+#include <functional>
 
 #include "spindle/commands/context.hpp"
+#include "spindle/report/progress.hpp"
 
 namespace spindle::commands {
 
-/// The one line on a terminal that says how far long work has come. Says nothing elsewhere, and
-/// never waits for a terminal that does not take it. Several threads may call it.
-class ProgressLine {
+/// The line on a terminal, as the options of this command line want it.
+class ProgressLine : public report::Progress {
  public:
-  explicit ProgressLine(const Context& context) : io_(&context.io) {}
-  ~ProgressLine() { clear(); }
-  ProgressLine(const ProgressLine&) = delete;
-  ProgressLine& operator=(const ProgressLine&) = delete;
+  explicit ProgressLine(const Context& context)
+      : Progress(context.io, context.clock, context.common.progress) {}
 
-  void show(std::string_view text) {
-    const std::lock_guard lock(mutex_);
-    draw(text);
+  /// For what reads one tool.
+  [[nodiscard]] link::Progress counter(std::string what) {
+    return [this, what = std::move(what)](std::size_t done, std::size_t total) {
+      advance({.what = what, .done = done, .total = total});
+    };
   }
-  /// To be called before anything else is printed.
-  void clear() {
-    const std::lock_guard lock(mutex_);
-    if (shown_) draw("");
-    shown_ = false;
-  }
-
- private:
-  void draw(std::string_view text) {
-    const bool ready = !io_->err_is_ready || io_->err_is_ready();
-    if (!io_->err_is_terminal || !ready) return;
-    io_->err(std::string("\r\x1b[K").append(text));
-    shown_ = true;
-  }
-
-  const report::Streams* io_;
-  std::mutex mutex_ = {};
-  bool shown_ = false;
 };
 
 }  // namespace spindle::commands

@@ -19,6 +19,7 @@ namespace spindle::commands {
 namespace {
 
 using catalogue::Action;
+using catalogue::EventKind;
 using catalogue::Profile;
 using device::RunEnding;
 
@@ -36,6 +37,7 @@ Result<RunPlan> plan_run(const RemoteStartOptions& options, const Profile& profi
   if (!profile.events || start->confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "a run of this product can not be followed",
+                                .hint = "its profile lacks 'events', or 'confirm' of its start",
                                 .name = profile.id});
   }
   auto alarm_reset = profile.find_action("alarm-reset");
@@ -61,11 +63,6 @@ Result<void> ask_to_start(const RunPlan& plan, const Target& target, const Conte
   return ask_for_hazards(deeds, target, context);
 }
 
-Error not_ready(const Target& target, std::string message, std::string hint) {
-  return target.blamed(
-      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
-}
-
 /// No alarm, not running. Whether it is locked can not be read on every product.
 Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
   const auto alarm_free =
@@ -86,11 +83,15 @@ Result<void> check_ready(const RunPlan& plan, OpenTool& tool) {
 }
 
 /// A result in the words of the table.
-std::string_view words_of(std::string_view kind) {
-  if (kind == "fastening-ok") return "OK";
-  if (kind == "fastening-ng") return "NG";
-  if (kind == "error") return "error";
-  return kind.empty() ? "no result" : "ended without OK or NG";
+std::string_view words_of(std::optional<EventKind> kind) {
+  if (kind == EventKind::fastening_ok) return "OK";
+  if (kind == EventKind::fastening_ng) return "NG";
+  if (kind == EventKind::error) return "error";
+  return kind ? "ended without OK or NG" : "no result";
+}
+
+std::string to_text(std::optional<EventKind> kind) {
+  return kind ? std::string(catalogue::to_text(*kind)) : std::string();
 }
 
 /// One remote start: what is told of it, and how it ended.
@@ -112,12 +113,9 @@ class RemoteRun {
     if (auto prepared = follower.prepare(); !prepared) {
       return tl::unexpected(std::move(prepared.error()));
     }
-    if (context_->calm.stay_awake) context_->calm.stay_awake();
-    device::RunGuard guard(tool_->device, plan_->start, guarded_.reopener(), context_->calm.clock);
-    const device::FollowOptions following = limit_run();
-    auto followed = guard.start().and_then([&] { return follower.follow(following); });
-    const device::StopReport stop = guard.stop();
-    guarded_.show_state("");  // not before the stop: a terminal may keep its writer waiting
+    auto [followed, stop] = guarded_.run(
+        device::motion_of(plan_->start), [this] { return limit_run(); },
+        [&](const device::FollowOptions& limits) { return follower.follow(limits); });
     auto late = find_result(followed, follower, stop);
     follower.leave();
     return report(followed, late, stop);
@@ -170,33 +168,34 @@ class RemoteRun {
     const NewsRecords records(tool_->target, *tool_->profile,
                               tables.value_or(catalogue::CodeTables()));
     Listing listing(*context_, news_columns(Tools::one));
-    std::string kind;
+    std::optional<EventKind> kind;
     if (event) {
       kind = records.kind_of(event->block);
       listing.add(records.event(*event));
     }
     log_run(followed, kind, stop);
     judge(followed, kind);
-    return guarded_.end(listing, stop,
-                        {.result = kind, .subject = fmt::format("{}; the tool", words_of(kind))});
+    return guarded_.end(
+        listing, stop,
+        {.result = to_text(kind), .subject = fmt::format("{}; the tool", words_of(kind))});
   }
 
-  void log_run(const Result<device::FollowedRun>& followed, const std::string& kind,
+  void log_run(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind,
                const device::StopReport& stop) {
     const bool refused = !followed && followed.error().code == Errc::exception_response;
-    const std::string result = kind.empty() && refused ? "refused" : kind;
+    const std::string result = !kind && refused ? "refused" : to_text(kind);
     log_.add({.name = plan_->start.name,
               .register_address = plan_->start.address.value,
               .new_value = Decimal(*plan_->start.value),
               .result = log_word(result, stop)});
   }
 
-  void judge(const Result<device::FollowedRun>& followed, const std::string& kind) {
+  void judge(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind) {
     if (!followed) {
       guarded_.fail_following(followed.error());
       return;
     }
-    if (followed->ending == RunEnding::ignored && kind.empty()) {
+    if (followed->ending == RunEnding::ignored && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::mismatch,
                                 .message = "the tool acknowledged the start, but does not run",
@@ -204,7 +203,7 @@ class RemoteRun {
                                 .name = plan_->start.name}));
       return;
     }
-    if (followed->ending == RunEnding::ended && kind.empty()) {
+    if (followed->ending == RunEnding::ended && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::no_answer,
                                 .message = "the tool ran, but never sent a result",
@@ -212,7 +211,7 @@ class RemoteRun {
       return;
     }
     guarded_.outcome().succeed();
-    if (kind == "fastening-ng" || kind == "error") guarded_.outcome().negate();
+    if (kind == EventKind::fastening_ng || kind == EventKind::error) guarded_.outcome().negate();
   }
 
   const RemoteStartOptions* options_;

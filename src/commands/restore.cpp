@@ -53,11 +53,9 @@ const catalogue::PlannedWrite* find_other_unit(const RestoreTask& task) {
   return nullptr;
 }
 
-/// What somebody should know who is about to restore.
-std::vector<std::string> warnings_for(const RestoreTask& task) {
-  std::vector<std::string> warnings;
-  const Snapshot& backup = task.backup;
-  const Snapshot& present = task.present;
+/// How the tool and the profile of the backup differ from those of the restore.
+void warn_of_origin(const Snapshot& backup, const Snapshot& present,
+                    std::vector<std::string>& warnings) {
   if (!is_same_model(backup, present)) {
     warnings.push_back(fmt::format("the backup is of a {}, and this tool is a {}",
                                    shown_model(backup), shown_model(present)));
@@ -77,6 +75,10 @@ std::vector<std::string> warnings_for(const RestoreTask& task) {
     warnings.push_back(
         fmt::format("the backup was made with another version of profile {}", backup.profile));
   }
+}
+
+/// What the writes themselves bring with them, and what is not written.
+void warn_of_plan(const RestoreTask& task, std::vector<std::string>& warnings) {
   if (const auto* other = find_other_unit(task)) {
     warnings.push_back(fmt::format("{} is in {} in the backup, and in {} on this tool",
                                    other->parameter.name,
@@ -92,6 +94,13 @@ std::vector<std::string> warnings_for(const RestoreTask& task) {
                                    why == Skip::absent ? "this tool has no such register"
                                                        : "it is not copied to another tool"));
   }
+}
+
+/// What somebody should know who is about to restore.
+std::vector<std::string> warnings_for(const RestoreTask& task) {
+  std::vector<std::string> warnings;
+  warn_of_origin(task.backup, task.present, warnings);
+  warn_of_plan(task, warnings);
   return warnings;
 }
 
@@ -175,10 +184,8 @@ Result<Wanted> understand(const files::BackupFile& file, const RestoreOptions& o
 Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& options,
                          Context& context) {
   ProgressLine progress(context);
-  auto present =
-      take_snapshot(tool, Secrets::include, context, [&](std::size_t done, std::size_t total) {
-        progress.show(fmt::format("{}: reading, {} of {}", tool.target.shown, done, total));
-      });
+  auto present = take_snapshot(tool, Secrets::include, context,
+                               progress.counter(tool.target.shown + ": reading"));
   if (!present) return tl::unexpected(std::move(present.error()));
   for (const Error& error : present->unreadable) {
     const auto* needed = wanted.backup.find(error.name);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/files/backup_file.hpp"
 #include "storing.hpp"
 
@@ -42,17 +43,13 @@ Error about(const Parameter& parameter, std::string message) {
           .register_address = parameter.address.value};
 }
 
-/// A text as one word of a command line.
-std::string shell_word(const std::string& text) {
-  const auto is_harmless = [](char c) {
-    constexpr std::string_view others = "._-/:@=+,";
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           others.find(c) != std::string_view::npos;
-  };
-  if (!text.empty() && std::all_of(text.begin(), text.end(), is_harmless)) return text;
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
+/// What can be typed to restore a file, all of it without patterns.
+std::string command_for(const Target& target, const std::string& file,
+                        const std::vector<std::string>& patterns = {}) {
+  std::string command =
+      fmt::format("spindle restore {} {}", shell_word(target.shown), shell_word(file));
+  for (const std::string& pattern : patterns) command += " " + shell_word(pattern);
+  return command;
 }
 
 /// What the tool should hold after the restore: what it held before, with the plan laid over it.
@@ -103,7 +100,7 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       task_(&task),
       tool_(&tool),
       context_(&context),
-      calm_context_(calm_context(context)),
+      calm_line_(tool, context),
       log_("restore", tool, context),
       progress_(context) {}
 
@@ -112,7 +109,6 @@ Result<Outcome> RestoreRun::run() {
   listing_.emplace(*context_, restore_columns());
   write_all();
   if (errors_.empty()) verify();
-  progress_.clear();
   return end();
 }
 
@@ -149,8 +145,8 @@ void RestoreRun::write_all() {
       fail(done.error());
     }
     if (!errors_.empty()) return roll_back();
-    progress_.show(
-        fmt::format("{}: written, {} of {}", tool_->target.shown, ++written_, writes.size()));
+    progress_.advance(
+        {.what = tool_->target.shown + ": writing", .done = ++written_, .total = writes.size()});
   }
 }
 
@@ -192,10 +188,8 @@ void RestoreRun::verify() {
 
 /// A tool may change one parameter when another one is written, so everything is read once more.
 void RestoreRun::compare_everything() {
-  const auto now =
-      take_snapshot(*tool_, Secrets::include, *context_, [&](std::size_t done, std::size_t total) {
-        progress_.show(fmt::format("{}: verifying, {} of {}", tool_->target.shown, done, total));
-      });
+  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
+                                 progress_.counter(tool_->target.shown + ": verifying"));
   if (!now) {
     fail(now.error());
     return roll_back();
@@ -218,9 +212,7 @@ void RestoreRun::compare_everything() {
 device::Rollback::Reopen RestoreRun::reopener() {
   return [this](Duration patience) -> Result<device::Device> {
     progress_.show("the link is lost; trying to put the tool back");
-    const Duration usual = context_->common.connect_timeout.value_or(tool_->profile->link.connect);
-    calm_context_.common.connect_timeout = std::min(usual, patience);
-    auto opened = connect_device(tool_->target, *tool_->profile, calm_context_);
+    auto opened = calm_line_.connect(patience);
     if (!opened) return opened;
     auto known = opened->require_known_registers().and_then([&] { return same_tool(*opened); });
     if (!known) return tl::unexpected(std::move(known.error()));
@@ -249,7 +241,6 @@ void RestoreRun::roll_back() {
   if (!complete) outcome_ = {};  // what the tool holds matters more than why it came to that
   for (const device::PutBackReport& report : reports) report_put_back(report);
   if (complete) check_rolled_back(rollback);
-  progress_.clear();
 }
 
 void RestoreRun::report_put_back(const device::PutBackReport& report) {
@@ -266,9 +257,8 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
   Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
                                              before.to_string(), holds, report.trouble));
   if (report.result == PutBack::unknown) error.code = Errc::no_answer;
-  error.hint =
-      fmt::format("'spindle restore {} {}' puts everything back, '{}' finishes the restore",
-                  shell_word(tool_->target.shown), shell_word(saved_), command_to_finish());
+  error.hint = fmt::format("'{}' puts everything back, '{}' finishes the restore",
+                           command_for(tool_->target, saved_), command_to_finish());
   log_.add(logged(parameter, before, report.now.value_or(tried), "not-rolled-back"));
   fail(tool_->target.blamed(error));
 }
@@ -293,8 +283,7 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
     Error error = about(parameters[index],
                         fmt::format("holds {} after everything was put back, but held {} before",
                                     value->to_string(), before.to_string()));
-    error.hint = fmt::format("'spindle restore {} {}' puts everything back",
-                             shell_word(tool_->target.shown), shell_word(saved_));
+    error.hint = fmt::format("'{}' puts everything back", command_for(tool_->target, saved_));
     fail(tool_->target.blamed(error));
   }
 }
@@ -311,23 +300,23 @@ void RestoreRun::fail(const Error& error) {
 }
 
 std::string RestoreRun::command_to_finish() const {
-  std::string command = fmt::format("spindle restore {} {}", shell_word(tool_->target.shown),
-                                    shell_word(options_->file));
-  for (const std::string& pattern : options_->patterns) command += " " + shell_word(pattern);
-  return command;
+  return command_for(tool_->target, options_->file, options_->patterns);
+}
+
+/// What was written and is not put back, because nobody wants it so.
+void RestoreRun::tell_what_stays() {
+  const std::size_t planned = task_->plan.writes.size();
+  const bool left = !errors_.empty() && written_ < planned && rolled_back_ == 0;
+  if (!left || options_->on_failure != OnFailure::leave) return;
+  Error error = tool_->target.blamed(
+      {.code = errors_.front().code,
+       .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)});
+  error.hint = fmt::format("'{}' writes the rest", command_to_finish());
+  errors_.push_back(error);
 }
 
 Result<Outcome> RestoreRun::end() {
-  const std::size_t planned = task_->plan.writes.size();
-  const std::size_t unchanged = task_->plan.count(Skip::equal);
-  const bool left = !errors_.empty() && written_ < planned && rolled_back_ == 0;
-  if (left && options_->on_failure == OnFailure::leave) {
-    Error error = tool_->target.blamed(
-        {.code = errors_.front().code,
-         .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)});
-    error.hint = fmt::format("'{}' writes the rest", command_to_finish());
-    errors_.push_back(error);
-  }
+  tell_what_stays();
   auto listed = listing_->end();
   if (listed && errors_.empty() && options_->storing == Storing::yes) {
     listed = store(*tool_, log_, outcome_, *context_);
@@ -339,18 +328,23 @@ Result<Outcome> RestoreRun::end() {
   if (errors_.empty() && outcome_.failed() == 0) outcome_.succeed();
   if (!listed && errors_.empty()) return tl::unexpected(listed.error());
   if (!listed) return outcome_;
+  return summarise().map([&] { return outcome_; });
+}
+
+Result<void> RestoreRun::summarise() {
+  const catalogue::RestorePlan& plan = task_->plan;
+  const std::size_t unchanged = plan.count(Skip::equal);
   std::string sentence = fmt::format("{} written, {} unchanged", written_, unchanged);
   if (!errors_.empty()) sentence += fmt::format(", {} rolled back", rolled_back_);
-  return context_->renderer
-      .summary(summary_record({{"planned", count(planned)},
-                               {"written", count(written_)},
-                               {"unchanged", count(unchanged)},
-                               {"skipped", count(task_->plan.skipped.size() - unchanged)},
-                               {"rolled_back", count(rolled_back_)},
-                               {"saved_state", text_or_null(saved_)}},
-                              outcome_.status(), tool_->target.shown, context_->clock),
-               sentence)
-      .map([&] { return outcome_; });
+  return context_->renderer.summary(
+      summary_record({{"planned", count(plan.writes.size())},
+                      {"written", count(written_)},
+                      {"unchanged", count(unchanged)},
+                      {"skipped", count(plan.skipped.size() - unchanged)},
+                      {"rolled_back", count(rolled_back_)},
+                      {"saved_state", text_or_null(saved_)}},
+                     outcome_.status(), tool_->target.shown, context_->clock),
+      sentence);
 }
 
 }  // namespace spindle::commands

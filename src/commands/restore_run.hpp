@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calm_line.hpp"
 #include "change_log.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
@@ -53,13 +54,15 @@ class RestoreRun {
             const catalogue::Value& now, std::string_view result);
   void fail(const Error& error);
   [[nodiscard]] std::string command_to_finish() const;
+  void tell_what_stays();
   Result<Outcome> end();
+  Result<void> summarise();
 
   const RestoreOptions* options_;
   const RestoreTask* task_;
   OpenTool* tool_;
   Context* context_;
-  Context calm_context_;  ///< lines that are opened on it refer to it
+  CalmLine calm_line_;
   ChangeLog log_;
   ProgressLine progress_;
   std::optional<Listing> listing_ = std::nullopt;

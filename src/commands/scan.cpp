@@ -3,6 +3,7 @@
 #include <array>
 
 #include "listing.hpp"
+#include "progress.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
@@ -56,12 +57,6 @@ report::Record unit_record(modbus::UnitId unit, const device::Probe& probe, cons
                      {"round_trip_ms", std::move(time), std::move(shown)}}};
 }
 
-/// One line on a terminal that changes while the scan goes on; empty: it is taken away.
-void show_progress(std::string_view text, const Context& context) {
-  const bool ready = !context.io.err_is_ready || context.io.err_is_ready();
-  if (context.io.err_is_terminal && ready) context.io.err(fmt::format("\r\x1b[K{}", text));
-}
-
 /// Nothing came, or only what this side's own adapter said.
 bool is_silence(const Error& error) {
   return error.code == Errc::no_answer || error.code == Errc::local_echo;
@@ -92,24 +87,24 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
 
   Outcome outcome;
   Listing listing(context, columns);
+  ProgressLine progress(context);
   std::int64_t asked = 0;
   for (const modbus::UnitId unit : options.units) {
     if (!listing.open()) break;
-    show_progress(fmt::format("unit {}: {} of {}, {} found", unit.value, ++asked,
-                              options.units.size(), outcome.succeeded()),
-                  context);
+    progress.advance({.what = "units asked:",
+                      .done = static_cast<std::size_t>(asked++),
+                      .total = options.units.size(),
+                      .more = fmt::format("{} found", outcome.succeeded())});
     const auto probe = tool->device.probe(unit);
     if (probe) {
       outcome.succeed();
       listing.add(unit_record(unit, *probe, *bus, context.clock));
     } else if (!is_silence(probe.error())) {
-      show_progress({}, context);
       outcome.fail(probe.error());
       listing.add(with_unit(probe.error(), unit));
       if (!is_noise(probe.error())) break;
     }
   }
-  show_progress({}, context);
   if (outcome.succeeded() == 0) outcome.negate();
   return finish(listing, outcome,
                 {.counts = {{"asked", number(asked)}, {"found", count(outcome.succeeded())}},

@@ -117,6 +117,7 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
       if (!overlap(earlier.parameter, assignment->parameter)) continue;
       return tl::unexpected(Error{.code = Errc::usage,
                                   .message = "its register is assigned twice",
+                                  .hint = "give it one value",
                                   .name = assignment->parameter.name,
                                   .register_address = assignment->parameter.address.value});
     }

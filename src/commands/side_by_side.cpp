@@ -20,4 +20,20 @@ std::vector<std::vector<std::size_t>> by_line(const std::vector<Target>& targets
   return lines;
 }
 
+FinishedTools::FinishedTools(ProgressLine* progress, std::size_t tools, std::size_t at_once)
+    : progress_(tools > 1 ? progress : nullptr),
+      step_({.what = "tools done:", .total = tools, .at_once = at_once}) {
+  show();
+}
+
+void FinishedTools::add() {
+  const std::lock_guard lock(mutex_);
+  ++step_.done;
+  show();
+}
+
+void FinishedTools::show() {
+  if (progress_ != nullptr) progress_->advance(step_);
+}
+
 }  // namespace spindle::commands

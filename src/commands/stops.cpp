@@ -60,6 +60,7 @@ Result<catalogue::Action> find_start(const catalogue::Profile& profile) {
   if (start && start->value && start->stop_value) return start;
   return tl::unexpected(Error{.code = Errc::usage,
                               .message = "this product can not be started and stopped by Modbus",
+                              .hint = "start and stop it at the tool",
                               .name = profile.id});
 }
 

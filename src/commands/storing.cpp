@@ -9,6 +9,7 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile) {
   if (storing == Storing::no || profile.find_action(store_action)) return {};
   return tl::unexpected(Error{.code = Errc::usage,
                               .message = "this product stores what it is told by itself",
+                              .hint = "leave --save out",
                               .name = "--save"});
 }
 

@@ -258,7 +258,9 @@ Result<Target> resolve_target(const std::string& text, const Context& context,
 
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context) {
   if (target.profile.empty()) return catalogue::Profile();
-  return context.profiles.load(target.profile);
+  auto profile = context.profiles.load(target.profile);
+  if (!profile) profile.error().asked_of = target.shown;
+  return profile;
 }
 
 Target known_target(const OpenTool& tool) {

@@ -32,10 +32,12 @@ std::string_view to_text(link::Decision decision) {
       return "echo of our request, ignored";
     case link::Decision::junk:
       return "no frame";
+    case link::Decision::unanswered:
+      return "no answer";
     case link::Decision::retry:
       return "asking again";
-    case link::Decision::quarantine:
-      return "quarantine";
+    case link::Decision::resync:
+      return "resync";
   }
   return "";
 }

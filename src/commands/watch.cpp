@@ -89,10 +89,10 @@ class Stage {
  private:
   report::Record record_of(const device::EventNews& news, const NewsRecords& records) {
     report::Record record = records.event(news);
-    const std::string kind = records.kind_of(news.block);
+    const catalogue::EventKind kind = records.kind_of(news.block);
     ++events_;
-    if (kind == "fastening-ok") ++ok_;
-    if (kind == "fastening-ng") ++ng_;
+    if (kind == catalogue::EventKind::fastening_ok) ++ok_;
+    if (kind == catalogue::EventKind::fastening_ng) ++ng_;
     last_event_ = context_->clock.now();
     return record;
   }
@@ -259,6 +259,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   if (!tools) return tl::unexpected(std::move(tools.error()));
   for (const WatchedTool& tool : *tools) {
     if (auto checked = check(options, tool, shelf, context); !checked) {
+      checked.error().asked_of = tool.target().shown;
       return tl::unexpected(std::move(checked.error()));
     }
   }
@@ -269,6 +270,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   Stage stage(options, tools->size(), columns_for(*tools), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, open_transport, stage, options, context);
+    if (!watched) watched.error().asked_of = tool.target().shown;
     stage.leave(watched);
   });
   return stage.finish();

@@ -330,9 +330,9 @@ Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& par
   }
   std::vector<RegisterRange> wanted_limits;
   if (limits == Limits::read) wanted_limits = limit_ranges(parameters, nullptr);
-  const std::size_t first_part = progress ? client_.count_requests(wanted) : 0;
+  const std::size_t first_part = progress ? client_.count_wanted(wanted) : 0;
   const std::size_t second_part =
-      progress && !wanted_limits.empty() ? client_.count_requests(wanted_limits) : 0;
+      progress && !wanted_limits.empty() ? client_.count_wanted(wanted_limits) : 0;
   auto values = client_.read_each(wanted, [&](std::size_t done, std::size_t total) {
     if (progress) progress(done, total + second_part);
   });

@@ -46,6 +46,7 @@ Result<Motor> Motor::of(const catalogue::Profile& profile) {
   if (!profile.run) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "this product has no motor that a command word runs",
+                                .hint = "its profile lacks 'run'",
                                 .name = profile.id});
   }
   Motor motor;

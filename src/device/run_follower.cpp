@@ -8,6 +8,8 @@
 namespace spindle::device {
 namespace {
 
+using catalogue::EventKind;
+
 /// How often the running state is read.
 constexpr Duration look_interval = std::chrono::milliseconds(100);
 /// How long the event of a run that ended may still be on its way.
@@ -15,8 +17,9 @@ constexpr Duration event_grace = std::chrono::milliseconds(500);
 /// A motor runs: one lost answer is forgiven, however often the user lets reads be repeated.
 constexpr unsigned retries_while_running = 1;
 
-bool is_result(std::string_view kind) {
-  return kind == "fastening-ok" || kind == "fastening-ng" || kind == "error";
+bool is_result(std::optional<EventKind> kind) {
+  return kind == EventKind::fastening_ok || kind == EventKind::fastening_ng ||
+         kind == EventKind::error;
 }
 
 }  // namespace
@@ -25,15 +28,8 @@ RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& 
     : device_(&device),
       start_(&start),
       clock_(&clock),
-      answer_timeout_(device.session().options().answer_timeout) {
-  const catalogue::Profile& profile = device.profile();
-  const auto index_of = [&](const std::string& name) -> std::size_t {
-    const auto parameter = profile.find(name);
-    return parameter ? parameter->address.value - profile.events->first : 0U;
-  };
-  number_at_ = index_of(profile.events->number);
-  kind_at_ = index_of(profile.events->kind);
-}
+      layout_(device.profile()),
+      answer_timeout_(device.session().options().answer_timeout) {}
 
 Result<void> RunFollower::prepare() {
   const auto number = device_->event_number();
@@ -120,12 +116,12 @@ Result<std::optional<EventNews>> RunFollower::fetch_result() {
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:
 /// loosening ends neither well nor badly.
 std::optional<EventNews> RunFollower::sift(EventNews event) {
-  const bool is_new = tracker_.track(event.block[number_at_], event.block).is_new();
+  const bool is_new = tracker_.track(layout_.number_of(event.block), event.block).is_new();
   // A tool that was switched off and on has had no event at all.
   if (!is_new || EventTracker::is_blank(event.block)) return std::nullopt;
-  const std::string& kind = kind_of(event);
+  const auto kind = layout_.kind_of(event.block);
   if (is_result(kind)) return event;
-  if (kind == "other") other_ = std::move(event);
+  if (kind == EventKind::other) other_ = std::move(event);
   return std::nullopt;
 }
 
@@ -134,13 +130,6 @@ Result<std::optional<EventNews>> RunFollower::late_event() {
   if (!event || !*event) event = fetch_result();
   if (event && !*event) return std::exchange(other_, std::nullopt);
   return event;
-}
-
-const std::string& RunFollower::kind_of(const EventNews& event) const {
-  static const std::string unknown;
-  const auto& kinds = device_->profile().events->kinds;
-  const auto kind = kinds.find(event.block[kind_at_]);
-  return kind == kinds.end() ? unknown : kind->second;
 }
 
 void RunFollower::leave() {

@@ -162,10 +162,8 @@ Result<void> Watcher::learn(const catalogue::Profile& profile) {
   previous_.assign(plan_.values.size(), std::nullopt);
   motor_.reset();
   profile_ = &profile;
-  if (!profile.events) return {};
-  const auto number = profile.find(profile.events->number);
-  if (!number) return tl::unexpected(number.error());
-  number_at_ = number->address.value - profile.events->first;
+  layout_.reset();
+  if (profile.events) layout_.emplace(profile);
   return {};
 }
 

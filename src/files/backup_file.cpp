@@ -218,8 +218,11 @@ bool has_form(const YamlNode& document, Findings& findings) {
   if (!expect(document, YamlNode::Kind::map, findings)) return false;
   const YamlNode* named = document.find("kind");
   if (named == nullptr || named->text != kind) {
-    findings.add(named == nullptr ? document.at : named->at,
-                 fmt::format("this is no backup: it does not say 'kind: {}'", kind));
+    findings.add(
+        named == nullptr ? document.at : named->at,
+        fmt::format(
+            "this is no backup: it does not say 'kind: {}', as those of 'spindle backup' do",
+            kind));
     return false;
   }
   const YamlNode* format = document.find("format");
@@ -260,7 +263,8 @@ void read_document(const YamlNode& document, std::string_view text, BackupFile& 
                    Findings& findings) {
   if (!has_form(document, findings)) return;
   if (document.find("end") == nullptr) {
-    findings.add(end_of(text, document.at.file), "the end marker is missing: the file is cut off");
+    findings.add(end_of(text, document.at.file),
+                 "the end marker is missing: the file is cut off; take another backup");
     return;
   }
   YamlMap map(document, findings);

@@ -22,8 +22,6 @@ constexpr std::array<std::pair<std::string_view, catalogue::CodeTable>, 3> table
      {"warning-codes", catalogue::CodeTable::warning},
      {"refusals", catalogue::CodeTable::refusal}}};
 
-Need need_of(bool inherited) { return inherited ? Need::optional : Need::required; }
-
 RunWords read_words(const YamlNode& node, Findings& findings) {
   YamlMap map(node, findings);
   RunWords words;
@@ -323,9 +321,7 @@ class DriveRules {
 
 void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.run.has_value());
-  if (!draft.profile.run) draft.profile.run.emplace();
-  RunFacts& run = *draft.profile.run;
+  auto [run, need] = section_of(draft.profile.run);
   assign(run.evidence, map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, need));
   assign(run.source, map.text("source", need));
   if (const YamlNode* part = map.get("command", need)) read_command(*part, run, need, findings);
@@ -339,9 +335,7 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
 
 void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.refusals.has_value());
-  if (!draft.profile.refusals) draft.profile.refusals.emplace();
-  catalogue::RefusalFacts& refusals = *draft.profile.refusals;
+  auto [refusals, need] = section_of(draft.profile.refusals);
   assign(refusals.parameter, map.text("parameter", need));
   if (const YamlNode* codes = map.get("codes", need)) {
     read_codes(*codes, refusals.codes, findings);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -20,6 +21,21 @@ inline constexpr std::array<std::pair<std::string_view, catalogue::Evidence>, 4>
      {"transcribed", catalogue::Evidence::transcribed},
      {"sibling", catalogue::Evidence::sibling},
      {"inferred", catalogue::Evidence::inferred}}};
+
+/// A section that is laid over what earlier layers of the profile say of it; what it must say is
+/// needed only of the first of them.
+template <typename Facts>
+struct Section {
+  Facts& facts;
+  Need need;
+};
+
+template <typename Facts>
+Section<Facts> section_of(std::optional<Facts>& facts) {
+  const Need need = facts ? Need::optional : Need::required;
+  if (!facts) facts.emplace();
+  return {*facts, need};
+}
 
 /// Lays the lists `parameters` and `actions` over the draft; a name of an earlier layer is
 /// replaced, a name of the same layer is a finding.

@@ -163,9 +163,7 @@ void read_total(const YamlNode& node, catalogue::IdentityFacts& identity, Findin
 
 void read_identity(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.identity.has_value());
-  if (!draft.profile.identity) draft.profile.identity.emplace();
-  catalogue::IdentityFacts& identity = *draft.profile.identity;
+  auto [identity, need] = section_of(draft.profile.identity);
   assign(identity.minimum_bytes, map.number<std::uint8_t>("minimum-bytes", need));
   assign(identity.id, read_slice(map, "id"));
   assign(identity.controller_model, read_slice(map, "controller-model"));
@@ -192,26 +190,35 @@ void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& fin
   map.finish();
 }
 
+void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& findings) {
+  std::map<std::int64_t, std::string> names;
+  read_names(node, names, findings);
+  for (const auto& [number, name] : names) {
+    if (const auto kind = catalogue::parse_event_kind(name)) {
+      events.kinds.insert_or_assign(number, *kind);
+    } else {
+      const auto& known = catalogue::event_kind_texts;
+      findings.add_once(node->at, unknown_word("event kind", name, {known.begin(), known.end()}));
+    }
+  }
+}
+
 void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.events.has_value());
-  if (!draft.profile.events) draft.profile.events.emplace();
-  catalogue::EventFacts& events = *draft.profile.events;
+  auto [events, need] = section_of(draft.profile.events);
   if (const YamlNode* arm = map.get("arm", need)) read_arm(*arm, events, findings);
   assign(events.function, map.number<std::uint8_t>("function", need));
   assign(events.first, map.number<std::uint16_t>("first", need));
   assign(events.count, map.number<std::uint16_t>("count", need));
   assign(events.number, map.text("number", need));
   assign(events.kind, map.text("kind", need));
-  read_names(map.get("kinds"), events.kinds, findings);
+  read_kinds(map.get("kinds"), events, findings);
   map.finish();
 }
 
 void read_limits(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.limits.has_value());
-  if (!draft.profile.limits) draft.profile.limits.emplace();
-  catalogue::LimitFacts& limits = *draft.profile.limits;
+  auto [limits, need] = section_of(draft.profile.limits);
   assign(limits.minimum_offset, map.number<std::uint16_t>("minimum-offset", need));
   assign(limits.maximum_offset, map.number<std::uint16_t>("maximum-offset", need));
   assign(limits.from, map.number<std::uint16_t>("from", need));
@@ -221,9 +228,7 @@ void read_limits(const YamlNode& node, ProfileDraft& draft, Findings& findings) 
 
 void read_numbered(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
-  const Need need = need_of(draft.profile.numbered.has_value());
-  if (!draft.profile.numbered) draft.profile.numbered.emplace();
-  catalogue::NumberedFacts& numbered = *draft.profile.numbered;
+  auto [numbered, need] = section_of(draft.profile.numbered);
   assign(numbered.prefix, map.text("prefix", need));
   assign(numbered.table, map.word<modbus::RegisterTable>("table", "table", table_words));
   assign(numbered.from, map.number<std::uint16_t>("from", need));

@@ -393,19 +393,6 @@ void arming_is_no_parameter(const ProfileDraft& draft, Findings& findings) {
                     fmt::format("register {} arms events, but is also a parameter", address.value));
 }
 
-void event_kinds_are_known(const ProfileDraft& draft, Findings& findings) {
-  if (!draft.profile.events) return;
-  const std::vector<std::string> known = {"fastening-ok",  "fastening-ng", "direction-change",
-                                          "preset-change", "alarm-reset",  "error",
-                                          "barcode",       "screw-count",  "other"};
-  for (const auto& [number, kind] : draft.profile.events->kinds) {
-    if (std::find(known.begin(), known.end(), kind) != known.end()) continue;
-    const std::string hint = suggestion(kind, known);
-    findings.add_once(draft.events.of("kinds"), fmt::format("unknown event kind '{}'{}{}", kind,
-                                                            hint.empty() ? "" : "; ", hint));
-  }
-}
-
 void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
   if (!draft.profile.limits) return;
   const catalogue::LimitFacts& limits = *draft.profile.limits;
@@ -445,7 +432,7 @@ void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 25> rules = {
+constexpr std::array<Rule, 24> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -467,7 +454,6 @@ constexpr std::array<Rule, 25> rules = {
     event_block_is_legal,
     event_fields_are_in_the_block,
     arming_is_no_parameter,
-    event_kinds_are_known,
     limits_are_in_the_table,
     numbered_are_usable,
     exception_codes_fit,

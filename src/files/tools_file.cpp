@@ -29,8 +29,8 @@ bool is_tool_name(std::string_view text) {
 void check_name(const YamlEntry& entry, Findings& findings) {
   if (is_tool_name(entry.key)) return;
   findings.add(entry.key_at,
-               fmt::format("name '{}' is not made of letters, digits, '_', '.' and '-', beginning "
-                           "with a letter or digit",
+               fmt::format("name '{}' is not made of the letters a to z and A to Z, digits, '_', "
+                           "'.' and '-', beginning with a letter or digit",
                            entry.key));
 }
 
@@ -126,8 +126,10 @@ Result<Tools> read_tools_file(const std::string& path, Findings& findings) {
 Result<Tools> load_tools(const std::string& path) {
   Findings findings;
   auto tools = read_tools_file(path, findings);
-  if (tools && !findings.empty()) return tl::unexpected(findings.error());
-  return tools;
+  if (!tools || findings.empty()) return tools;
+  Error error = findings.error();
+  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
+  return tl::unexpected(std::move(error));
 }
 
 Result<CheckedTools> check_tools(const std::string& path) {

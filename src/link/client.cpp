@@ -111,6 +111,12 @@ bool is_missing_register(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
 
+std::size_t count_pieces(const std::vector<PlannedRead>& plan) {
+  std::size_t pieces = 0;
+  for (const PlannedRead& planned : plan) pieces += planned.wanted.size();
+  return pieces;
+}
+
 }  // namespace
 
 std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
@@ -165,6 +171,7 @@ Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries) {
   auto response = session_->transact(request);
   for (unsigned retry = 0; retry < retries && !response && response.error().code == Errc::no_answer;
        ++retry) {
+    session_->tell_retry(request);
     response = session_->transact(request);
   }
   if (!response) return response;
@@ -200,10 +207,15 @@ Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted
                                         const Progress& progress) {
   RegisterImage image;
   const auto plan = plan_reads(askable(wanted, image), limits_, absent_registers());
+  const std::size_t total = count_pieces(plan);
   std::size_t done = 0;
+  const Settled settled = [&](const PlannedRead& part) {
+    done += part.wanted.size();
+    if (progress) progress(done, total);
+  };
   for (const PlannedRead& planned : plan) {
-    if (auto read = read_or_bisect(planned, image); !read) return tl::unexpected(read.error());
-    if (progress) progress(++done, plan.size());
+    auto read = read_or_bisect(planned, image, settled);
+    if (!read) return tl::unexpected(std::move(read.error()));
   }
   return image;
 }
@@ -222,13 +234,15 @@ std::vector<RegisterRange> Client::askable(const std::vector<RegisterRange>& wan
   return pieces;
 }
 
-Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& image) {
+Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& image,
+                                    const Settled& settled) {
   std::vector<PlannedRead> allowed;  // a half may have the shape that the whole had not
   append_allowed(planned, limits_, allowed);
   for (const PlannedRead& part : allowed) {
     auto registers = read(part.range);
     if (registers) {
       image.store(part.range, *registers);
+      settled(part);
       continue;
     }
     if (registers.error().code != Errc::exception_response) {
@@ -236,11 +250,13 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
     }
     if (!is_missing_register(registers.error()) || part.wanted.size() == 1) {
       remember(part, registers.error(), image);
+      settled(part);
       continue;
     }
     const auto [head, tail] = split_at(part, part.wanted.size() / 2);
-    if (auto read_head = read_or_bisect(head, image); !read_head) return read_head;
-    if (auto read_tail = read_or_bisect(tail, image); !read_tail) return read_tail;
+    for (const PlannedRead& half : {head, tail}) {
+      if (auto read = read_or_bisect(half, image, settled); !read) return read;
+    }
   }
   return {};
 }
@@ -269,9 +285,9 @@ void Client::avoid(const RegisterRange& range) {
   for (std::uint32_t key = first; key < first + range.count; ++key) avoided_.insert(key);
 }
 
-std::size_t Client::count_requests(const std::vector<RegisterRange>& wanted) const {
+std::size_t Client::count_wanted(const std::vector<RegisterRange>& wanted) const {
   RegisterImage unused;
-  return plan_reads(askable(wanted, unused), limits_, absent_registers()).size();
+  return count_pieces(plan_reads(askable(wanted, unused), limits_, absent_registers()));
 }
 
 std::set<std::uint32_t> Client::absent_registers() const {

@@ -120,7 +120,12 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   }
   Error error = std::move(answer.error());
   if (error.tried.empty()) error.tried = modbus::describe_request(request);
+  decide(Decision::unanswered, message_of(error));
   return tl::unexpected(std::move(error));
+}
+
+void Session::tell_retry(const modbus::Pdu& request) const {
+  decide(Decision::retry, modbus::explain_request(request));
 }
 
 Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
@@ -254,13 +259,13 @@ Result<std::optional<modbus::Adu>> Session::take_frame() {
     auto deframing = modbus::deframe(options_.rules.framing, modbus::Role::client, buffer_);
     if (std::holds_alternative<modbus::NeedMore>(deframing)) return std::nullopt;
     if (auto* frame = std::get_if<modbus::Deframed>(&deframing)) {
-      counters_.noise_bytes += frame->skipped;
+      note_noise(frame->skipped);
       buffer_.erase(buffer_.begin(),
                     buffer_.begin() + static_cast<std::ptrdiff_t>(frame->consumed));
       return std::move(frame->adu);
     }
     const auto& junk = std::get<modbus::Junk>(deframing);
-    if (trace_.decision) trace_.decision(Decision::junk, junk.reason);
+    decide(Decision::junk, junk.reason);
     if (options_.rules.framing == modbus::Framing::tcp) {
       // Left in the buffer: every later attempt on this connection fails alike, until it is
       // reopened.
@@ -355,21 +360,27 @@ Result<void> Session::wait_for_silence(TimePoint not_before) {
                                   .hint = "another master, noise or a wrong rate?"});
     }
   }
-  counters_.noise_bytes += buffer_.size();
+  note_noise(buffer_.size());
   buffer_.clear();
   return {};
+}
+
+void Session::note_noise(std::size_t bytes) {
+  if (bytes == 0) return;
+  counters_.noise_bytes += bytes;
+  decide(Decision::junk, fmt::format("{} byte{} skipped", bytes, bytes == 1 ? "" : "s"));
 }
 
 /// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
 /// then prove the line.
 Result<void> Session::leave_quarantine() {
-  if (trace_.decision)
-    trace_.decision(Decision::quarantine, "waiting until no late answer can come");
+  decide(Decision::resync, "waiting until no late answer can come");
   if (auto silent = wait_for_silence(*quarantined_until_); !silent) return silent;
   if (options_.proof == SessionOptions::Proof::loopback) {
     auto proved = exchange(modbus::loopback_request(fresh_word()));
     if (!proved) return tl::unexpected(std::move(proved.error()));
   }
+  decide(Decision::resync, "the line is in step again");
   quarantined_until_.reset();
   abandoned_.reset();
   return {};
@@ -436,7 +447,16 @@ std::string Session::describe_frame(const modbus::Adu& adu) const {
 }
 
 void Session::decide(Decision decision, const modbus::Adu& adu) const {
-  if (trace_.decision) trace_.decision(decision, describe_frame(adu));
+  if (!trace_.decision) return;
+  const bool is_ours = decision == Decision::request || decision == Decision::echo;
+  const std::string id = is_rtu() ? "" : fmt::format("id {:04X}, ", adu.transaction.value);
+  decide(decision, fmt::format("{}unit {}: {}", id, adu.unit.value,
+                               is_ours ? modbus::explain_request(adu.pdu)
+                                       : modbus::explain_response(adu.pdu)));
+}
+
+void Session::decide(Decision decision, std::string_view text) const {
+  if (trace_.decision) trace_.decision(decision, text);
 }
 
 }  // namespace spindle::link

@@ -131,6 +131,52 @@ struct Describe {
   }
 };
 
+/// The same with the values.
+struct Explain : Describe {
+  using Describe::operator();
+  std::string operator()(const WriteSingleRequest& write) const {
+    return fmt::format("write {} to register {}", write.value, write.address.value);
+  }
+  std::string operator()(const WriteMultipleRequest& write) const {
+    return fmt::format("write {} to {} register{} from {}", fmt::join(write.values, " "),
+                       write.values.size(), plural(write.values.size()), write.first.value);
+  }
+  std::string operator()(const LoopbackRequest& loopback) const {
+    return fmt::format("loop-back of {:04X}", loopback.word);
+  }
+};
+
+std::string explain_bytes(const Pdu& pdu) {
+  return fmt::format("function {:02X}, data {}", pdu.function, to_hex(pdu.data));
+}
+
+/// Counted bytes, as answers to reads and to FC 11h have them.
+bool is_counted(const Pdu& pdu) {
+  return !pdu.data.empty() && pdu.data.size() == std::size_t{1} + pdu.data.front();
+}
+
+std::string explain_read(const Pdu& response) {
+  const Registers registers = registers_of(response);
+  if (!is_counted(response) || response.data.front() % 2 != 0) return explain_bytes(response);
+  return fmt::format("{} register{}: {}", registers.size(), plural(registers.size()),
+                     fmt::join(registers, " "));
+}
+
+/// Responses that are the echo of their request, or of its beginning.
+std::string explain_echo(const Pdu& response) {
+  if (response.data.size() != 4) return explain_bytes(response);
+  const std::uint16_t first = get_u16(response.data, 0);
+  const std::uint16_t second = get_u16(response.data, 2);
+  switch (static_cast<FunctionCode>(response.function)) {
+    case FunctionCode::write_single_register:
+      return fmt::format("wrote {} to register {}", second, first);
+    case FunctionCode::write_multiple_registers:
+      return fmt::format("wrote {} register{} from {}", second, plural(second), first);
+    default:
+      return fmt::format("loop-back of {:04X}", second);
+  }
+}
+
 }  // namespace
 
 Pdu read_request(RegisterTable table, RegisterAddress first, std::uint16_t count) {
@@ -220,6 +266,32 @@ std::string describe_request(const Pdu& request) {
   const auto parsed = parse_request(request);
   if (!parsed) return fmt::format("function 0x{:02X}", request.function);
   return std::visit(Describe{}, *parsed);
+}
+
+std::string explain_request(const Pdu& request) {
+  const auto parsed = parse_request(request);
+  return parsed ? std::visit(Explain(), *parsed) : explain_bytes(request);
+}
+
+std::string explain_response(const Pdu& response) {
+  if (const auto code = exception_of(response)) {
+    const std::string_view name = exception_name(*code);
+    return name.empty() ? fmt::format("exception {:02X}", *code)
+                        : fmt::format("exception {:02X} ({})", *code, name);
+  }
+  switch (static_cast<FunctionCode>(response.function)) {
+    case FunctionCode::read_holding_registers:
+    case FunctionCode::read_input_registers:
+      return explain_read(response);
+    case FunctionCode::write_single_register:
+    case FunctionCode::write_multiple_registers:
+    case FunctionCode::diagnostics:
+      return explain_echo(response);
+    case FunctionCode::report_server_id:
+      if (is_counted(response)) return fmt::format("server id {}", to_hex(server_id_of(response)));
+      break;
+  }
+  return explain_bytes(response);
 }
 
 std::string_view exception_name(std::uint8_t code) {

@@ -29,9 +29,26 @@ constexpr mode_t usual_file = 0666;  // less what the user masks
 /// Names of temporary files that may be taken by what a killed program left.
 constexpr unsigned most_attempts = 100;
 
+std::string hint_for(int code) {
+  switch (code) {
+    case ENOENT:
+      return "is its folder there?";
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return "check who may read and write there";
+    case ENOSPC:
+    case EDQUOT:
+      return "free some space, or choose another disk";
+    default:
+      return {};
+  }
+}
+
 Error failed(const std::string& path, std::string_view what, int code) {
   return {.code = Errc::bad_file,
           .message = fmt::format("{}: {}", what, std::generic_category().message(code)),
+          .hint = hint_for(code),
           .name = path};
 }
 
@@ -43,7 +60,10 @@ Error exists_already(const std::string& path) {
 }
 
 Error not_a_file(const std::string& path) {
-  return {.code = Errc::bad_file, .message = "this is no ordinary file", .name = path};
+  return {.code = Errc::bad_file,
+          .message = "this is no ordinary file",
+          .hint = "choose another path",
+          .name = path};
 }
 
 /// 0, or the errno of the write that failed.
@@ -62,9 +82,11 @@ int write_all(int descriptor, std::string_view text) {
 Result<std::string> read_file(const std::string& path) {
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file.valid()) {
-    return tl::unexpected(
-        errno == ENOENT ? Error{.code = Errc::bad_file, .message = "no such file", .name = path}
-                        : failed(path, "cannot be read", errno));
+    return tl::unexpected(errno == ENOENT ? Error{.code = Errc::bad_file,
+                                                  .message = "no such file",
+                                                  .hint = "check the path",
+                                                  .name = path}
+                                          : failed(path, "cannot be read", errno));
   }
   struct stat about = {};
   if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) {

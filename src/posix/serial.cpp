@@ -220,36 +220,24 @@ Port::~Port() {
 class SerialTransport final : public link::Transport {
  public:
   SerialTransport(Port port, const Clock& clock, const Interrupt& interrupt)
-      : port_(std::move(port)), clock_(&clock), interrupt_(&interrupt) {}
+      : port_(std::move(port)), wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
-  void shield() override { shield_ = Shield::up; }
+  void shield() override { wait_.shield(); }
 
  private:
-  [[nodiscard]] bool interrupted() const { return shield_ == Shield::down && interrupt_->raised(); }
   [[nodiscard]] bool hung_up() const;
-  // Whether the port became ready before the deadline.
-  Result<bool> wait(short events, TimePoint deadline) const;
   Result<void> drain() const;
 
   Port port_;
-  const Clock* clock_;
-  const Interrupt* interrupt_;
-  Shield shield_ = Shield::down;
+  LineWait wait_;
 };
 
 Error unplugged_error(int error_number) {
   return {.code = Errc::reset,
           .message = fmt::format("the serial port is gone ({})", words(error_number)),
           .hint = "was the adapter pulled out? plug it in and try again"};
-}
-
-Result<bool> SerialTransport::wait(short events, TimePoint deadline) const {
-  const Interest interest = {.descriptor = port_.number(), .events = events};
-  const Woken woken = wait_for(interest, deadline, *clock_, *interrupt_, shield_);
-  if (woken == Woken::interrupted) return tl::unexpected(interrupt_->error());
-  return woken == Woken::ready;
 }
 
 bool SerialTransport::hung_up() const {
@@ -259,7 +247,7 @@ bool SerialTransport::hung_up() const {
 
 Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
   while (!bytes.empty()) {
-    if (interrupted()) return tl::unexpected(interrupt_->error());
+    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
     const ssize_t sent = ::write(port_.number(), bytes.data(), bytes.size());
     if (sent > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -268,7 +256,7 @@ Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0 && errno != EAGAIN) return tl::unexpected(unplugged_error(errno));
     if (hung_up()) return tl::unexpected(unplugged_error(EIO));
-    const Result<bool> ready = wait(POLLOUT, deadline);
+    const Result<bool> ready = wait_.until_ready({port_.number(), POLLOUT}, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) {
       return tl::unexpected(
@@ -281,7 +269,7 @@ Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
 Result<void> SerialTransport::drain() const {
   while (::tcdrain(port_.number()) != 0) {
     if (errno != EINTR) return tl::unexpected(unplugged_error(errno));
-    if (interrupted()) return tl::unexpected(interrupt_->error());
+    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
   }
   return {};
 }
@@ -289,14 +277,14 @@ Result<void> SerialTransport::drain() const {
 Result<std::size_t> SerialTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
   for (;;) {
     // Before every read: an interrupt wins over data that never ends, too.
-    if (interrupted()) return tl::unexpected(interrupt_->error());
+    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
     const ssize_t received = ::read(port_.number(), into.data(), into.size());
     if (received > 0) return static_cast<std::size_t>(received);
     if (received < 0 && errno == EINTR) continue;
     if (received < 0 && errno != EAGAIN) return tl::unexpected(unplugged_error(errno));
     // No bytes is what a port says both when there are none and when it is gone.
     if (hung_up()) return tl::unexpected(unplugged_error(EIO));
-    const Result<bool> ready = wait(POLLIN, deadline);
+    const Result<bool> ready = wait_.until_ready({port_.number(), POLLIN}, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) return 0;
   }

@@ -1,6 +1,7 @@
 #include "spindle/posix/streams.hpp"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -36,8 +37,8 @@ Result<void> write_out(std::string_view text) {
   if (failure == EPIPE) return tl::unexpected(Error{.code = Errc::closed_pipe});
   return tl::unexpected(Error{
       .code = Errc::internal,
-      .message = "cannot write the output: " + std::generic_category().message(failure),
-      .hint = "check the file or disk that the output goes to",
+      .message = "standard output cannot be written: " + std::generic_category().message(failure),
+      .hint = "check the file, disk or program that it goes to",
   });
 }
 
@@ -63,13 +64,13 @@ std::function<std::optional<std::string>()> line_reader(const Clock& clock,
   };
 }
 
-bool is_terminal(Stream stream) {
+bool is_terminal(Std stream) {
   switch (stream) {
-    case Stream::in:
+    case Std::in:
       return ::isatty(STDIN_FILENO) == 1;
-    case Stream::out:
+    case Std::out:
       return ::isatty(STDOUT_FILENO) == 1;
-    case Stream::err:
+    case Std::err:
       return ::isatty(STDERR_FILENO) == 1;
   }
   return false;
@@ -78,6 +79,11 @@ bool is_terminal(Stream stream) {
 bool err_is_ready() {
   pollfd room = {STDERR_FILENO, POLLOUT, 0};
   return ::poll(&room, 1, 0) != 0;
+}
+
+std::size_t err_columns() {
+  winsize size = {};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
 }
 
 bool out_is_open() {

@@ -44,33 +44,20 @@ void set_options(const Descriptor& socket) {
 class TcpTransport final : public link::Transport {
  public:
   TcpTransport(Descriptor socket, const Clock& clock, const Interrupt& interrupt)
-      : socket_(std::move(socket)), clock_(&clock), interrupt_(&interrupt) {}
+      : socket_(std::move(socket)), wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
-  void shield() override { shield_ = Shield::up; }
+  void shield() override { wait_.shield(); }
 
  private:
-  [[nodiscard]] bool interrupted() const { return shield_ == Shield::down && interrupt_->raised(); }
-  // Whether the socket became ready before the deadline.
-  Result<bool> wait(short events, TimePoint deadline) const;
-
   Descriptor socket_;
-  const Clock* clock_;
-  const Interrupt* interrupt_;
-  Shield shield_ = Shield::down;
+  LineWait wait_;
 };
-
-Result<bool> TcpTransport::wait(short events, TimePoint deadline) const {
-  const Interest interest = {.descriptor = socket_.number(), .events = events};
-  const Woken woken = wait_for(interest, deadline, *clock_, *interrupt_, shield_);
-  if (woken == Woken::interrupted) return tl::unexpected(interrupt_->error());
-  return woken == Woken::ready;
-}
 
 Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
   while (!bytes.empty()) {
-    if (interrupted()) return tl::unexpected(interrupt_->error());
+    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
     const ssize_t sent = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -78,7 +65,7 @@ Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
     }
     if (errno == EINTR) continue;
     if (errno != EAGAIN) return tl::unexpected(stream_error(errno));
-    const Result<bool> ready = wait(POLLOUT, deadline);
+    const Result<bool> ready = wait_.until_ready({socket_.number(), POLLOUT}, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) {
       return tl::unexpected(
@@ -91,13 +78,13 @@ Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
 Result<std::size_t> TcpTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
   for (;;) {
     // Before every read: an interrupt wins over data that never ends, too.
-    if (interrupted()) return tl::unexpected(interrupt_->error());
+    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
     const ssize_t received = ::recv(socket_.number(), into.data(), into.size(), 0);
     if (received > 0) return static_cast<std::size_t>(received);
     if (received == 0) return tl::unexpected(Error{.code = Errc::closed});
     if (errno == EINTR) continue;
     if (errno != EAGAIN) return tl::unexpected(stream_error(errno));
-    const Result<bool> ready = wait(POLLIN, deadline);
+    const Result<bool> ready = wait_.until_ready({socket_.number(), POLLIN}, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) return 0;
   }

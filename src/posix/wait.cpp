@@ -34,4 +34,15 @@ Woken wait_for(Interest interest, TimePoint deadline, const Clock& clock,
   }
 }
 
+Result<void> LineWait::check() const {
+  if (shield_ == Shield::up || !interrupt_->raised()) return {};
+  return tl::unexpected(interrupt_->error());
+}
+
+Result<bool> LineWait::until_ready(Interest interest, TimePoint deadline) const {
+  const Woken woken = wait_for(interest, deadline, *clock_, *interrupt_, shield_);
+  if (woken == Woken::interrupted) return tl::unexpected(interrupt_->error());
+  return woken == Woken::ready;
+}
+
 }  // namespace spindle::posix

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "spindle/base/clock.hpp"
+#include "spindle/base/error.hpp"
 #include "spindle/base/interrupt.hpp"
 
 namespace spindle::posix {
@@ -33,5 +34,25 @@ int poll_until(std::span<pollfd> descriptors, TimePoint deadline, const Clock& c
 /// Waits until the descriptor is ready, the deadline passes or an interrupt is raised.
 Woken wait_for(Interest interest, TimePoint deadline, const Clock& clock,
                const Interrupt& interrupt, Shield shield = Shield::down);
+
+/// The waits of one line, which interrupts end until it is shielded.
+class LineWait {
+ public:
+  LineWait(const Clock& clock, const Interrupt& interrupt)
+      : clock_(&clock), interrupt_(&interrupt) {}
+
+  void shield() { shield_ = Shield::up; }
+
+  /// Error: the interrupt that is raised.
+  [[nodiscard]] Result<void> check() const;
+
+  /// Whether the descriptor became ready before the deadline. Error: an interrupt.
+  [[nodiscard]] Result<bool> until_ready(Interest interest, TimePoint deadline) const;
+
+ private:
+  const Clock* clock_;
+  const Interrupt* interrupt_;
+  Shield shield_ = Shield::down;
+};
 
 }  // namespace spindle::posix

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -12,11 +13,17 @@ namespace spindle::report {
 /// wide ones two, all others one.
 std::size_t display_width(std::string_view text);
 
+/// Which end of a text stays when it does not fit.
+enum class Keep : std::uint8_t { beginning, end };
+
+/// Printable text of at most so many terminal cells; where something was cut off stands "...".
+std::string fitted(std::string_view text, std::size_t cells, Keep keep);
+
 /// What becomes of line breaks and tabs: a run of them is one space, or they stay.
 enum class LineBreaks : std::uint8_t { fold, keep };
 
-/// Text that cannot steer a terminal: every other control character is shown as `\x1b` is, and
-/// ill-formed UTF-8 as U+FFFD.
+/// Text that cannot steer a terminal or hide anything: every other control character and every
+/// invisible one is shown as `\x1b` or `\u202e` is, and ill-formed UTF-8 as U+FFFD.
 std::string printable(std::string_view text, LineBreaks breaks);
 
 /// What people see of a record under a column's key: the field's `shown`, else its cell; "target",

@@ -4,12 +4,23 @@
 
 #include <iterator>
 
+#include "characters.hpp"
 #include "utf8.hpp"
 
 namespace spindle::report {
 namespace {
 
-bool is_control(char32_t value) { return value < 0x20 || (value >= 0x7F && value < 0xA0); }
+/// Escaped in UTF-16, as RFC 8259, section 7 wants it.
+void append_escaped(std::string& out, char32_t value) {
+  constexpr char32_t first_of_two_units = 0x10000;
+  if (value < first_of_two_units) {
+    fmt::format_to(std::back_inserter(out), "\\u{:04x}", static_cast<std::uint32_t>(value));
+    return;
+  }
+  const auto beyond = static_cast<std::uint32_t>(value - first_of_two_units);
+  fmt::format_to(std::back_inserter(out), "\\u{:04x}\\u{:04x}", 0xD800U | (beyond >> 10U),
+                 0xDC00U | (beyond & 0x3FFU));
+}
 
 std::string_view short_escape(char32_t value) {
   switch (value) {
@@ -37,13 +48,10 @@ std::size_t append_character(std::string& out, std::string_view text) {
   const CodePoint character = first_code_point(text);
   if (const std::string_view escape = short_escape(character.value); !escape.empty()) {
     out += escape;
-  } else if (is_control(character.value)) {
-    fmt::format_to(std::back_inserter(out), "\\u{:04x}",
-                   static_cast<std::uint32_t>(character.value));
-  } else if (character.value == replacement_character) {
-    out += replacement_bytes;
+  } else if (steers(character.value)) {
+    append_escaped(out, character.value);
   } else {
-    out += text.substr(0, character.length);
+    append_first(out, character, text);
   }
   return character.length;
 }

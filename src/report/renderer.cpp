@@ -21,7 +21,7 @@ Record error_record(const Error& error, WallTime time) {
   const StatusInfo& status = info(error.status());
   Record record{
       .type = "error",
-      .target = error.target,
+      .target = error.target.empty() ? error.asked_of : error.target,
       .time = time,
       .fields = {{"code", std::string(status.name)},
                  {"exit_status", number(static_cast<std::int64_t>(status.status))},

@@ -7,6 +7,9 @@
 namespace spindle::report {
 namespace {
 
+constexpr char32_t replacement_character = U'\uFFFD';
+constexpr std::string_view replacement_bytes = "\xEF\xBF\xBD";
+
 // The Unicode Standard 15.0, table 3-7: well-formed UTF-8 byte sequences.
 struct Lead {
   std::uint8_t first;
@@ -51,6 +54,11 @@ CodePoint first_code_point(std::string_view text) {
     high = 0xBF;
   }
   return {.value = value, .length = row->length};
+}
+
+void append_first(std::string& out, const CodePoint& first, std::string_view text) {
+  const bool is_none = first.value == replacement_character;
+  out += is_none ? replacement_bytes : text.substr(0, first.length);
 }
 
 std::size_t plain_prefix(std::string_view text) {

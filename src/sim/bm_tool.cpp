@@ -16,6 +16,7 @@
 namespace spindle::sim {
 namespace {
 
+using catalogue::EventKind;
 using modbus::ExceptionCode;
 using modbus::Pdu;
 using modbus::RegisterTable;
@@ -109,7 +110,7 @@ class SimulatedBm final : public BmTool {
   void pull_trigger(TimePoint now);
   void show_motion(TimePoint now);
   void show_ready();
-  void emit(std::string_view kind, const EventData& data, TimePoint now);
+  void emit(EventKind kind, const EventData& data, TimePoint now);
 
   RegisterBank registers_;
   catalogue::EventFacts events_;
@@ -265,7 +266,7 @@ void SimulatedBm::reset_alarm(const catalogue::Action& /*action*/, std::uint16_t
                               TimePoint now) {
   for (const char* name : {"status.alarm", "alarm.1", "alarm.2"}) registers_.set(name, 0);
   show_ready();
-  emit("alarm-reset", {}, now);
+  emit(EventKind::alarm_reset, {}, now);
 }
 
 void SimulatedBm::lock(const catalogue::Action& /*action*/, std::uint16_t value,
@@ -287,14 +288,14 @@ void SimulatedBm::select_preset(const catalogue::Action& /*action*/, std::uint16
                                 TimePoint now) {
   if (run_) return;
   registers_.set("status.preset", value);
-  emit("preset-change", {}, now);
+  emit(EventKind::preset_change, {}, now);
 }
 
 void SimulatedBm::turn_round(const catalogue::Action& /*action*/, std::uint16_t value,
                              TimePoint now) {
   if (run_) return;
   registers_.set("status.direction", value);
-  emit("direction-change", {}, now);
+  emit(EventKind::direction_change, {}, now);
 }
 
 // ---- motion ----
@@ -361,9 +362,9 @@ void SimulatedBm::finish_run(TimePoint now) {
                  .motion = motion_at(run.plan, elapsed),
                  .speed = run.plan.speed};
   if (fastening && !reached) data.error = stopped_error_;
-  const std::string_view result = reached ? "fastening-ok" : "fastening-ng";
+  const EventKind result = reached ? EventKind::fastening_ok : EventKind::fastening_ng;
   for (unsigned told = 0; told < run.results; ++told) {
-    emit(fastening ? result : "other", data, now);
+    emit(fastening ? result : EventKind::other, data, now);
   }
 }
 
@@ -412,7 +413,7 @@ void SimulatedBm::pull_trigger(TimePoint now) {
 
 // ---- events ----
 
-void SimulatedBm::emit(std::string_view kind, const EventData& data, TimePoint now) {
+void SimulatedBm::emit(EventKind kind, const EventData& data, TimePoint now) {
   const auto row = std::find_if(events_.kinds.begin(), events_.kinds.end(),
                                 [kind](const auto& entry) { return entry.second == kind; });
   const std::int64_t status = row == events_.kinds.end() ? 0 : row->first;
@@ -478,7 +479,7 @@ void SimulatedBm::raise_alarm(std::uint16_t code, TimePoint now) {
   registers_.set("alarm.1", code);
   show_motion(now);
   show_ready();
-  emit("error", {.error = code}, now);
+  emit(EventKind::error, {.error = code}, now);
 }
 
 void SimulatedBm::reboot(TimePoint now) {

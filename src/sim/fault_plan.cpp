@@ -130,7 +130,9 @@ Result<const KindInfo*> find_kind(std::string_view text, std::string_view name) 
   std::vector<std::string> names;
   names.reserve(kinds.size());
   for (const KindInfo& info : kinds) names.emplace_back(info.name);
-  return tl::unexpected(bad(text, "there is none of that name", suggestion(name, names)));
+  std::string hint = suggestion(name, names);
+  if (hint.empty()) hint = "'spindle simulate --help' lists them";
+  return tl::unexpected(bad(text, "there is none of that name", std::move(hint)));
 }
 
 Result<void> parse_argument(Fault& fault, const KindInfo& row, std::string_view text,

@@ -20,6 +20,7 @@ import socket
 import struct
 import subprocess
 import tempfile
+import termios
 import threading
 import time
 
@@ -233,24 +234,40 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
     return Finished(arguments, status, *texts, seconds)
 
 
-def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):
-    """Runs spindle on a terminal of its own, calls `meanwhile` at its question, and types the answer."""
-    program, folder, environment = binary(), home().path, home().environment()
+def run_on_terminal(*arguments, columns=120, environment=None, timeout=DEADLINE, hear=lambda shown, terminal: None):
+    """Runs spindle on a terminal of its own to its end; standard output is all that the terminal got.
+    `hear` is called with that, as far as it has come, and may type something."""
+    arguments = [str(argument) for argument in arguments]
+    began = time.monotonic()
     pid, terminal = pty.fork()
     if pid == 0:
-        os.chdir(folder)
-        os.execve(program, [program, *arguments], environment)
-    shown, answered = b"", False
+        fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        os.chdir(home().path)
+        os.execve(binary(), [binary(), *arguments], home().environment(**{"TERM": "xterm", **(environment or {})}))
+    shown = b""
     with contextlib.suppress(OSError):  # the end of the terminal
-        while select.select([terminal], [], [], DEADLINE)[0]:
-            shown += os.read(terminal, 4096)
-            if question in shown and not answered:
-                meanwhile()
-                answered = os.write(terminal, answer) > 0
+        while select.select([terminal], [], [], max(0.0, began + timeout - time.monotonic()))[0]:
+            shown += os.read(terminal, 65536)
+            hear(shown, terminal)
         os.kill(pid, signal.SIGKILL)  # it neither ended nor said anything more
     _, status = os.waitpid(pid, 0)
     os.close(terminal)
-    return shown.decode(), os.waitstatus_to_exitcode(status)
+    seconds = time.monotonic() - began
+    return Finished(arguments, os.waitstatus_to_exitcode(status), shown.decode(), "", seconds)
+
+
+def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):
+    """Runs spindle on a terminal of its own, calls `meanwhile` at its question, and types the answer.
+    Returns what the terminal got, and the status."""
+    answered = []
+
+    def hear(shown, terminal):
+        if question in shown and not answered:
+            meanwhile()
+            answered.append(os.write(terminal, answer))
+
+    finished = run_on_terminal(*arguments, hear=hear)
+    return finished.stdout, finished.status
 
 
 @contextlib.contextmanager

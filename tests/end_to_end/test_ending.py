@@ -163,12 +163,67 @@ class StreamTest(unittest.TestCase):
             finished = running.finish()
         self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
 
-    def test_full_disk_is_no_success(self):
+    def check_full(self, *arguments):
+        """Runs into a full disk: the sentence names what failed and why, once, and the status is no success."""
         with open("/dev/full", "wb") as full:
-            with support.Running("list", "--profile", "doga-bm", "--json", stdout=full) as running:
+            with support.Running(*arguments, stdout=full) as running:
                 finished = running.finish()
-        self.assertNotEqual(finished.status, 0, finished)
-        self.assertIn("spindle: ", finished.stderr)
+        self.assertEqual(finished.status, 70, finished)
+        sentences = [line for line in finished.stderr.splitlines() if line.startswith("spindle: ")]
+        self.assertEqual(len(sentences), 1, finished)
+        self.assertIn("standard output cannot be written: No space left on device; check", sentences[0])
+        return finished
+
+    def changes(self):
+        log = support.home().path / ".local" / "state" / "spindle" / "changes.jsonl"
+        return [support.parse_json(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+    def test_full_disk_is_no_success(self):
+        profile = ("--profile", "doga-bm")
+        backup, other = (support.home().path / name for name in ("backup.yaml", "other.yaml"))
+        with support.simulator("doga-bm", "--rundown-every", "300ms") as url:
+            saved = support.run("backup", url, *profile, "-f", other, "--force")
+            self.assertEqual(saved.status, 0, saved)
+            self.assertEqual(support.run("set", url, *profile, f"{TORQUE}=2.90").status, 0)
+            commands = (
+                ["identify", url], ["get", url, *profile, TORQUE], ["ping", url, "-c", "1"], ["list", *profile],
+                ["alarms", url, *profile], ["backup", url, *profile, "-f", backup, "--force"],
+                ["backup", url, *profile, "-f", "-"], ["diff", other, url], ["watch", url, *profile],
+                ["profile", "list"], ["profile", "show", "doga-bm"], ["--version"], ["--help"],
+                ["simulate", "doga-bm"],
+            )  # fmt: skip
+            for arguments in commands:
+                for form in ([], ["--json"]):
+                    if form and arguments[-1] in ("-", "--help"):
+                        continue
+                    with self.subTest(arguments, form=form):
+                        self.check_full(*arguments, *form)
+
+    def test_full_disk_after_a_change(self):
+        """What was done is on record, though nobody could be told."""
+        profile = ("--profile", "doga-bm")
+        with support.simulator() as url:
+            for number, form in enumerate(([], ["--json"], ["-o", "csv"])):
+                with self.subTest(form):
+                    known = len(self.changes())
+                    self.check_full("set", url, *profile, f"{TORQUE}=2.8{number}", *form)
+                    new = self.changes()[known:]
+                    self.assertEqual([(c["name"], str(c["new"]), c["result"]) for c in new],
+                                     [(TORQUE, f"2.8{number}", "written")])
+
+    def test_full_disk_while_a_motor_runs(self):
+        profile = ("--profile", "orientalmotor-blv")
+        with support.simulator("orientalmotor-blv", listen="rtu+tcp://127.0.0.1:0") as url:
+            known = len(self.changes())
+            run = ("remote-start", url, *profile, "--speed", "500", "--for", "300ms", "--yes")
+            for form in ([], ["--json"]):
+                with self.subTest(form):
+                    self.check_full(*run, *form)
+                    found = support.run("identify", url, *profile, "--json").records("identity")
+                    self.assertIn("motor stands still", " ".join(found[0]["notes"]))
+            starts = [change for change in self.changes()[known:] if change["name"] == "start"]
+            self.assertEqual(len(starts), 2, starts)
+            self.check_full("remote-stop", url, *profile)
 
     def closed(self, descriptors, *arguments):
         """Runs with descriptors closed, as a daemon's parent may leave them."""

@@ -137,6 +137,10 @@ class UsageTest(unittest.TestCase):
                     kinds = [(r["type"], r["code"], r["exit_status"]) for r in records]
                     self.assertEqual(kinds, [("error", "usage", 2)], finished)
                     self.check_sentence(finished, named, suggested)
+                    # What is outside a range names the limit; everything else says what would help.
+                    message, hint = records[0]["message"], records[0]["hint"]
+                    names_a_limit = any(word in message for word in (" above ", " below ", " between "))
+                    self.assertTrue(hint or names_a_limit, finished)
 
     def test_options_without_their_value(self):
         for option in ("--timeout", "--profile", "--output", "-o", "--tools", "--retries", "--color"):

@@ -35,13 +35,13 @@ inline catalogue::Profile bm_profile() {
                               .count = 14,
                               .number = "event.number",
                               .kind = "event.status",
-                              .kinds = {{0, "other"},
-                                        {1, "fastening-ok"},
-                                        {2, "fastening-ng"},
-                                        {3, "direction-change"},
-                                        {4, "preset-change"},
-                                        {5, "alarm-reset"},
-                                        {6, "error"}}};
+                              .kinds = {{0, EventKind::other},
+                                        {1, EventKind::fastening_ok},
+                                        {2, EventKind::fastening_ng},
+                                        {3, EventKind::direction_change},
+                                        {4, EventKind::preset_change},
+                                        {5, EventKind::alarm_reset},
+                                        {6, EventKind::error}}};
   profile.limits = LimitFacts{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
   profile.numbered = NumberedFacts{.prefix = "p",
                                    .from = 1,

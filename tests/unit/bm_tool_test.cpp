@@ -560,6 +560,7 @@ TEST_CASE("the shipped profiles make tools that answer for all they name") {
     const catalogue::Parameter kind = profile->find(profile->events->kind).value();
     const Pdu request = modbus::read_request(kind.table, kind.address, 1);
     const Pdu response = ask(request, start_time + duration);
-    CHECK(profile->events->kinds.at(modbus::registers_of(response).front()) == "fastening-ok");
+    CHECK(profile->events->kinds.at(modbus::registers_of(response).front()) ==
+          catalogue::EventKind::fastening_ok);
   }
 }

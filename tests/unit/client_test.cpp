@@ -338,9 +338,13 @@ TEST_CASE("read_each() brings every register at its place") {
   REQUIRE(image);
   for (const RegisterRange& range : wanted) check_values(*image, range);
   REQUIRE(progress.size() == bench.server.reads.size());
-  for (std::size_t i = 0; i < progress.size(); ++i) {
-    CHECK(progress[i] == std::pair{i + 1, progress.size()});
+  std::size_t before = 0;
+  for (const auto& [done, total] : progress) {
+    CHECK(before < done);
+    CHECK(total == bench.client.count_wanted(wanted));
+    before = done;
   }
+  CHECK(before == bench.client.count_wanted(wanted));
 }
 
 TEST_CASE("bisecting finds exactly the holes, and they are not asked for again") {
@@ -447,14 +451,18 @@ TEST_CASE("what is said to be absent is asked for all the same, and costs no oth
   Bench bench({.max_read = 10, .absent = {{holding, 10, 3}}});
   bench.server.holes = {10, 12};
   const Ranges wanted = singles(holding, 8, 14);
-  CHECK(bench.client.count_requests(wanted) == 5);
-  const auto image = bench.client.read_each(wanted);
+  CHECK(bench.client.count_wanted(wanted) == 7);
+  std::pair<std::size_t, std::size_t> last;
+  const auto image = bench.client.read_each(wanted, [&](std::size_t done, std::size_t total) {
+    last = {done, total};
+  });
+  CHECK(last == std::pair<std::size_t, std::size_t>{7, 7});
   REQUIRE(image);
   CHECK(bench.server.reads.size() == 5);
   for (const std::uint16_t there : Registers{8, 9, 11, 13, 14})
     check_values(*image, {holding, there, 1});
   for (const std::uint16_t hole : Registers{10, 12}) CHECK_FALSE(image->get({holding, hole, 1}));
-  CHECK(bench.client.count_requests(wanted) == 3);
+  CHECK(bench.client.count_wanted(wanted) == 5);
 }
 
 TEST_CASE("registers that are to be avoided are not read along") {

@@ -12,6 +12,7 @@
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "support/fake_clock.hpp"
+#include "support/fault_plan.hpp"
 
 using namespace spindle;
 using namespace spindle::device;
@@ -78,7 +79,7 @@ struct Setup {
 /// A device before a simulated tool, with no retries of reads; what it sends is written down.
 struct Bench {
   explicit Bench(Setup setup = {}, const Profile& profile = bm()) {
-    for (const std::string& fault : setup.faults) faults.push_back(*sim::parse_fault(fault));
+    faults = test::plan_of(setup.faults);
     setup.tool.faults = faults;
     auto tool = sim::make_bm_tool(bm(), store().load_simulation("doga-bm").value(), setup.tool);
     auto server = std::make_unique<Deaf>(std::move(tool), std::move(setup.swallow));

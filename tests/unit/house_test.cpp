@@ -86,6 +86,20 @@ const std::vector<BannedWord> banned_words = {
     {"new", Counts::anywhere, {}},
     {"shared_ptr", Counts::anywhere, {}},
     {"make_shared", Counts::anywhere, {}},
+    // What a locale could change: numbers are read and written the same everywhere.
+    {"locale", Counts::anywhere, {}},
+    {"setlocale", Counts::anywhere, {}},
+    {"imbue", Counts::anywhere, {}},
+    {"stringstream", Counts::anywhere, {}},
+    {"ostringstream", Counts::anywhere, {}},
+    {"strtod", Counts::anywhere, {}},
+    {"strtof", Counts::anywhere, {}},
+    {"strtold", Counts::anywhere, {}},
+    {"atof", Counts::anywhere, {}},
+    {"stod", Counts::anywhere, {}},
+    {"stof", Counts::anywhere, {}},
+    {"stold", Counts::anywhere, {}},
+    {"wcwidth", Counts::anywhere, {}},
 };
 
 // Lines of code in main.cpp; includes, comments and blank lines are free.
@@ -294,6 +308,18 @@ void check_finished(const Source& source, Findings& findings) {
   }
 }
 
+/// fmt's 'L' asks the locale for its decimal sign.
+void check_formats(const Source& source, Findings& findings) {
+  for (std::size_t at = source.text.find('{'); at != std::string::npos;
+       at = source.text.find('{', at + 1)) {
+    const std::size_t end = source.text.find_first_of("{}\n\"", at + 1);
+    if (end == std::string::npos || source.text[end] != '}') continue;
+    const std::string_view field = std::string_view(source.text).substr(at, end - at);
+    if (field.find(':') == std::string_view::npos || !field.ends_with('L')) continue;
+    findings.push_back(fmt::format("{}: formats by locale: {}}}", source.path, field));
+  }
+}
+
 void check_pragma_once(const Source& source, Findings& findings) {
   if (!source.path.ends_with(".hpp")) return;
   const std::vector<std::string> lines = lines_of(code_of(source.text));
@@ -316,7 +342,7 @@ void check_main(const Source& source, Findings& findings) {
 Findings judge(const Source& source) {
   Findings findings;
   for (const auto rule : {check_layers, check_private_headers, check_homes, check_words,
-                          check_finished, check_pragma_once, check_main}) {
+                          check_formats, check_finished, check_pragma_once, check_main}) {
     rule(source, findings);
   }
   return findings;
@@ -433,6 +459,11 @@ TEST_CASE("a file that breaks the law is found") {
       {{"src/link/a.cpp", "std::shared_ptr<int> p;\n"}, "src/link/a.cpp: uses shared_ptr"},
       {{"src/link/a.cpp", "auto separated = 1'000; int* p = new int; auto c = 'x';\n"},
        "src/link/a.cpp: uses new"},
+      {{"src/report/a.cpp", "auto t = fmt::format(\"{:.2L} N.m\", 2.71);\n"},
+       "src/report/a.cpp: formats by locale: {:.2L}"},
+      {{"src/report/a.cpp", "double d = std::strtod(text, nullptr);\n"},
+       "src/report/a.cpp: uses strtod"},
+      {{"src/report/a.cpp", "std::ostringstream s;\n"}, "src/report/a.cpp: uses ostringstream"},
       {{"src/link/a.hpp", "// #pragma once\n"}, "src/link/a.hpp: lacks #pragma once"},
       {{"src/link/a.cpp", "// " + unfinished.front() + ": later\n"},
        "src/link/a.cpp: says " + unfinished.front()},

@@ -1,6 +1,7 @@
 #include "spindle/modbus/pdu.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include "unit/hex.hpp"
 
@@ -223,5 +224,36 @@ TEST_CASE("standard exception codes have names, others have none") {
   for (const std::uint8_t code : hex("00 07 09 0C 0E FF")) {
     CAPTURE(code);
     CHECK(exception_name(code).empty());
+  }
+}
+
+TEST_CASE("a frame is explained with all that is in it") {
+  const RegisterAddress two{2};
+  CHECK(explain_request(read_request(RegisterTable::input, two, 1)) ==
+        "read 1 input register from 2");
+  CHECK(explain_request(write_request({4002}, 1)) == "write 1 to register 4002");
+  CHECK(explain_request(write_request({1156}, Registers{0, 1000})) ==
+        "write 0 1000 to 2 registers from 1156");
+  CHECK(explain_request(loopback_request(0x7E28)) == "loop-back of 7E28");
+  CHECK(explain_request(report_server_id_request()) == "report server id");
+  CHECK(explain_request({0x2B, {0x0E, 0x01}}) == "function 2B, data 0E 01");
+
+  CHECK(explain_response(read_response(RegisterTable::holding, Registers{271})) ==
+        "1 register: 271");
+  CHECK(explain_response(read_response(RegisterTable::input, Registers{0, 65535})) ==
+        "2 registers: 0 65535");
+  CHECK(explain_response(write_request({4002}, 1)) == "wrote 1 to register 4002");
+  CHECK(explain_response(write_multiple_response({1156}, 2)) == "wrote 2 registers from 1156");
+  CHECK(explain_response(loopback_request(0x7E28)) == "loop-back of 7E28");
+  CHECK(explain_response(report_server_id_response(Bytes{0, 1})) == "server id 00 01");
+  CHECK(explain_response(exception_response(3, 2)) == "exception 02 (illegal data address)");
+  CHECK(explain_response(exception_response(3, 0x0E)) == "exception 0E");
+  // Whatever has no shape of these stands there as it came.
+  const Pdu shapeless[] = {{3, {}},         {3, {4, 1, 15}}, {4, {3, 1, 2, 3}}, {6, {0, 1}},
+                           {16, {0, 1, 0}}, {8, {}},         {17, {9, 1}},      {0x83, {}},
+                           {0x83, {1, 2}},  {0x64, {1}}};
+  for (const Pdu& pdu : shapeless) {
+    CHECK(explain_response(pdu) ==
+          fmt::format("function {:02X}, data {}", pdu.function, to_hex(pdu.data)));
   }
 }

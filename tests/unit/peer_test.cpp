@@ -8,12 +8,14 @@
 
 #include "hex.hpp"
 #include "spindle/modbus/pdu.hpp"
+#include "support/fault_plan.hpp"
 
 using namespace spindle;
 using namespace spindle::sim;
 using namespace std::chrono_literals;
 using modbus::Framing;
 using spindle::test::hex;
+using spindle::test::plan_of;
 
 namespace {
 
@@ -82,12 +84,6 @@ std::string show(const std::vector<Sent>& pieces) {
     text += std::to_string(us) + "us: " + to_hex(piece.bytes) + "; ";
   }
   return text;
-}
-
-FaultPlan plan_of(const std::vector<std::string>& texts) {
-  FaultPlan plan;
-  for (const std::string& text : texts) plan.push_back(*parse_fault(text));
-  return plan;
 }
 
 const Bytes tcp_read = hex("8002 0000 0006 00 03 0002 0001");

@@ -100,7 +100,7 @@ TEST_CASE("streams: a full disk is told in the system's words") {
     const Result<void> result = posix::write_out("x");
     const bool expected =
         !result && result.error().code == Errc::internal &&
-        result.error().message == "cannot write the output: No space left on device";
+        result.error().message == "standard output cannot be written: No space left on device";
     return expected ? 0 : 1;
   });
   CHECK(finish(child) == 0);
@@ -164,9 +164,9 @@ TEST_CASE("streams: a pipe is no terminal") {
   const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [&pipe] {
     ::dup2(pipe.writer.number(), STDOUT_FILENO);
     ::dup2(pipe.writer.number(), STDERR_FILENO);
-    const bool any = posix::is_terminal(posix::Stream::in) ||
-                     posix::is_terminal(posix::Stream::out) ||
-                     posix::is_terminal(posix::Stream::err);
+    const bool any = posix::is_terminal(posix::Std::in) ||
+                     posix::is_terminal(posix::Std::out) ||
+                     posix::is_terminal(posix::Std::err);
     return any ? 1 : 0;
   });
   CHECK(finish(child) == 0);

@@ -254,7 +254,7 @@ TEST_CASE("a user's own profile extends ours, wherever it lies") {
   CHECK(profile.exceptions.at(0x0E).text == "range of data not available");
   CHECK(profile.exceptions.at(0x02).text == "wrong address, or no such address");
   CHECK(profile.numbered->evidence == Evidence::manual);  // what the child leaves out stays
-  CHECK(profile.events->kinds.at(1) == "fastening-ok");
+  CHECK(profile.events->kinds.at(1) == catalogue::EventKind::fastening_ok);
   CHECK(shipped().load_simulation(path).has_value() == false);
 }
 

@@ -117,6 +117,8 @@ TEST_CASE("JSON: strings mean the same to another parser, whatever is in them") 
       "\x1b[31mred\x7f",
       "21.5 °C, é, トルク, \U0001F529",
       "\u0085\u009b",
+      "\u202ereversed\u2066\u2028\ufeff",
+      "tag \U000E0041",
       // Ill-formed: The Unicode Standard 15.0, tables 3-8 to 3-11.
       "\xC0\xAF\xE0\x80\xBF\xF0\x81\x82\x41",
       "\xED\xA0\x80\xED\xBF\xBF\xED\xAF\x41",
@@ -206,14 +208,21 @@ TEST_CASE("table: widths count terminal cells, not bytes") {
     std::string padding;
   };
   const Row rows[] = {
-      {"12345678", ""},         {"21.5 °C", " "},  // two bytes, one cell
-      {"caf\u00e9", "    "},                       // precomposed
-      {"cafe\u0301", "    "},                      // combining accent
-      {"トルク", "  "},                            // wide
-      {"\uff21\uff22", "    "},                    // fullwidth
-      {"\U0001F529", "      "},                    // nut and bolt
-      {"\u200b", "        "},                      // zero width space
-      {"\xff", "       "},                         // replaced by U+FFFD
+      {"12345678", ""},
+      {"21.5 °C", " "},                        // two bytes, one cell
+      {"caf\u00e9", "    "},                   // precomposed
+      {"cafe\u0301", "    "},                  // combining accent
+      {"トルク", "  "},                        // wide
+      {"\uff21\uff22", "    "},                // fullwidth
+      {"\U0001F529", "      "},                // nut and bolt
+      {"\u0e17\u0e35\u0e48", "       "},       // Thai vowel and tone above
+      {"\u1112\u1161\u11ab", "      "},        // Hangul, in parts
+      {"\u2699", "       "},                   // gear: as narrow as the standard says
+      {"\u2705\u274c", "    "},                // marks that are wide
+      {"\U0001F468\u200D\U0001F527", "    "},  // joined emoji
+      {"\U0001F1E9\U0001F1EA", "      "},      // a flag of two letters
+      {"\U0001FAA3", "      "},                // bucket, of Unicode 13
+      {"\xff", "       "},                     // replaced by U+FFFD
   };
   for (const Row& row : rows) {
     CAPTURE(row.text);
@@ -241,6 +250,13 @@ TEST_CASE("table: nothing in a cell can steer the terminal or break the line") {
       {"end\n", "end"},
       {"\xC3(", "\uFFFD("},
       {"bell\a", "bell\\x07"},
+      {"\u202eesrever\u202c", "\\u202eesrever\\u202c"},
+      {"\u2066isolated\u2069", "\\u2066isolated\\u2069"},
+      {"\u061c\u200e\u200f", "\\u061c\\u200e\\u200f"},
+      {"line\u2028paragraph\u2029", "line\\u2028paragraph\\u2029"},
+      {"stat\u200bion3\ufeff", "stat\\u200bion3\\ufeff"},
+      {"soft\u00adhyphen", "soft\\xadhyphen"},
+      {"tag\U000E0041", "tag\\U000e0041"},
   };
   for (const Row& row : rows) CHECK(table_cell(row.text) == "F\n" + row.shown + "\n");
 }

@@ -10,6 +10,7 @@
 #include "spindle/sim/peer.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "support/fake_clock.hpp"
+#include "support/fault_plan.hpp"
 #include "support/serial_bank.hpp"
 
 using namespace spindle;
@@ -18,6 +19,7 @@ using namespace std::chrono_literals;
 using modbus::Framing;
 using spindle::test::FakeClock;
 using spindle::test::hex;
+using spindle::test::plan_of;
 using spindle::test::SerialBank;
 
 namespace {
@@ -25,12 +27,6 @@ namespace {
 constexpr TimePoint start = TimePoint(1h);
 constexpr Duration gap = 5500us;
 constexpr Duration delay = 10ms;
-
-FaultPlan plan_of(const std::vector<std::string>& texts) {
-  FaultPlan plan;
-  for (const std::string& text : texts) plan.push_back(*parse_fault(text));
-  return plan;
-}
 
 // A bus with units 1 and 2 and one client.
 struct Bus {

@@ -670,7 +670,7 @@ TEST_CASE("rtu: after a failure the line is silent for one more answer time and 
     CHECK(line.sent_at(1) == 2 * timeout);
     CHECK(line.script.sent[1].bytes[1] == 0x08);
     CHECK(line.sent_at(2) == 2 * timeout + 15ms + gap);
-    CHECK(line.count(Decision::quarantine) == 1);
+    CHECK(line.count(Decision::resync) == 2);
 
     line.script.on_request(rtu_answer(15ms, two_values));  // and then all is as before
     CHECK(line.session.transact(read_two) == two_values);

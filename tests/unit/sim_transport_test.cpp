@@ -10,6 +10,7 @@
 #include "spindle/sim/bm_tool.hpp"
 #include "support/bm_profile.hpp"
 #include "support/fake_clock.hpp"
+#include "support/fault_plan.hpp"
 
 using namespace spindle;
 using namespace spindle::sim;
@@ -32,9 +33,8 @@ std::unique_ptr<BmTool> make_tool() {
 
 struct Bench {
   explicit Bench(const std::vector<std::string>& faults = {}) {
-    FaultPlan plan;
-    for (const std::string& fault : faults) plan.push_back(*parse_fault(fault));
-    transport = make_sim_transport(make_tool(), Framing::tcp, plan, clock, interrupt);
+    transport =
+        make_sim_transport(make_tool(), Framing::tcp, test::plan_of(faults), clock, interrupt);
   }
 
   Result<void> send(const Bytes& bytes) { return transport->send(bytes, clock.now() + 1s); }

@@ -149,3 +149,11 @@ TEST_CASE("splitting keeps empty parts") {
   CHECK(split("", ',') == Parts{""});
   CHECK(split(",a,", ',') == Parts{"", "a", ""});
 }
+
+TEST_CASE("a word of a command line is quoted where a shell would read it otherwise") {
+  CHECK(spindle::shell_word("tcp://10.0.0.7:5000") == "tcp://10.0.0.7:5000");
+  CHECK(spindle::shell_word("my tool") == "'my tool'");
+  CHECK(spindle::shell_word("preset.*") == "'preset.*'");
+  CHECK(spindle::shell_word("it's") == "'it'\\''s'");
+  CHECK(spindle::shell_word("") == "''");
+}

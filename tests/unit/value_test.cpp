@@ -160,18 +160,35 @@ TEST_CASE("parse_value: numbers") {
   CHECK(parsed(make(Kind::i16, "1"), "0x8000") == "'0x8000' is not a number");
 }
 
+TEST_CASE("parse_value: a decimal comma, or what parts thousands, is refused and never left out") {
+  for (const std::string text :
+       {"2,8", "2,80", "1,000", "1.000,5", "1 000", "1'000", "1\u00a0000", "1\u202f000", "2\u00b78",
+        "\u0662.\u0668", "2.8.1", "2. 8", "2.8 N.m"}) {
+    CAPTURE(text);
+    for (const char* const scale : {"1", "0.01"}) {
+      const auto value = parse_value(make(Kind::u16, scale), text);
+      REQUIRE_FALSE(value);
+      CHECK(value.error().code == Errc::bad_value);
+      CHECK(value.error().message == "'" + text + "' is not a number");
+      CHECK(value.error().hint == (std::string(scale) == "1"
+                                       ? "write it in digits without separators, such as 2500"
+                                       : "write it in digits with a decimal point, such as 2.5"));
+    }
+  }
+}
+
 TEST_CASE("parse_value: labels") {
   CHECK(parsed(mode(), "AC/TM") == "AC/TM");
   CHECK(parsed(mode(), "ac/tm") == "AC/TM");
   CHECK(parse_value(mode(), "ac/tm")->number == Decimal(1));
   CHECK(parsed(mode(), "0") == "TC/AM");
-  CHECK(parsed(mode(), "2") == "'2' is none of its labels; it has TC/AM (0), AC/TM (1)");
+  CHECK(parsed(mode(), "2") == "'2' is none of its labels");
 
   const auto misspelt = parse_value(mode(), "TCAM");
   REQUIRE_FALSE(misspelt.has_value());
   CHECK(misspelt.error().code == Errc::bad_value);
-  CHECK(misspelt.error().message == "'TCAM' is none of its labels; it has TC/AM (0), AC/TM (1)");
-  CHECK(misspelt.error().hint == "did you mean 'TC/AM'?");
+  CHECK(misspelt.error().message == "'TCAM' is none of its labels");
+  CHECK(misspelt.error().hint == "it has TC/AM (0), AC/TM (1); did you mean 'TC/AM'?");
 }
 
 TEST_CASE("parse_value: an enumeration with a range has numbers beside its labels") {
@@ -231,7 +248,8 @@ TEST_CASE("a bit field is typed by names or as a number") {
   const auto wrong = catalogue::parse_value(two_wire, "M1+START/STOP");
   REQUIRE_FALSE(wrong);
   CHECK(wrong.error().code == Errc::bad_value);
-  CHECK(wrong.error().message == "'START/STOP' is none of its bits; it has M0, M1, FWD, REV");
+  CHECK(wrong.error().message == "'START/STOP' is none of its bits");
+  CHECK(wrong.error().hint == "it has M0, M1, FWD, REV");
   CHECK_FALSE(catalogue::parse_value(two_wire, "M1+"));
 }
 

@@ -93,6 +93,7 @@ struct Error {
   std::string hint = {};      ///< what would help; empty: the table's hint
   std::string target = {};    ///< tool as the user named it
   std::string endpoint = {};  ///< where the target is, when that is not its name; empty: the same
+  std::string asked_of = {};  ///< tool that it was wanted from, where the error is not about it
   std::string name = {};      ///< parameter, action, option or file that it is about
   std::string tried = {};     ///< operation under way, such as "report server id"
   std::optional<std::chrono::nanoseconds> waited = std::nullopt;

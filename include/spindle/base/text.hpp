@@ -33,6 +33,9 @@ std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t
 /// "1 event", "2 events", "0 events".
 std::string counted(std::size_t count, std::string_view noun);
 
+/// The text as one word of a shell's command line: in single quotes where that is needed.
+std::string shell_word(const std::string& text);
+
 std::vector<std::string_view> split(std::string_view text, char separator);
 
 }  // namespace spindle

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -57,6 +58,26 @@ struct LinkFacts {
   std::vector<Area> absent = {};      ///< registers said not to exist
 };
 
+/// What an event says, as the contract names it.
+enum class EventKind : std::uint8_t {
+  fastening_ok,
+  fastening_ng,
+  direction_change,
+  preset_change,
+  alarm_reset,
+  error,
+  barcode,
+  screw_count,
+  other,
+};
+
+/// In the order of the enumeration; as written in profiles and records.
+inline constexpr std::array<std::string_view, 9> event_kind_texts = {
+    "fastening-ok", "fastening-ng", "direction-change", "preset-change", "alarm-reset",
+    "error",        "barcode",      "screw-count",      "other"};
+std::string_view to_text(EventKind kind);
+std::optional<EventKind> parse_event_kind(std::string_view text);
+
 /// Frames that the tool sends unasked once armed (or always).
 struct EventFacts {
   std::uint16_t arm_register = 0;
@@ -69,7 +90,7 @@ struct EventFacts {
   std::uint16_t count = 0;    ///< registers in the block; the frame has 2 × count data bytes
   std::string number;         ///< parameter that counts events up
   std::string kind;           ///< parameter whose value names the kind
-  std::map<std::int64_t, std::string> kinds = {};  ///< value to the contract's event kind
+  std::map<std::int64_t, EventKind> kinds = {};
 };
 
 /// The table that the event block stands in.

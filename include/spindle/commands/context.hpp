@@ -12,6 +12,7 @@
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/report/progress.hpp"
 #include "spindle/report/renderer.hpp"
 #include "spindle/report/streams.hpp"
 #include "spindle/sim/serve.hpp"
@@ -39,6 +40,8 @@ struct CommonOptions {
   Consent consent = Consent::ask;
   Verbosity verbosity = Verbosity::normal;
   std::string trace_file = {};  ///< --trace; empty: no capture
+  /// Not with --quiet, not beside frames, not on a terminal that can not draw over a line.
+  report::Showing progress = report::Showing::wanted;
 };
 
 /// A line and a clock that signals do not end: for the last words that leave a tool safe.

@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/device/device.hpp"
 #include "spindle/device/event_tracker.hpp"
 #include "spindle/device/watcher.hpp"
@@ -54,14 +55,12 @@ class RunFollower {
   std::optional<EventNews> sift(EventNews event);
   Result<std::optional<RunEnding>> look_at_tool();
   Result<void> keep_armed();
-  [[nodiscard]] const std::string& kind_of(const EventNews& event) const;
 
   Device* device_;
   const catalogue::Action* start_;
   Clock* clock_;
+  catalogue::EventLayout layout_;
   EventTracker tracker_ = {};
-  std::size_t number_at_ = 0;
-  std::size_t kind_at_ = 0;
   Duration answer_timeout_ = {};  ///< the user's or the profile's
   TimePoint confirm_by_ = {};
   TimePoint arm_due_ = {};

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/device/device.hpp"
 #include "spindle/device/event_tracker.hpp"
 #include "spindle/device/motor_follower.hpp"
@@ -127,7 +128,9 @@ class Watcher {
   void tell_trouble(const Error& error);
   void leave();
   [[nodiscard]] bool goes_on(const Until& until) const;
-  [[nodiscard]] std::uint16_t number_of(const Registers& block) const { return block[number_at_]; }
+  [[nodiscard]] std::uint16_t number_of(const Registers& block) const {
+    return layout_->number_of(block);
+  }
   [[nodiscard]] TimePoint next_due() const;
   [[nodiscard]] Duration back_off() const;
 
@@ -140,8 +143,8 @@ class Watcher {
   WatchPlan plan_ = {};
   std::optional<Link> link_ = std::nullopt;
   std::string known_identity_ = {};
+  std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
   EventTracker tracker_ = {};
-  std::size_t number_at_ = 0;
   std::vector<std::optional<catalogue::Value>> previous_ = {};
   std::optional<MotorState> motor_ = std::nullopt;  ///< as seen last
   TimePoint arm_due_ = {};

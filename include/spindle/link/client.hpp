@@ -82,7 +82,8 @@ class Client {
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
   /// bisected, and what does not exist is remembered and not asked for again. Other exception
   /// responses stand in the image at the registers concerned; anything else ends it at once and is
-  /// the result. `progress` hears how many of how many requests of the plan are done.
+  /// the result. `progress` hears how many of the wanted pieces are known by now, or known to be
+  /// absent.
   Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted,
                                   const Progress& progress = {});
 
@@ -99,8 +100,8 @@ class Client {
   /// Never reads these registers along with others, because they are unlikely to exist.
   void avoid(const RegisterRange& range);
 
-  /// How many requests read_each() begins with.
-  [[nodiscard]] std::size_t count_requests(const std::vector<RegisterRange>& wanted) const;
+  /// How many pieces read_each() will tell its progress of.
+  [[nodiscard]] std::size_t count_wanted(const std::vector<RegisterRange>& wanted) const;
 
   [[nodiscard]] Session& session() { return *session_; }
 
@@ -109,7 +110,9 @@ class Client {
   std::vector<RegisterRange> askable(const std::vector<RegisterRange>& wanted,
                                      RegisterImage& image) const;
   [[nodiscard]] std::optional<std::uint32_t> read_refusal();
-  Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image);
+  using Settled = std::function<void(const PlannedRead& part)>;
+  Result<void> read_or_bisect(const PlannedRead& planned, RegisterImage& image,
+                              const Settled& settled);
   void remember(const PlannedRead& refused, const Error& error, RegisterImage& image);
   [[nodiscard]] const Error* known_absent(const RegisterRange& range) const;
   [[nodiscard]] std::set<std::uint32_t> absent_registers() const;

@@ -84,6 +84,9 @@ class Session {
   /// the session.
   void set_hearer(std::function<void(const Spontaneous&)> hear) { hear_ = std::move(hear); }
 
+  /// For traces: the request is about to be sent once more.
+  void tell_retry(const modbus::Pdu& request) const;
+
   /// RTU: before the line is left to others, waits for the answer to a request that was abandoned,
   /// though not for long: they would take it for theirs. Interrupts do not end this wait.
   void settle();
@@ -128,7 +131,9 @@ class Session {
   [[nodiscard]] bool is_rtu() const { return options_.rules.framing == modbus::Framing::rtu; }
   [[nodiscard]] bool is_late(const modbus::Adu& stray) const;
   Error timeout_error(const Outstanding& outstanding) const;
+  void note_noise(std::size_t bytes);
   void decide(Decision decision, const modbus::Adu& adu) const;
+  void decide(Decision decision, std::string_view text) const;
   [[nodiscard]] std::string describe_frame(const modbus::Adu& adu) const;
 
   std::unique_ptr<Transport> transport_;

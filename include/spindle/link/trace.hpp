@@ -21,8 +21,9 @@ enum class Decision : std::uint8_t {
   late,
   junk,
   echo,
+  unanswered,
   retry,
-  quarantine
+  resync
 };
 
 /// Hears all bytes and every decision of one connection, for --verbose and --trace. Bytes come as

@@ -84,6 +84,11 @@ std::optional<std::uint8_t> exception_of(const Pdu& response);
 /// "report server id", "read 2 holding registers from 2", "write register 4002": for messages.
 std::string describe_request(const Pdu& request);
 
+/// What a frame says with all that is in it, for traces: "write 1 to register 4002".
+std::string explain_request(const Pdu& request);
+/// "2 registers: 0 271", "exception 02 (illegal data address)"; bytes where it has no known shape.
+std::string explain_response(const Pdu& response);
+
 /// Name of a standard exception code ("illegal data address"); empty for others.
 std::string_view exception_name(std::uint8_t code);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -31,7 +32,11 @@ bool out_is_open();
 /// is full or its terminal was halted with Ctrl-S.
 bool err_is_ready();
 
-enum class Stream : std::uint8_t { in, out, err };
-bool is_terminal(Stream stream);
+/// Cells of a row of the terminal behind standard error; 0 when it is none, or does not say.
+std::size_t err_columns();
+
+/// The standard streams.
+enum class Std : std::uint8_t { in, out, err };
+bool is_terminal(Std stream);
 
 }  // namespace spindle::posix

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -27,6 +28,8 @@ struct Streams {
   /// Whether err() can write a line without waiting; may be empty, which means yes. A motor must
   /// not run on because nobody takes what is told meanwhile.
   std::function<bool()> err_is_ready = {};
+  /// Cells of a row of the terminal behind err(), 0 where nobody knows; may be empty, which means 0.
+  std::function<std::size_t()> err_columns = {};
   Color color = Color::off;
 };
 

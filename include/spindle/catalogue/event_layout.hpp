@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "spindle/base/bytes.hpp"
+#include "spindle/catalogue/profile.hpp"
+
+namespace spindle::catalogue {
+
+/// Where the parts of a product's events stand in the block that brings them, looked up once.
+class EventLayout {
+ public:
+  struct Field {
+    const Parameter* parameter;
+    std::size_t at;  ///< index of its first register in the block
+  };
+
+  /// Requires a profile with events, which must outlive it. That the number and the kind stand in
+  /// the block is a rule that every loaded profile keeps.
+  explicit EventLayout(const Profile& profile);
+
+  [[nodiscard]] std::uint16_t number_of(RegisterView block) const { return block[number_at_]; }
+
+  /// Empty for a value that the profile does not name.
+  [[nodiscard]] std::optional<EventKind> kind_of(RegisterView block) const;
+
+  /// All parameters of the block, in the order of the profile.
+  [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
+
+ private:
+  const EventFacts* facts_;
+  std::vector<Field> fields_ = {};
+  std::size_t number_at_ = 0;
+  std::size_t kind_at_ = 0;
+};
+
+}  // namespace spindle::catalogue

@@ -1,0 +1,149 @@
+#include "motor_setup.hpp"
+
+#include <fmt/format.h>
+
+#include "guarded_run.hpp"
+
+namespace spindle::commands {
+
+using catalogue::Parameter;
+using catalogue::RunFacts;
+using catalogue::Value;
+
+Result<void> MotorSetup::prepare() {
+  return read_settings()
+      .and_then([&] { return check_ready(); })
+      .and_then([&] { return clear_word(); })
+      .and_then([&] { return write_settings(); })
+      .and_then([&] { return set_watchdog(); });
+}
+
+Result<void> MotorSetup::read_settings() {
+  const RunFacts& run = facts();
+  std::vector<std::string> names = {run.command, run.mode,
+                                    catalogue::numbered_name(run.deceleration, plan_->operation)};
+  for (const std::string* name : {&run.analog, &run.watchdog}) {
+    if (!name->empty()) names.push_back(*name);
+  }
+  auto wanted = tool_->profile->select(names);
+  if (!wanted) return tl::unexpected(std::move(wanted.error()));
+  const auto readings = tool_->device.read_each(*wanted, device::Limits::skip);
+  if (!readings) return tl::unexpected(readings.error());
+  for (const device::Reading& reading : *readings) {
+    if (!reading.value) return tl::unexpected(reading.value.error());
+  }
+  const auto value = [&](std::size_t at) { return *(*readings)[at].value; };
+  found_.word = static_cast<std::uint16_t>(value(0).number.mantissa());
+  found_.mode = value(1).number.mantissa();
+  found_.stopping = device::time_of((*readings)[2], device::longest_stop(*tool_->profile));
+  std::size_t next = 3;
+  found_.analog = run.analog.empty() ? run.digital : value(next++).number.mantissa();
+  if (!run.watchdog.empty()) found_.watchdog = value(next);
+  return {};
+}
+
+Result<void> MotorSetup::check_ready() {
+  const auto state = plan_->motor.look(tool_->device);
+  if (!state) return tl::unexpected(state.error());
+  const auto refuse = [this](std::string message, std::string hint) {
+    return tl::unexpected(not_ready(tool_->target, std::move(message), std::move(hint)));
+  };
+  if (state->alarm != 0) {
+    return refuse(
+        fmt::format("alarm {:02X}h is present, so the motor was not started", state->alarm),
+        "'spindle alarms' shows what it means");
+  }
+  if (state->running || state->command_speed != 0) {
+    return refuse("the motor runs already, so it was not started",
+                  "wait until it stands still, or stop it with 'spindle remote-stop'");
+  }
+  if (state->busy) {
+    return refuse("the driver is busy, so the motor was not started", "try again in a second");
+  }
+  if (!facts().modes.contains(found_.mode)) {
+    return refuse(
+        fmt::format("{} is {}, which the profile does not know", facts().mode, found_.mode),
+        "'spindle get' shows it");
+  }
+  return check_analog();
+}
+
+Result<void> MotorSetup::check_analog() const {
+  const RunFacts& run = facts();
+  const bool from_outside =
+      !run.analog.empty() && found_.analog != run.digital && plan_->operation <= run.analog_to;
+  if (!from_outside) return {};
+  return tl::unexpected(
+      bad_option("--operation",
+                 fmt::format("the speed of operation data {} comes from outside while {} is {}",
+                             plan_->operation, run.analog, found_.analog),
+                 fmt::format("use --operation {}, or set {}={} and run 'do configure'",
+                             run.preferred, run.analog, run.digital)));
+}
+
+/// A word that runs at speed 0 would start the motor when its speed is set.
+Result<void> MotorSetup::clear_word() {
+  if ((found_.word & facts().starting) == 0) return {};
+  return plan_->motor.command(tool_->device, facts().decelerate_always);
+}
+
+Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& value) {
+  const auto before = tool_->device.read_each({parameter}, device::Limits::skip);
+  if (!before) return tl::unexpected(before.error());
+  const device::Reading& reading = before->front();
+  if (!reading.value) return tl::unexpected(reading.value.error());
+  if (*reading.value == value) return {};
+  const auto written = tool_->device.write(parameter, *reading.value, value);
+  if (!written) return tl::unexpected(written.error());
+  const bool done = written->result == device::WriteResult::written;
+  log_->add(logged(parameter, *reading.value, written->now, done ? "written" : "coerced"));
+  if (done) return {};
+  return tl::unexpected(
+      tool_->target.blamed({.code = Errc::mismatch,
+                            .message = fmt::format("the driver acknowledged {} but holds {}",
+                                                   value.to_string(), written->now.to_string()),
+                            .name = parameter.name,
+                            .register_address = parameter.address.value}));
+}
+
+Result<void> MotorSetup::write_settings() {
+  for (const auto& [parameter, value] : plan_->settings) {
+    if (auto written = write_one(parameter, value); !written) return written;
+    const bool is_stop =
+        parameter.name == catalogue::numbered_name(facts().deceleration, plan_->operation);
+    if (is_stop) {
+      device::Reading reading{.parameter = parameter, .registers = {}, .value = value};
+      found_.stopping = device::time_of(reading, found_.stopping);
+    }
+  }
+  return {};
+}
+
+Result<void> MotorSetup::set_watchdog() {
+  const bool is_off = !found_.watchdog || found_.watchdog->number == Decimal(0);
+  if (plan_->watchdog) return write_one(*plan_->watchdog_parameter, *plan_->watchdog);
+  if (is_off && plan_->watchdog_parameter) {
+    context_->renderer.note(
+        fmt::format("{}: {} is off: if this program or the line fails, the motor runs on; with "
+                    "--watchdog 1s the driver itself stops it",
+                    tool_->target.shown, plan_->watchdog_parameter->name));
+  }
+  return {};
+}
+
+void MotorSetup::restore_watchdog() {
+  const bool changed =
+      plan_->watchdog && found_.watchdog && !(*plan_->watchdog == *found_.watchdog);
+  if (!changed) return;
+  const auto restored =
+      tool_->device.write(*plan_->watchdog_parameter, *plan_->watchdog, *found_.watchdog);
+  const bool done = restored && restored->result == device::WriteResult::written;
+  log_->add(logged(*plan_->watchdog_parameter, *plan_->watchdog, *found_.watchdog,
+                   done ? "written" : "unknown"));
+  if (done) return;
+  context_->renderer.note(fmt::format("{}: {} could not be set back to {}", tool_->target.shown,
+                                      plan_->watchdog_parameter->name,
+                                      found_.watchdog->to_string()));
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "change_log.hpp"
+#include "motor_plan.hpp"
+
+namespace spindle::commands {
+
+/// What a driver is set to before its motor runs, and what of it is set back afterwards.
+class MotorSetup {
+ public:
+  /// All must outlive it.
+  MotorSetup(const MotorPlan& plan, OpenTool& tool, Context& context, ChangeLog& log)
+      : plan_(&plan), tool_(&tool), context_(&context), log_(&log) {}
+
+  /// Reads what the run depends on, and checks that the motor may be started; then writes the
+  /// operation data and the watchdog. The motor does not turn.
+  Result<void> prepare();
+
+  /// Of a motor that stands still.
+  void restore_watchdog();
+
+  /// By which the words of the run are chosen.
+  [[nodiscard]] std::int64_t input_mode() const { return found_.mode; }
+  /// How long the motor takes to decelerate, as it is set now.
+  [[nodiscard]] Duration stopping() const { return found_.stopping; }
+  /// The one that is in force during the run; empty or 0 where there is none.
+  [[nodiscard]] const std::optional<catalogue::Value>& watchdog() const {
+    return plan_->watchdog ? plan_->watchdog : found_.watchdog;
+  }
+
+ private:
+  /// Before anything is changed.
+  struct Found {
+    std::int64_t mode = 0;
+    std::uint16_t word = 0;
+    std::int64_t analog = 0;
+    std::optional<catalogue::Value> watchdog;
+    Duration stopping = {};
+  };
+
+  [[nodiscard]] const catalogue::RunFacts& facts() const { return plan_->motor.facts(); }
+  Result<void> read_settings();
+  Result<void> check_ready();
+  Result<void> check_analog() const;
+  Result<void> clear_word();
+  Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);
+  Result<void> write_settings();
+  Result<void> set_watchdog();
+
+  const MotorPlan* plan_;
+  OpenTool* tool_;
+  Context* context_;
+  ChangeLog* log_;
+  Found found_ = {};
+};
+
+}  // namespace spindle::commands

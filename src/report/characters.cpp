@@ -1,0 +1,32 @@
+#include "characters.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "character_table.hpp"
+
+namespace spindle::report {
+namespace {
+
+bool is_in(char32_t character, std::span<const CodePoints> spans) {
+  const auto behind =
+      std::upper_bound(spans.begin(), spans.end(), character,
+                       [](char32_t value, const CodePoints& span) { return value < span.first; });
+  return behind != spans.begin() && character <= std::prev(behind)->last;
+}
+
+bool is_control(char32_t character) {
+  return character < 0x20 || (character >= 0x7F && character < 0xA0);
+}
+
+}  // namespace
+
+std::size_t cells_of(char32_t character) {
+  if (character < no_cell.front().first) return 1;
+  if (is_in(character, no_cell)) return 0;
+  return is_in(character, two_cells) ? 2 : 1;
+}
+
+bool steers(char32_t character) { return is_control(character) || is_in(character, unseen); }
+
+}  // namespace spindle::report

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstddef>
+
+namespace spindle::report {
+
+/// Cells of a terminal that a character takes: none, one or two. The same in every locale.
+std::size_t cells_of(char32_t character);
+
+/// Whether it does something to a terminal, or to the text around it, that is not seen in itself:
+/// control characters, and those that turn the direction of writing, break lines or are invisible.
+bool steers(char32_t character);
+
+}  // namespace spindle::report
