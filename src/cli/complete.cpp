@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "spindle/base/text.hpp"
 #include "spindle/link/endpoint.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/sim/outage.hpp"
@@ -201,7 +202,10 @@ class Completer {
 
   void offer_argument(const Slot& slot, const std::string& word) {
     const bool is_side = slot.name == "A" || slot.name == "B";  // of a comparison
-    if (slot.name == "TARGET" || slot.name == "BUS" || is_side) offer_targets(word);
+    if (slot.name == "TARGET" || slot.name == "BUS" || is_side) {
+      offer_tools(word);
+      offer_groups(slot.repeats || find_option("--jobs") != nullptr ? Groups::all : Groups::of_one);
+    }
     if (is_side) add("defaults", "what the profile says");
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
     if (slot.name == "PROFILE") {
@@ -218,13 +222,20 @@ class Completer {
     offer_names(names_of(*profile), word);
   }
 
-  void offer_targets(const std::string& word) {
+  void offer_tools(const std::string& word) {
     for (const files::Tool& tool : nameable_->tools.tools) add(tool.name, tool.url);
-    for (const auto& [group, members] : nameable_->tools.groups) {
-      add("@" + group, fmt::format("{} tools", members.size()));
-    }
     if (!word.starts_with("sim:")) return add("sim:", "a simulated tool");
     for (const Candidate& profile : profiles()) add("sim:" + profile.text, "a simulated tool");
+  }
+
+  /// Which groups a command takes: one that takes a single tool takes a group of one.
+  enum class Groups : std::uint8_t { of_one, all };
+
+  void offer_groups(Groups taken) {
+    for (const auto& [group, members] : nameable_->tools.groups) {
+      if (taken == Groups::of_one && members.size() > 1) continue;
+      add("@" + group, counted(members.size(), "tool"));
+    }
   }
 
   /// Labels behind "NAME=", else the names that can be set.
@@ -310,17 +321,30 @@ class Completer {
     return kinds;
   }
 
-  /// By --profile, by the tools file, or because the target is simulated.
+  /// The tools that an argument means, by their names or URLs.
+  [[nodiscard]] std::vector<std::string> members_of(const std::string& argument) const {
+    const auto& groups = nameable_->tools.groups;
+    const auto group = argument.starts_with('@') ? groups.find(argument.substr(1)) : groups.end();
+    return group == groups.end() ? std::vector<std::string>{argument} : group->second;
+  }
+
+  /// By the tools file, or because the target is simulated.
+  [[nodiscard]] std::string profile_of(const std::string& name) const {
+    const auto& tools = nameable_->tools.tools;
+    const auto tool = std::find_if(tools.begin(), tools.end(),
+                                   [&](const files::Tool& one) { return one.name == name; });
+    if (tool != tools.end() && !tool->profile.empty()) return tool->profile;
+    const auto endpoint = link::parse_endpoint(tool == tools.end() ? name : tool->url);
+    return endpoint ? endpoint->profile : std::string();
+  }
+
+  /// By --profile, else that of the first tool which has one.
   [[nodiscard]] std::optional<Profile> profile_of_target() const {
     std::string name = typed_.profile;
     for (const std::string& argument : typed_.arguments) {
-      if (!name.empty()) break;
-      const auto& tools = nameable_->tools.tools;
-      const auto tool = std::find_if(tools.begin(), tools.end(),
-                                     [&](const files::Tool& one) { return one.name == argument; });
-      if (tool != tools.end()) name = tool->profile;
-      const auto endpoint = link::parse_endpoint(tool == tools.end() ? argument : tool->url);
-      if (name.empty() && endpoint) name = endpoint->profile;
+      for (const std::string& member : members_of(argument)) {
+        if (name.empty()) name = profile_of(member);
+      }
     }
     if (name.empty()) return std::nullopt;
     auto profile = nameable_->profiles.load(name);

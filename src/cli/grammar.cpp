@@ -187,21 +187,25 @@ CLI::App* add_command(CLI::App& parent, Draft& draft, const Words& words, Option
 /// The options as typed, command by command; what needs converting is text here.
 struct TypedPing {
   commands::PingOptions options;
+  std::string jobs;
   std::string count;
   std::string interval;
 };
 struct TypedSet {
   commands::SetOptions options;
+  std::string jobs;
   bool dry_run = false;
   bool save = false;
   bool broadcast = false;
 };
 struct TypedGet {
   commands::GetOptions options;
+  std::string jobs;
   bool limits = false;
 };
 struct TypedDo {
   commands::DoOptions options;
+  std::string jobs;
   bool accept_unverified = false;
   bool broadcast = false;
 };
@@ -221,6 +225,7 @@ struct TypedRemoteStop {
 };
 struct TypedAlarms {
   commands::AlarmsOptions options;
+  std::string jobs;
   bool reset = false;
   bool accept_unverified = false;
 };
@@ -298,6 +303,7 @@ struct TypedCommands {
   commands::ProfileNameOptions profile_check;
 };
 
+constexpr std::string_view target_words = "tool name, @group or URL";
 constexpr std::string_view jobs_words = "how many tools at a time (default 64)";
 
 Result<void> fill_jobs(const std::string& text, std::size_t& jobs) {
@@ -321,7 +327,7 @@ void add_identify(CLI::App& app, Draft& draft, TypedCommands& typed) {
     return commands::identify(identify.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.identify, run);
-  command->add_option("TARGET", typed.identify.options.targets, "tool name, @group or URL");
+  command->add_option("TARGET", typed.identify.options.targets, std::string(target_words));
   option(command, "--jobs", typed.identify.jobs, "N", std::string(jobs_words));
 }
 
@@ -342,17 +348,21 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "(@holding:2, @input:3204/i16)",
                            "spindle get sim:doga-bm 'preset.1.*torque*'\n"
                            "spindle get station3 status.ready status.alarm\n"
+                           "spindle get @line1 'preset.1.*' --json\n"
                            "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16"};
   const auto run = [](TypedGet get, Context& context) {
     if (get.options.target.empty())
       return Result<Outcome>(tl::unexpected(missing("get", "TARGET")));
+    if (auto filled = fill_jobs(get.jobs, get.options.jobs); !filled)
+      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
     if (get.limits) get.options.limits = device::Limits::read;
     return commands::get(get.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.get, run);
-  command->add_option("TARGET", typed.get.options.target, "tool name or URL");
+  command->add_option("TARGET", typed.get.options.target, std::string(target_words));
   command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
   flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
+  option(command, "--jobs", typed.get.jobs, "N", std::string(jobs_words));
 }
 
 constexpr std::string_view save_words =
@@ -367,23 +377,27 @@ void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
                            "spindle set station3 preset.1.mode=TC/AM preset.1.speed=900\n"
                            "spindle set station3 preset.2.target-torque=3.10 --dry-run\n"
+                           "spindle set @line1 preset.1.target-torque=2.80\n"
                            "spindle set sim:orientalmotor-blv operation.2.speed=1200"};
   const auto run = [](TypedSet set, Context& context) {
     if (set.options.target.empty())
       return Result<Outcome>(tl::unexpected(missing("set", "TARGET")));
     if (set.options.assignments.empty())
       return Result<Outcome>(tl::unexpected(missing("set", "NAME=VALUE")));
+    if (auto filled = fill_jobs(set.jobs, set.options.jobs); !filled)
+      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
     if (set.dry_run) set.options.execution = commands::Execution::dry_run;
     if (set.save) set.options.storing = commands::Storing::yes;
     if (set.broadcast) set.options.reach = commands::Reach::everybody;
     return commands::set(set.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.set, run);
-  command->add_option("TARGET", typed.set.options.target, "tool name or URL");
+  command->add_option("TARGET", typed.set.options.target, std::string(target_words));
   command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
   flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
   flag(command, "--save", typed.set.save, std::string(save_words));
   flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
+  option(command, "--jobs", typed.set.jobs, "N", std::string(jobs_words));
 }
 
 void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -391,25 +405,31 @@ void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
-                           "spindle do station3 alarm-reset"};
+                           "spindle do station3 alarm-reset\n"
+                           "spindle do @line1 lock=unlocked"};
   const auto run = [](TypedDo perform, Context& context) {
     if (perform.options.target.empty())
       return Result<Outcome>(tl::unexpected(missing("do", "TARGET")));
+    if (auto filled = fill_jobs(perform.jobs, perform.options.jobs); !filled)
+      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
     if (perform.broadcast) perform.options.reach = commands::Reach::everybody;
     if (perform.accept_unverified) perform.options.acceptance = commands::Acceptance::unverified;
     return commands::perform(perform.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.perform, run);
-  command->add_option("TARGET", typed.perform.options.target, "tool name or URL");
+  command->add_option("TARGET", typed.perform.options.target, std::string(target_words));
   command->add_option("ACTION", typed.perform.options.actions,
                       "actions, with =VALUE where they take one");
   flag(command, "--accept-unverified", typed.perform.accept_unverified,
        "send what may move or lock the tool although its register is not certain");
   flag(command, "--broadcast", typed.perform.broadcast, std::string(broadcast_words));
+  option(command, "--jobs", typed.perform.jobs, "N", std::string(jobs_words));
 }
 
 Result<Outcome> run_ping(TypedPing ping, Context& context) {
   if (ping.options.target.empty()) return tl::unexpected(missing("ping", "TARGET"));
+  if (auto filled = fill_jobs(ping.jobs, ping.options.jobs); !filled)
+    return tl::unexpected(std::move(filled.error()));
   if (!ping.count.empty()) {
     const auto count = to_number("--count", ping.count, 1, 1'000'000);
     if (!count) return tl::unexpected(count.error());
@@ -426,11 +446,13 @@ void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "round-trip statistics without touching any value",
                            "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
                            "spindle ping station3\n"
+                           "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
   CLI::App* command = add_command(app, draft, words, typed.ping, run_ping);
-  command->add_option("TARGET", typed.ping.options.target, "tool name or URL");
+  command->add_option("TARGET", typed.ping.options.target, std::string(target_words));
   option(command, "-c,--count", typed.ping.count, "N", "how many requests (default 4)");
   option(command, "--interval", typed.ping.interval, "DURATION", "time between them (default 1s)");
+  option(command, "--jobs", typed.ping.jobs, "N", std::string(jobs_words));
 }
 
 /// "1-3,7": units of a serial line, each once, in the order given.
@@ -690,7 +712,7 @@ void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
     return commands::remote_stop(stop.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.remote_stop, run);
-  command->add_option("TARGET", typed.remote_stop.options.targets, "tool name, @group or URL");
+  command->add_option("TARGET", typed.remote_stop.options.targets, std::string(target_words));
   option(command, "--stop", typed.remote_stop.stop, "HOW",
          "how a motor stops: decelerate (default) or instant");
   flag(command, "--broadcast", typed.remote_stop.broadcast,
@@ -701,20 +723,24 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"alarms", "TARGET [--reset]",
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
+                           "spindle alarms @line1\n"
                            "spindle alarms station3 --reset"};
   const auto run = [](TypedAlarms alarms, Context& context) {
     if (alarms.options.target.empty()) {
       return Result<Outcome>(tl::unexpected(missing("alarms", "TARGET")));
     }
+    if (auto filled = fill_jobs(alarms.jobs, alarms.options.jobs); !filled)
+      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
     if (alarms.reset) alarms.options.reset = commands::AlarmReset::yes;
     if (alarms.accept_unverified) alarms.options.acceptance = commands::Acceptance::unverified;
     return commands::alarms(alarms.options, context);
   };
   CLI::App* command = add_command(app, draft, words, typed.alarms, run);
-  command->add_option("TARGET", typed.alarms.options.target, "tool name or URL");
+  command->add_option("TARGET", typed.alarms.options.target, std::string(target_words));
   command->add_flag("--reset", typed.alarms.reset, "also reset the present alarm");
   command->add_flag("--accept-unverified", typed.alarms.accept_unverified,
                     std::string(accept_unverified_words));
+  option(command, "--jobs", typed.alarms.jobs, "N", std::string(jobs_words));
 }
 
 Result<Outcome> run_backup(TypedBackup typed, Context& context) {
@@ -736,7 +762,7 @@ void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle backup @line1 --dir backups --force"};
   CLI::App* command = add_command(app, draft, words, typed.backup, run_backup);
   auto& options = typed.backup.options;
-  command->add_option("TARGET", options.targets, "tool name, @group or URL");
+  command->add_option("TARGET", options.targets, std::string(target_words));
   option(command, "-f,--file", options.file, "FILE",
          "where to (default TARGET.yaml in the present folder); - is standard output")
       ->each([&draft](const std::string& file) {

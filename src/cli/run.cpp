@@ -117,8 +117,8 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
        .version = version,
        .profiles = profiles,
        .tools = *tools,
-       .renderer = renderer,
-       .common = invocation.common}};
+       .common = invocation.common},
+      {.renderer = renderer}};
   if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
     return tl::unexpected(std::move(begun.error()));
   }

@@ -3,8 +3,10 @@
 #include <array>
 
 #include "deeds.hpp"
+#include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 
@@ -92,6 +94,10 @@ struct Findings {
   catalogue::Value present = {};  ///< the present alarm; 0: none
   catalogue::Resettable resettable = catalogue::Resettable::unknown;
   enum class Reset : std::uint8_t { none, done, failed } reset = Reset::none;
+
+  [[nodiscard]] bool was_present() const { return present.number != Decimal(0); }
+  /// Whether there is still an alarm now.
+  [[nodiscard]] bool is_present() const { return was_present() && reset != Reset::done; }
 };
 
 /// The meaning of a code by the table of its list; null when it is not known.
@@ -156,11 +162,15 @@ Error not_resettable(const Findings& findings, const Target& target) {
        .hint = "remove its cause, then switch the tool off and on"});
 }
 
-Result<void> reset(const Deed& deed, OpenTool& tool, Findings& findings, Context& context) {
-  const bool present = findings.present.number != Decimal(0);
-  if (present && findings.resettable == catalogue::Resettable::no) {
+/// Whether somebody was asked, and what the note of the reset says was told.
+enum class Asked : std::uint8_t { no, yes };
+
+Result<void> reset(const Deed& deed, Asked asked, OpenTool& tool, Findings& findings,
+                   Context& context) {
+  if (findings.is_present() && findings.resettable == catalogue::Resettable::no) {
     return tl::unexpected(not_resettable(findings, tool.target));
   }
+  if (asked == Asked::no) tell_notes(deed, tool.target, context);
   const auto result = perform_deed(deed, tool, context);
   if (!result) return tl::unexpected(result.error());
   Listing listing(context, deed_columns());
@@ -185,40 +195,121 @@ std::string sentence_of(const Findings& findings) {
     case Findings::Reset::none:
       break;
   }
-  if (findings.present.number == Decimal(0)) return "no alarm present";
+  if (!findings.is_present()) return "no alarm present";
   return fmt::format("alarm {} is present", findings.present.to_string());
+}
+
+Summary summary_of(std::size_t present, const Outcome& outcome, std::string sentence,
+                   const std::string& target) {
+  return {.counts = {{"present", count(present)}, {"failed", count(outcome.failed())}},
+          .sentence = std::move(sentence),
+          .target = target};
+}
+
+Result<AlarmPlan> plan(const Profile& profile, const AlarmsOptions& options, const Target& target) {
+  auto plan = plan_alarms(profile);
+  if (!plan || options.reset == AlarmReset::no) return plan;
+  auto deed = parse_deed("alarm-reset", profile);
+  if (!deed) return tl::unexpected(std::move(deed.error()));
+  plan->reset = std::move(*deed);
+  return check_evidence(plan->reset->action, target, options.acceptance).map([&] {
+    return std::move(*plan);
+  });
+}
+
+/// One tool: its alarms and, where it is wanted, their reset.
+Result<Findings> examine(const Target& target, const AlarmsOptions& options, Asked asked,
+                         Context& context) {
+  auto opened = open_prepared(target, Need::named_registers, context, [&](const Profile& profile) {
+    return plan(profile, options, target).and_then([&](AlarmPlan made) -> Result<AlarmPlan> {
+      if (!made.reset || asked == Asked::yes) return made;
+      return ask_for_hazards({*made.reset}, target, context).map([&] { return std::move(made); });
+    });
+  });
+  if (!opened) return tl::unexpected(std::move(opened.error()));
+  Findings findings;
+  auto done = show(opened->prepared, opened->tool, findings, context);
+  if (done && opened->prepared.reset) {
+    done = reset(*opened->prepared.reset, asked, opened->tool, findings, context);
+  }
+  if (!done) return tl::unexpected(std::move(done.error()));
+  return tell(summary_of(findings.was_present() ? 1 : 0, findings.outcome, sentence_of(findings),
+                         target.shown),
+              findings.outcome, context)
+      .map([&] { return findings; });
+}
+
+/// The tools of a group whose alarms may be reset.
+Result<Readiness<std::vector<Deed>>> agree_to_reset(const std::vector<Target>& targets,
+                                                    const AlarmsOptions& options,
+                                                    Context& context) {
+  auto ready = make_ready(targets, options.jobs, context, [&](const Target& target, Context& own) {
+    return plan_by_profile(target, own, [&](const Profile& profile) {
+      return plan(profile, options, target).map([](const AlarmPlan& made) {
+        return std::vector<Deed>{*made.reset};
+      });
+    });
+  });
+  if (!ready || ready->refused.failed() > 0) return ready;
+  return ask_for_group(ready->targets, ready->plans, targets.size(), context).map([&] {
+    return std::move(*ready);
+  });
+}
+
+std::string sentence_of(std::size_t present, std::size_t failed, std::size_t of) {
+  const std::string found = present == 0
+                                ? std::string("no alarm present")
+                                : fmt::format("alarms on {} of {}", present, counted(of, "tool"));
+  return found + failed_in_words(failed, of);
+}
+
+Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOptions& options,
+                              Context& context) {
+  const bool resets = options.reset == AlarmReset::yes;
+  std::vector<Target> reached = targets;
+  Outcome outcome;
+  if (resets) {
+    auto ready = agree_to_reset(targets, options, context);
+    if (!ready) return tl::unexpected(std::move(ready.error()));
+    if (ready->refused.failed() > 0) {
+      return refuse_all(ready->refused, summary_of(0, ready->refused, {}, {}), targets.size(),
+                        context);
+    }
+    reached = std::move(ready->targets);
+    outcome = ready->lost;
+  }
+  const auto performances =
+      tape_each(reached, options.jobs, context, [&](const Target& target, Context& own) {
+        return examine(target, options, resets ? Asked::yes : Asked::no, own);
+      });
+  outcome.add(outcome_of_all(performances, [](const Findings& found) { return found.outcome; }));
+  std::size_t present = 0;
+  std::size_t remaining = 0;
+  std::size_t failed = targets.size() - reached.size();
+  for (const auto& [tape, found] : performances) {
+    if (found && found->was_present()) ++present;
+    if (found && found->is_present()) ++remaining;
+    if (!found || found->outcome.failed() > 0) ++failed;
+  }
+  return play(performances, context)
+      .and_then([&] {
+        return tell(
+            summary_of(present, outcome, sentence_of(remaining, failed, targets.size()), {}),
+            outcome, context);
+      })
+      .map([&] { return outcome; });
 }
 
 }  // namespace
 
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
-  if (!target) return tl::unexpected(target.error());
-  auto opened = open_prepared(
-      *target, Need::named_registers, context, [&](const Profile& profile) -> Result<AlarmPlan> {
-        auto plan = plan_alarms(profile);
-        if (!plan || options.reset == AlarmReset::no) return plan;
-        auto deed = parse_deed("alarm-reset", profile);
-        if (!deed) return tl::unexpected(std::move(deed.error()));
-        plan->reset = std::move(*deed);
-        return check_evidence(plan->reset->action, *target, options.acceptance)
-            .and_then([&] { return ask_for_hazards({*plan->reset}, *target, context); })
-            .map([&] { return std::move(*plan); });
-      });
-  if (!opened) return tl::unexpected(std::move(opened.error()));
-  Findings findings;
-  auto done = show(opened->prepared, opened->tool, findings, context);
-  if (done && opened->prepared.reset) {
-    done = reset(*opened->prepared.reset, opened->tool, findings, context);
-  }
-  if (!done) return tl::unexpected(std::move(done.error()));
-  const Outcome& outcome = findings.outcome;
-  return context.renderer
-      .summary(summary_record({{"present", number(findings.present.number == Decimal(0) ? 0 : 1)},
-                               {"failed", count(outcome.failed())}},
-                              outcome.status(), target->shown, context.clock),
-               sentence_of(findings))
-      .map([&] { return outcome; });
+  const auto targets = resolve_one_or_group(options.target, Reach::one, context);
+  if (!targets) return tl::unexpected(targets.error());
+  const bool asks = options.reset == AlarmReset::yes && asks_as_group(options.target, Reach::one);
+  if (asks || targets->size() > 1) return examine_group(*targets, options, context);
+  return examine(targets->front(), options, Asked::no, context).map([](const Findings& findings) {
+    return findings.outcome;
+  });
 }
 
 }  // namespace spindle::commands

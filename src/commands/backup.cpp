@@ -170,14 +170,10 @@ Result<Outcome> tell(const std::vector<Result<Saved>>& results, Context& context
   }
   const auto saved = static_cast<std::size_t>(std::count_if(
       results.begin(), results.end(), [](const auto& result) { return result.has_value(); }));
-  auto drawn = listing.end();
-  if (drawn) {
-    drawn = context.renderer.summary(
-        summary_record({{"saved", count(saved)}, {"failed", count(results.size() - saved)}},
-                       outcome.status(), {}, context.clock),
-        fmt::format("{} saved, {} failed", saved, results.size() - saved));
-  }
-  return drawn.map([&] { return outcome; });
+  return finish(listing, outcome,
+                {.counts = {{"saved", count(saved)}, {"failed", count(results.size() - saved)}},
+                 .sentence = fmt::format("{} saved, {} failed", saved, results.size() - saved)},
+                context);
 }
 
 /// Standard output holds the backup and nothing else.

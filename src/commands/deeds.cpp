@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "consent.hpp"
+#include "group.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "stops.hpp"
@@ -127,6 +128,35 @@ Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& targe
   return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
 }
 
+Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
+                           std::size_t of, const Context& context) {
+  std::vector<std::string> names;
+  std::vector<std::string> ordinary;
+  std::map<std::string, std::string> dangerous;  // what a deed may cost, by its name
+  for (const Target& target : targets) {
+    names.push_back(target.shown);
+    for (const Deed& deed : deeds.at(target.shown)) {
+      const std::string& name = deed.action.name;
+      const bool is_dangerous = deed.action.hazard == Hazard::link;
+      const bool is_in_question = is_dangerous && context.common.consent != Consent::given;
+      if (!is_in_question) tell_notes(deed, target, context);
+      if (is_dangerous) {
+        dangerous.emplace(name, deed.action.note);
+        continue;
+      }
+      const bool is_new = std::find(ordinary.begin(), ordinary.end(), name) == ordinary.end();
+      if (is_new) ordinary.push_back(name);
+    }
+  }
+  const std::string tools = tools_in_words(names, of);
+  for (const auto& [name, note] : dangerous) {
+    const std::string what = fmt::format("{} on {}: {}", name, tools, note);
+    if (auto given = ask_typed_consent(what, name, context); !given) return given;
+  }
+  if (ordinary.empty()) return {};
+  return ask_consent(fmt::format("{} on {}", fmt::join(ordinary, ", "), tools), context);
+}
+
 std::string_view to_text(device::ActionResult result) {
   switch (result) {
     case device::ActionResult::confirmed:
@@ -141,17 +171,21 @@ std::string_view to_text(device::ActionResult result) {
   return "";
 }
 
+void tell_notes(const Deed& deed, const Target& target, const Context& context) {
+  const Action& action = deed.action;
+  if (!action.note.empty()) {
+    context.renderer.note(fmt::format("{}: {}: {}", target.shown, action.name, action.note));
+  }
+  if (target.reach == Reach::everybody && action.prepare) {
+    context.renderer.note(fmt::format("{}: {}: every motor on the line is stopped for it",
+                                      target.shown, action.name));
+  }
+}
+
 Result<device::ActionResult> perform_deed(const Deed& deed, OpenTool& tool,
                                           const Context& context) {
   const Action& action = deed.action;
-  if (!action.note.empty()) {
-    context.renderer.note(fmt::format("{}: {}: {}", tool.target.shown, action.name, action.note));
-  }
   const bool everybody = tool.target.reach == Reach::everybody;
-  if (everybody && action.prepare) {
-    context.renderer.note(fmt::format("{}: {}: every motor on the line is stopped for it",
-                                      tool.target.shown, action.name));
-  }
   if (action.motion == catalogue::Motion::stop) {
     return stop_motor(tool, catalogue::StopMode::decelerate, context).map(in_words_of_actions);
   }

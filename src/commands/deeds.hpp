@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,10 +32,20 @@ Result<void> check_evidence(const catalogue::Action& action, const Target& targe
 Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
                              const Context& context);
 
+/// What is to be done on each tool of a group, by its name.
+using GroupDeeds = std::map<std::string, std::vector<Deed>>;
+
+/// Asks once for a whole group of `of` tools, whatever the hazard; tells first what the notes of
+/// the deeds say.
+Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
+                           std::size_t of, const Context& context);
+
 std::string_view to_text(device::ActionResult result);
 
-/// Carries out one deed on its tool, or sends it to everybody where the target says so. Tells what
-/// its note says beforehand.
+/// What somebody should know before a deed is carried out.
+void tell_notes(const Deed& deed, const Target& target, const Context& context);
+
+/// Carries out one deed on its tool, or sends it to everybody where the target says so.
 Result<device::ActionResult> perform_deed(const Deed& deed, OpenTool& tool, const Context& context);
 
 report::Record deed_record(const Deed& deed, device::ActionResult result, const Target& target,

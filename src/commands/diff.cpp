@@ -55,7 +55,9 @@ Result<Side> understand(const std::string& text, const Context& context) {
     side.file = std::move(*file);
     return side;
   }
-  auto target = resolve_target(text, context);
+  auto target = resolve_target(text, context,
+                               {.why = "each side of a comparison is one",
+                                .instead = "compare them one by one, beginning with"});
   if (!target) return tl::unexpected(std::move(target.error()));
   side.target = std::move(*target);
   return side;
@@ -160,15 +162,13 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
       listing.add(error);
     }
   }
-  auto drawn = listing.end();
-  if (drawn) {
-    drawn = context.renderer.summary(
-        summary_record(
-            {{"different", count(comparison.differences.size())}, {"same", count(comparison.same)}},
-            outcome.status(), target, context.clock),
-        fmt::format("{} different, {} the same", comparison.differences.size(), comparison.same));
-  }
-  return drawn.map([&] { return outcome; });
+  return finish(listing, outcome,
+                {.counts = {{"different", count(comparison.differences.size())},
+                            {"same", count(comparison.same)}},
+                 .sentence = fmt::format("{} different, {} the same", comparison.differences.size(),
+                                         comparison.same),
+                 .target = target},
+                context);
 }
 
 }  // namespace

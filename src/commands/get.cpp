@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
@@ -10,15 +11,11 @@ namespace {
 
 bool is_raw(const std::string& name) { return name.starts_with('@'); }
 
-}  // namespace
-
-Result<Outcome> get(const GetOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
-  if (!target) return tl::unexpected(target.error());
+Result<Outcome> get_one(const Target& target, const GetOptions& options, Context& context) {
   const bool raw_only =
       !options.names.empty() && std::all_of(options.names.begin(), options.names.end(), is_raw);
   auto opened = open_prepared(
-      *target, raw_only ? Need::raw_registers : Need::named_registers, context,
+      target, raw_only ? Need::raw_registers : Need::named_registers, context,
       [&](const catalogue::Profile& profile) { return profile.select(options.names); });
   if (!opened) return tl::unexpected(std::move(opened.error()));
   const auto readings = opened->tool.device.read_each(opened->prepared, options.limits);
@@ -29,13 +26,34 @@ Result<Outcome> get(const GetOptions& options, Context& context) {
   for (const device::Reading& reading : *readings) {
     if (reading.value) {
       outcome.succeed();
-      listing.add(value_record(reading, *target, context.clock, options.limits));
+      listing.add(value_record(reading, target, context.clock, options.limits));
     } else {
       outcome.fail(reading.value.error());
       listing.add(reading.value.error());
     }
   }
   return finish(listing, outcome);
+}
+
+Result<Outcome> get_group(const std::vector<Target>& targets, const GetOptions& options,
+                          Context& context) {
+  const auto checked = check_for_some(targets, context, [&](const catalogue::Profile& profile) {
+    return profile.select(options.names);
+  });
+  if (!checked) return tl::unexpected(checked.error());
+  const auto performances =
+      tape_each(targets, options.jobs, context,
+                [&](const Target& target, Context& own) { return get_one(target, options, own); });
+  return play(performances, context).map([&] { return outcome_of_all(performances); });
+}
+
+}  // namespace
+
+Result<Outcome> get(const GetOptions& options, Context& context) {
+  const auto targets = resolve_one_or_group(options.target, Reach::one, context);
+  if (!targets) return tl::unexpected(targets.error());
+  return targets->size() == 1 ? get_one(targets->front(), options, context)
+                              : get_group(*targets, options, context);
 }
 
 }  // namespace spindle::commands

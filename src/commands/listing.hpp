@@ -1,6 +1,8 @@
 #pragma once
 
 #include <span>
+#include <string>
+#include <vector>
 
 #include "spindle/commands/context.hpp"
 
@@ -35,5 +37,18 @@ class Listing {
 inline Result<Outcome> finish(Listing& listing, const Outcome& outcome) {
   return listing.end().map([&] { return outcome; });
 }
+
+/// What a command did, as its last record and as a sentence for people.
+struct Summary {
+  std::vector<report::Field> counts;
+  std::string sentence;
+  std::string target = {};  ///< empty: it is about several
+};
+
+/// Tells the summary of something that ended like this.
+Result<void> tell(Summary summary, const Outcome& outcome, Context& context);
+
+/// The same for a command that ends with a summary behind its list.
+Result<Outcome> finish(Listing& listing, const Outcome& outcome, Summary summary, Context& context);
 
 }  // namespace spindle::commands

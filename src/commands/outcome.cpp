@@ -2,26 +2,46 @@
 
 namespace spindle::commands {
 
+namespace {
+
+bool ends_all(ExitStatus status) {
+  return status == ExitStatus::interrupted || status == ExitStatus::terminated;
+}
+
+}  // namespace
+
 Context calm_context(const Context& context) {
   const Calm& calm = context.calm;
-  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context};
+  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context, context};
 }
 
 Context with_lines(const Context& context, const device::OpenTransport& open) {
-  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open}, context};
+  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open}, context, context};
 }
 
-void Outcome::fail(const Error& error) {
-  const ExitStatus status = error.status();
-  if (failed_++ == 0) first_ = status;
+Context with_renderer(const Context& context, report::Renderer& renderer) {
+  return {context, context, {.renderer = renderer}};
+}
+
+void Outcome::fail(const Error& error) { note_failures(1, error.status()); }
+
+void Outcome::add(const Outcome& other) {
+  succeeded_ += other.succeeded_;
+  negative_ = negative_ || other.negative_;
+  if (other.failed_ > 0) note_failures(other.failed_, other.first_);
+  mixed_ = mixed_ || other.mixed_;
+}
+
+void Outcome::note_failures(std::size_t count, ExitStatus status) {
+  if (failed_ == 0) first_ = status;
+  failed_ += count;
   if (status != first_) mixed_ = true;
-  const bool ends_all = status == ExitStatus::interrupted || status == ExitStatus::terminated;
-  if (ends_all) first_ = status;
+  if (ends_all(status)) first_ = status;
 }
 
 ExitStatus Outcome::status() const {
   if (failed_ == 0) return negative_ ? ExitStatus::negative : ExitStatus::ok;
-  if (first_ == ExitStatus::interrupted || first_ == ExitStatus::terminated) return first_;
+  if (ends_all(first_)) return first_;
   return mixed_ || succeeded_ > 0 ? ExitStatus::partial : first_;
 }
 

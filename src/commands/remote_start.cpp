@@ -245,7 +245,10 @@ Result<void> check_tool_options(const RemoteStartOptions& options) {
 }  // namespace
 
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
+  const auto target =
+      resolve_target(options.target, context,
+                     {.why = "a motion is started one tool at a time, by somebody who watches it",
+                      .instead = "start them one after the other, beginning with"});
   if (!target) return tl::unexpected(target.error());
   const auto known = load_profile(*target, context);
   if (known && known->run) return run_motor(options, *target, context);

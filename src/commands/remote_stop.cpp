@@ -58,21 +58,17 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
       outcome.succeed();
     }
   }
-  return listing.end()
-      .and_then([&] {
-        return context.renderer.summary(
-            summary_record({{options.reach == Reach::everybody ? "sent" : "stopped",
-                             count(outcome.succeeded())},
+  const bool everybody = options.reach == Reach::everybody;
+  return finish(listing, outcome,
+                {.counts = {{everybody ? "sent" : "stopped", count(outcome.succeeded())},
                             {"failed", count(outcome.failed())}},
-                           outcome.status(), {}, context.clock),
-            fmt::format("{} {}, {} failed{}", outcome.succeeded(),
-                        options.reach == Reach::everybody ? "sent, not acknowledged" : "stopped",
-                        outcome.failed(),
-                        outcome.failed() == 0
-                            ? ""
-                            : "; what could not be stopped may still run: stop it at the tool"));
-      })
-      .map([&] { return outcome; });
+                 .sentence = fmt::format(
+                     "{} {}, {} failed{}", outcome.succeeded(),
+                     everybody ? "sent, not acknowledged" : "stopped", outcome.failed(),
+                     outcome.failed() == 0
+                         ? ""
+                         : "; what could not be stopped may still run: stop it at the tool")},
+                context);
 }
 
 }  // namespace spindle::commands

@@ -208,7 +208,9 @@ Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& op
 }  // namespace
 
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
-  const auto target = resolve_target(options.target, context);
+  const auto target = resolve_target(
+      options.target, context,
+      {.why = "a backup is restored to one", .instead = "restore them one by one, beginning with"});
   if (!target) return tl::unexpected(target.error());
   const auto file = read_backup_file(options.file, context);
   if (!file) return tl::unexpected(file.error());

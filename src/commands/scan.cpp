@@ -106,14 +106,11 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
     }
   }
   if (outcome.succeeded() == 0) outcome.negate();
-  return listing.end()
-      .and_then([&] {
-        return context.renderer.summary(
-            summary_record({{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
-                           outcome.status(), bus->shown, context.clock),
-            fmt::format("{} asked, {} found", asked, outcome.succeeded()));
-      })
-      .map([&] { return outcome; });
+  return finish(listing, outcome,
+                {.counts = {{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
+                 .sentence = fmt::format("{} asked, {} found", asked, outcome.succeeded()),
+                 .target = bus->shown},
+                context);
 }
 
 }  // namespace spindle::commands

@@ -16,6 +16,7 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile) {
 Result<void> store(OpenTool& tool, ChangeLog& log, Outcome& outcome, Context& context) {
   auto deed = parse_deed(std::string(store_action), *tool.profile);
   if (!deed) return tl::unexpected(std::move(deed.error()));
+  tell_notes(*deed, tool.target, context);
   const auto result = perform_deed(*deed, tool, context);
   log.add(logged(*deed, result));
   Listing listing(context, deed_columns());

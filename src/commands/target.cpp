@@ -245,14 +245,15 @@ Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& text
   return targets;
 }
 
-Result<Target> resolve_target(const std::string& text, const Context& context) {
+Result<Target> resolve_target(const std::string& text, const Context& context,
+                              const OneTool& words) {
   auto targets = resolve_targets({text}, context);
   if (!targets) return tl::unexpected(std::move(targets.error()));
   if (targets->size() == 1) return std::move(targets->front());
-  return tl::unexpected(Error{
-      .code = Errc::usage,
-      .message = fmt::format("'{}' is {} tools, and this command takes one", text, targets->size()),
-      .hint = fmt::format("name one of them, such as {}", targets->front().shown)});
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
+            .hint = fmt::format("{} {}", words.instead, targets->front().shown)});
 }
 
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context) {
@@ -262,7 +263,12 @@ Result<catalogue::Profile> load_profile(const Target& target, const Context& con
   return profile;
 }
 
-/// Unit 0 on a serial line is everybody, and nobody answers.
+Target known_target(const OpenTool& tool) {
+  Target known = tool.target;
+  if (known.profile.empty()) known.profile = tool.profile->id;
+  return known;
+}
+
 Result<void> check_reach(const Target& target, const catalogue::Profile& profile) {
   const bool serial_line = target.endpoint.medium == link::Medium::serial ||
                            target.endpoint.medium == link::Medium::rtu_over_tcp;

@@ -1,9 +1,6 @@
 """How it ends: signals during every wait, closed pipes, closed streams."""
 
-import contextlib
 import os
-import pty
-import select
 import signal
 import subprocess
 import unittest
@@ -20,24 +17,6 @@ TORQUE = "preset.1.target-torque"
 
 def tearDownModule():
     support.remove_home()
-
-
-def ask_on_terminal(arguments, question, answer):
-    """Runs spindle on a terminal of its own and types the answer to its question."""
-    pid, terminal = pty.fork()
-    if pid == 0:
-        program = support.binary()
-        os.execve(program, [program, *arguments], support.home().environment())
-    shown, answered = b"", False
-    with contextlib.suppress(OSError):  # the end of the terminal
-        while select.select([terminal], [], [], support.DEADLINE)[0]:
-            shown += os.read(terminal, 4096)
-            if question in shown and not answered:
-                answered = os.write(terminal, answer) > 0
-        os.kill(pid, signal.SIGKILL)  # it neither ended nor said anything more
-    _, status = os.waitpid(pid, 0)
-    os.close(terminal)
-    return shown.decode(), os.waitstatus_to_exitcode(status)
 
 
 class SignalTest(unittest.TestCase):
@@ -119,7 +98,7 @@ class SignalTest(unittest.TestCase):
         with support.Running("simulate", "doga-bm") as tool:
             url = tool.line()
             arguments = ["do", url, "select-preset=2", "--profile", "doga-bm", "--accept-unverified"]
-            shown, status = ask_on_terminal(arguments, b"Go on? [y/N]", b"\x03")
+            shown, status = support.ask_on_terminal(arguments, b"Go on? [y/N]", b"\x03")
             self.assertEqual(status, 130, shown)
             reading = support.run("get", url, "--profile", "doga-bm", "status.preset", "--json")
             self.assertEqual(reading.records()[0]["value"], 1)

@@ -25,7 +25,7 @@ Completion offered(const Words& words) {
       .path = "spindle.yaml",
       .tools = {{.name = "station3", .url = "tcp://10.0.0.3", .profile = "doga-bm"},
                 {.name = "bare", .url = "tcp://10.0.0.4", .profile = ""}},
-      .groups = {{"line1", {"station3", "bare"}}}};
+      .groups = {{"line1", {"bare", "station3"}}, {"single", {"bare"}}}};
   return cli::complete(words, cli::describe_grammar(), {tools, shipped()});
 }
 
@@ -84,12 +84,29 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
       {{"ping", "station3", "sta"}, {}},
       {{"profile", "show", "doga-bmt"}, {"doga-bmt"}},
       {{"get", "nowhere", "p"}, {}},
+      {{"get", "@line1", "event.num"}, {"event.number"}},
+      {{"set", "@line1", "preset.1.mode="}, {"preset.1.mode=TC/AM", "preset.1.mode=AC/TM"}},
+      {{"do", "@line1", "dir"}, {"direction="}},
+      {{"get", "@single", "event.num"}, {}},
+      {{"get", "@nobody", "event.num"}, {}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.words.back());
     CHECK(texts(row.words) == row.expected);
   }
   CHECK(offered({}).candidates.size() == offered({""}).candidates.size());
+}
+
+TEST_CASE("complete: a group is offered where several tools make sense") {
+  for (const char* command :
+       {"identify", "get", "set", "do", "watch", "remote-stop", "alarms", "backup", "ping"}) {
+    CAPTURE(command);
+    CHECK(texts({command, "@"}) == Words{"@line1", "@single"});
+  }
+  for (const char* command : {"list", "remote-start", "restore", "diff", "scan"}) {
+    CAPTURE(command);
+    CHECK(texts({command, "@"}) == Words{"@single"});
+  }
 }
 
 TEST_CASE("complete: many names are offered head by head") {

@@ -64,3 +64,40 @@ TEST_CASE("successes and failures are counted") {
   CHECK(outcome.succeeded() == 2);
   CHECK(outcome.failed() == 1);
 }
+
+TEST_CASE("what happened to several tools adds up to one status") {
+  constexpr std::nullopt_t good = std::nullopt;
+  struct Case {
+    std::vector<Story> tools;
+    ExitStatus status;
+    std::size_t succeeded;
+    std::size_t failed;
+  };
+  const std::vector<Case> cases = {
+      {{}, ExitStatus::ok, 0, 0},
+      {{{good}, {good, good}}, ExitStatus::ok, 3, 0},
+      {{{good}, {Errc::connection_refused}}, ExitStatus::partial, 1, 1},
+      {{{Errc::connection_refused}, {Errc::connect_timeout}}, ExitStatus::unreachable, 0, 2},
+      {{{Errc::connection_refused}, {}, {Errc::no_answer}}, ExitStatus::partial, 0, 2},
+      {{{}, {Errc::no_answer, Errc::bad_checksum}}, ExitStatus::partial, 0, 2},
+      {{{Errc::no_answer, good}, {Errc::interrupted}, {Errc::no_answer}},
+       ExitStatus::interrupted,
+       1,
+       3},
+      {{{Errc::interrupted, Errc::no_answer}, {good}}, ExitStatus::interrupted, 1, 2},
+  };
+  for (std::size_t row = 0; row < cases.size(); ++row) {
+    CAPTURE(row);
+    Outcome all;
+    for (const Story& story : cases[row].tools) all.add(told(story));
+    CHECK(all.status() == cases[row].status);
+    CHECK(all.succeeded() == cases[row].succeeded);
+    CHECK(all.failed() == cases[row].failed);
+  }
+  Outcome all;
+  Outcome negative = told({good});
+  negative.negate();
+  all.add(negative);
+  all.add(told({good}));
+  CHECK(all.status() == ExitStatus::negative);
+}

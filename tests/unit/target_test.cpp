@@ -43,8 +43,8 @@ struct Bench {
              .version = "1.2.3",
              .profiles = profiles,
              .tools = tools,
-             .renderer = *renderer,
-             .common = common}};
+             .common = common},
+            {.renderer = *renderer}};
   }
 
   Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& endpoint) {

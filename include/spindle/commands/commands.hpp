@@ -27,9 +27,10 @@ struct ListOptions {
 Result<Outcome> list(const ListOptions& options, Context& context);
 
 struct GetOptions {
-  std::string target;
+  std::string target;  ///< or a group
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> get(const GetOptions& options, Context& context);
 
@@ -39,28 +40,31 @@ enum class Execution : std::uint8_t { real, dry_run };
 enum class Storing : std::uint8_t { no, yes };
 
 struct SetOptions {
-  std::string target;
+  std::string target;                    ///< or a group
   std::vector<std::string> assignments;  ///< NAME=VALUE
   Execution execution = Execution::real;
   Storing storing = Storing::no;
   Reach reach = Reach::one;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
 
 enum class Acceptance : std::uint8_t { verified_only, unverified };
 
 struct DoOptions {
-  std::string target;
+  std::string target;                ///< or a group
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
   Reach reach = Reach::one;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> perform(const DoOptions& options, Context& context);
 
 struct PingOptions {
-  std::string target;
+  std::string target;  ///< or a group
   unsigned count = 4;
   Duration interval = std::chrono::seconds(1);
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> ping(const PingOptions& options, Context& context);
 
@@ -111,9 +115,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 enum class AlarmReset : std::uint8_t { no, yes };
 
 struct AlarmsOptions {
-  std::string target;
+  std::string target;  ///< or a group
   AlarmReset reset = AlarmReset::no;
   Acceptance acceptance = Acceptance::verified_only;
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
 

@@ -72,15 +72,22 @@ struct Surroundings {
   std::string_view version;         ///< of spindle
   const files::ProfileStore& profiles;
   const files::Tools& tools;
-  report::Renderer& renderer;
   CommonOptions common;
 };
 
+/// The part of a context that differs from one tool of a group to the next.
+struct Telling {
+  report::Renderer& renderer;
+};
+
 /// Everything a command may touch.
-struct Context : Waiting, Surroundings {};
+struct Context : Waiting, Surroundings, Telling {};
 
 /// The same context with a clock and lines that signals do not end.
 Context calm_context(const Context& context);
+
+/// The same context with another renderer, which must outlive it.
+Context with_renderer(const Context& context, report::Renderer& renderer);
 
 /// The same context with other lines, which must outlive it.
 Context with_lines(const Context& context, const device::OpenTransport& open);
@@ -92,6 +99,8 @@ class Outcome {
   void fail(const Error& error);
   /// Done, and the answer is no (status 1), unless something failed.
   void negate() { negative_ = true; }
+  /// All that happened elsewhere happened here, too.
+  void add(const Outcome& other);
 
   /// ok; the common status of all failures when nothing succeeded; else partial. Interruptions win.
   [[nodiscard]] ExitStatus status() const;
@@ -99,6 +108,8 @@ class Outcome {
   [[nodiscard]] std::size_t failed() const { return failed_; }
 
  private:
+  void note_failures(std::size_t count, ExitStatus status);
+
   std::size_t succeeded_ = 0;
   std::size_t failed_ = 0;
   bool negative_ = false;

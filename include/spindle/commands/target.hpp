@@ -36,8 +36,15 @@ struct OpenTool {
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Context& context);
 
+/// Why a command does not take a group, and what helps instead, before the name of the first tool.
+struct OneTool {
+  std::string_view why = "this command takes one";
+  std::string_view instead = "name one of them, such as";
+};
+
 /// The same for a command that takes one tool; a group of several is an error.
-Result<Target> resolve_target(const std::string& text, const Context& context);
+Result<Target> resolve_target(const std::string& text, const Context& context,
+                              const OneTool& words = {});
 
 /// Names the line on which the target's unit is one of several, as only one connection at a time
 /// can have it: the port behind its links, or the device server. Empty for a tool with a line of
@@ -68,6 +75,13 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const
 /// other registers than the profile's is refused (`wrong_generation`).
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Context& context);
+
+/// Unit 0 on a serial line is everybody, and nobody answers: refuses it where one tool is meant,
+/// and one tool where everybody is.
+Result<void> check_reach(const Target& target, const catalogue::Profile& profile);
+
+/// The target of a tool that was opened, with the profile that was found, to be opened again.
+Target known_target(const OpenTool& tool);
 
 /// A tool on a serial line whose profile nobody named.
 Error unproven(const Target& target);

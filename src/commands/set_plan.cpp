@@ -1,0 +1,164 @@
+#include "set_plan.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "spindle/catalogue/snapshot.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using catalogue::Profile;
+using catalogue::Value;
+
+/// Why a parameter can not be written. A raw register says what it belongs to instead.
+Error not_writable(const Parameter& parameter, const Profile& profile) {
+  Error error{
+      .code = Errc::read_only, .name = parameter.name, .register_address = parameter.address.value};
+  if (!parameter.name.starts_with('@') || parameter.table == modbus::RegisterTable::input) {
+    return error;
+  }
+  error.message = "this register is no parameter that can be written";
+  for (const catalogue::Action& action : profile.actions) {
+    if (action.address != parameter.address) continue;
+    error.message =
+        fmt::format("this is the register of action '{}', not of a parameter", action.name);
+    error.hint = "'spindle do' runs actions";
+  }
+  return error;
+}
+
+Result<Assignment> parse_assignment(const std::string& text, const Profile& profile) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
+                                .hint = "write it like preset.1.target-torque=2.71"});
+  }
+  auto parameter = profile.find(text.substr(0, equals));
+  if (!parameter) return tl::unexpected(std::move(parameter.error()));
+  if (parameter->access == catalogue::Access::read_only) {
+    return tl::unexpected(not_writable(*parameter, profile));
+  }
+  auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
+  if (!value) {
+    value.error().name = parameter->name;
+    value.error().register_address = parameter->address.value;
+    return tl::unexpected(std::move(value.error()));
+  }
+  return Assignment{std::move(*parameter), std::move(*value), text.substr(equals + 1)};
+}
+
+bool overlap(const Parameter& a, const Parameter& b) {
+  const auto end = [](const Parameter& p) {
+    return p.address.value + catalogue::register_count(p.encoding.kind);
+  };
+  return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
+}
+
+/// A motor that this would start needs somebody who stays to stop it.
+Result<void> check_motion(const Assignment& assignment, const Profile& profile) {
+  if (!profile.run) return {};
+  const auto command = profile.find(profile.run->command);
+  if (!command || !overlap(*command, assignment.parameter)) return {};
+  const auto registers = catalogue::encode(assignment.parameter, assignment.value.number);
+  if (!registers) return tl::unexpected(registers.error());
+  const unsigned end = assignment.parameter.address.value + unsigned(registers->size());
+  const unsigned low_word =
+      command->address.value + catalogue::register_count(command->encoding.kind) - 1U;
+  const bool starts = end > low_word && (registers->back() & profile.run->starting) != 0;
+  if (!starts) return {};
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = "it may start the motor, and 'set' does not stay to stop it",
+            .hint = "'spindle remote-start' starts it under a guard that always ends in a stop",
+            .name = assignment.parameter.name,
+            .register_address = assignment.parameter.address.value});
+}
+
+std::optional<Decimal> number_of(const std::optional<Value>& value) {
+  return value ? std::optional(value->number) : std::nullopt;
+}
+
+/// The tool's own limits; a parameter whose limits should exist but can not be read is not written.
+Result<void> check_own_limits(const Assignment& assignment, const device::Reading& reading,
+                              const Profile& profile) {
+  if (reading.limits_error) return tl::unexpected(*reading.limits_error);
+  return catalogue::check_own_limits(assignment.parameter, assignment.value.number,
+                                     number_of(reading.minimum), number_of(reading.maximum),
+                                     profile);
+}
+
+/// Names of bits as they count on this tool.
+Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading,
+                          const Profile& profile) {
+  if (assignment.parameter.bits_by.empty()) return {};
+  assignment.parameter = reading.parameter;
+  auto value = catalogue::parse_value(assignment.parameter, assignment.text);
+  if (!value) return tl::unexpected(std::move(value.error()));
+  assignment.value = std::move(*value);
+  return check_motion(assignment, profile);
+}
+
+}  // namespace
+
+Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
+                                                  const Profile& profile) {
+  std::vector<Assignment> assignments;
+  for (const std::string& text : texts) {
+    auto assignment = parse_assignment(text, profile);
+    if (!assignment) return tl::unexpected(std::move(assignment.error()));
+    if (auto calm = check_motion(*assignment, profile); !calm) {
+      return tl::unexpected(std::move(calm.error()));
+    }
+    for (const Assignment& earlier : assignments) {
+      if (!overlap(earlier.parameter, assignment->parameter)) continue;
+      return tl::unexpected(Error{.code = Errc::usage,
+                                  .message = "its register is assigned twice",
+                                  .hint = "give it one value",
+                                  .name = assignment->parameter.name,
+                                  .register_address = assignment->parameter.address.value});
+    }
+    assignments.push_back(std::move(*assignment));
+  }
+  return assignments;
+}
+
+Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
+                                                device::Device& device) {
+  std::vector<Parameter> parameters;
+  parameters.reserve(assignments.size());
+  for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
+  const auto readings = device.read_each(parameters, device::Limits::read);
+  if (!readings) return tl::unexpected(readings.error());
+  std::vector<SetStep> steps;
+  for (std::size_t index = 0; index < assignments.size(); ++index) {
+    const device::Reading& reading = (*readings)[index];
+    if (!reading.value) return tl::unexpected(reading.value.error());
+    if (auto known = resolve_bits(assignments[index], reading, device.profile()); !known) {
+      return tl::unexpected(std::move(known.error()));
+    }
+    auto allowed = check_own_limits(assignments[index], reading, device.profile());
+    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    steps.push_back({std::move(assignments[index]), *reading.value});
+  }
+  return steps;
+}
+
+Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignments) {
+  std::vector<SetStep> steps;
+  for (Assignment& assignment : assignments) {
+    if (!assignment.parameter.bits_by.empty()) {
+      assignment.parameter = catalogue::with_bits_for(assignment.parameter, std::nullopt);
+      auto value = catalogue::parse_value(assignment.parameter, assignment.text);
+      if (!value) return tl::unexpected(std::move(value.error()));
+      assignment.value = std::move(*value);
+    }
+    steps.push_back({std::move(assignment), std::nullopt});
+  }
+  return steps;
+}
+
+}  // namespace spindle::commands

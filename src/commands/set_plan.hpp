@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/catalogue/profile.hpp"
+#include "spindle/catalogue/value.hpp"
+#include "spindle/device/device.hpp"
+
+namespace spindle::commands {
+
+/// "NAME=VALUE", understood.
+struct Assignment {
+  catalogue::Parameter parameter;
+  catalogue::Value value;
+  std::string text;  ///< as typed: names of bits may mean others once the tool was read
+};
+
+/// One assignment with what the tool holds now.
+struct SetStep {
+  Assignment assignment;
+  std::optional<catalogue::Value> before;  ///< empty: it can not be asked
+
+  [[nodiscard]] bool changes() const { return before != assignment.value; }
+};
+
+/// What can be known from the profile: names, access, types, ranges, and that none starts a motor.
+Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
+                                                  const catalogue::Profile& profile);
+
+/// What only the tool can say: its present values, its own limits, and which bits have names. Reads
+/// only.
+Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
+                                                device::Device& device);
+
+/// For everybody on a line. Everybody may have another setting, so only names of bits that always
+/// count can be sent.
+Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignments);
+
+}  // namespace spindle::commands

@@ -1,0 +1,159 @@
+#include "set_records.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "records.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Parameter;
+using catalogue::Value;
+using report::Align;
+using report::Column;
+
+const std::array<Column, 5> plan_columns = {{{"NAME", "name"},
+                                             {"OLD", "old", Align::right},
+                                             {"NEW", "new", Align::right},
+                                             {"UNIT", "unit"},
+                                             {"CHANGES", "changes"}}};
+
+const std::array<Column, 5> write_columns = {{{"NAME", "name"},
+                                              {"OLD", "old", Align::right},
+                                              {"NEW", "new", Align::right},
+                                              {"UNIT", "unit"},
+                                              {"RESULT", "result"}}};
+
+/// When a value acts; empty where there is nothing to say.
+std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
+  if (!effect) return "";
+  switch (*effect) {
+    case catalogue::Effect::at_once:
+      return "";
+    case catalogue::Effect::after_stop:
+      return "takes effect when the motor stands still";
+    case catalogue::Effect::after_configuration:
+      return "takes effect after 'do configure'";
+    case catalogue::Effect::after_power_cycle:
+      return "takes effect after 'do save' and switching off and on";
+    case catalogue::Effect::unknown:
+      return "takes effect at a moment that is not known; at the latest after 'do save' and "
+             "switching off and on";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string_view to_text(Ending ending) {
+  switch (ending) {
+    case Ending::planned:
+      return "planned";
+    case Ending::written:
+      return "written";
+    case Ending::unchanged:
+      return "unchanged";
+    case Ending::coerced:
+      return "coerced";
+    case Ending::mismatch:
+      return "mismatch";
+    case Ending::refused:
+      return "refused";
+    case Ending::sent:
+      return "sent";
+  }
+  return "";
+}
+
+std::span<const Column> set_plan_columns() { return plan_columns; }
+
+std::span<const Column> set_columns() { return write_columns; }
+
+report::Record step_record(const SetStep& step, Ending ending, const Value& now,
+                           const Target& target, const Clock& clock) {
+  const Parameter& parameter = step.assignment.parameter;
+  report::Record record{.type = ending == Ending::planned ? "plan" : "write",
+                        .target = target.shown,
+                        .time = clock.wall(),
+                        .fields = {}};
+  record.fields = {{"name", parameter.name},
+                   {"register", number(parameter.address.value)},
+                   {"old", step.before ? report::Cell(step.before->number) : report::Cell(),
+                    step.before ? step.before->to_string() : std::string()},
+                   {"new", now.number, now.to_string()},
+                   {"unit", text_or_null(unit_of(parameter, target))}};
+  if (ending == Ending::planned) {
+    record.fields.push_back({"changes", step.changes(), step.changes() ? "yes" : "no"});
+  } else {
+    record.fields.push_back({"result", std::string(to_text(ending))});
+  }
+  return record;
+}
+
+Error not_stored(const SetStep& step, const device::Written& written, const Target& target) {
+  const std::string asked = step.assignment.value.to_string();
+  const std::string holds = written.now.to_string();
+  const std::string_view how = written.result == device::WriteResult::mismatch ? "still" : "now";
+  return target.blamed(
+      {.code = Errc::mismatch,
+       .message = fmt::format("the tool acknowledged {} but {} holds {}", asked, how, holds),
+       .hint = "is the tool running, locked, or set to refuse changes?",
+       .name = step.assignment.parameter.name,
+       .register_address = step.assignment.parameter.address.value});
+}
+
+void SetCounts::add(const SetCounts& other) {
+  changed += other.changed;
+  unchanged += other.unchanged;
+  failed += other.failed;
+  left += other.left;
+}
+
+SetCounts counts_of(const std::vector<SetStep>& steps) {
+  SetCounts counts;
+  for (const SetStep& step : steps) ++(step.changes() ? counts.changed : counts.unchanged);
+  return counts;
+}
+
+Summary plan_summary(const SetCounts& counts, const std::string& target) {
+  return {.counts = {{"planned", count(counts.changed)}, {"unchanged", count(counts.unchanged)}},
+          .sentence = fmt::format("{} to write, {} unchanged", counts.changed, counts.unchanged),
+          .target = target};
+}
+
+Summary set_summary(const SetCounts& counts, const std::string& target) {
+  Summary summary{
+      .counts = {{"written", count(counts.changed)},
+                 {"unchanged", count(counts.unchanged)},
+                 {"failed", count(counts.failed)},
+                 {"not_tried", count(counts.left)}},
+      .sentence = fmt::format("{} written, {} unchanged", counts.changed, counts.unchanged),
+      .target = target};
+  if (counts.failed > 0 || counts.left > 0) {
+    summary.sentence += fmt::format(", {} failed, {} not tried", counts.failed, counts.left);
+  }
+  return summary;
+}
+
+void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context) {
+  for (const SetStep& step : steps) {
+    const Parameter& parameter = step.assignment.parameter;
+    if (parameter.risk.empty() || !step.changes()) continue;
+    context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name, parameter.risk));
+  }
+}
+
+void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context) {
+  for (const SetStep& step : steps) {
+    const Parameter& parameter = step.assignment.parameter;
+    const std::string_view words = effect_words(parameter.effect);
+    if (words.empty() || !step.changes()) continue;
+    context.renderer.note(fmt::format("{}: {} {}", target.shown, parameter.name, words));
+  }
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "listing.hpp"
+#include "set_plan.hpp"
+#include "spindle/commands/target.hpp"
+
+namespace spindle::commands {
+
+/// How one assignment ended, as in the contract's record `write`.
+enum class Ending : std::uint8_t { planned, written, unchanged, coerced, mismatch, refused, sent };
+
+std::string_view to_text(Ending ending);
+
+std::span<const report::Column> set_plan_columns();
+std::span<const report::Column> set_columns();
+
+/// The `plan` or `write` record of a step; `now` is what the tool holds or is to hold.
+report::Record step_record(const SetStep& step, Ending ending, const catalogue::Value& now,
+                           const Target& target, const Clock& clock);
+
+/// The tool acknowledged a step, and holds something else.
+Error not_stored(const SetStep& step, const device::Written& written, const Target& target);
+
+/// What was written, or would be, of one tool or of several.
+struct SetCounts {
+  std::size_t changed = 0;
+  std::size_t unchanged = 0;
+  std::size_t failed = 0;
+  std::size_t left = 0;  ///< not tried
+
+  void add(const SetCounts& other);
+};
+
+/// What would be written.
+SetCounts counts_of(const std::vector<SetStep>& steps);
+
+Summary plan_summary(const SetCounts& counts, const std::string& target);
+Summary set_summary(const SetCounts& counts, const std::string& target);
+
+/// What a change may cost, before it is made.
+void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context);
+
+/// When what was written acts, where that is not at once.
+void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);
+
+}  // namespace spindle::commands

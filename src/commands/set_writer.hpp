@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "change_log.hpp"
+#include "set_records.hpp"
+#include "spindle/commands/commands.hpp"
+
+namespace spindle::commands {
+
+/// How `set` ended on one tool.
+struct SetResult {
+  Outcome outcome = {};
+  SetCounts counts = {};
+};
+
+/// Carries out the steps of one tool, records every change, and stops at the first that fails or
+/// when a signal asks for it.
+class SetWriter {
+ public:
+  /// All must outlive it.
+  SetWriter(OpenTool& tool, Storing storing, Context& context)
+      : tool_(&tool),
+        storing_(storing),
+        context_(&context),
+        listing_(context, set_columns()),
+        log_("set", tool, context) {}
+
+  /// Writes what differs, reads each back, and ends with a summary.
+  Result<SetResult> write(const std::vector<SetStep>& steps);
+
+  /// To everybody on the line. Nobody says what they hold now.
+  Result<SetResult> send(const std::vector<SetStep>& steps);
+
+ private:
+  void note(const SetStep& step, Ending ending, const catalogue::Value& now);
+  void log(const SetStep& step, std::string_view result, const catalogue::Value& now);
+  void succeed(const SetStep& step, Ending ending, const catalogue::Value& now);
+  void fail(const Error& error);
+  void write_one(const SetStep& step);
+  Result<SetResult> end(Summary summary);
+
+  OpenTool* tool_;
+  Storing storing_;
+  Context* context_;
+  Listing listing_;
+  ChangeLog log_;
+  SetResult result_ = {};
+};
+
+}  // namespace spindle::commands
