@@ -206,7 +206,8 @@ void Peer::receive(ByteView bytes, TimePoint now) {
   if (deaf_) return;
   if (framing_ == Framing::rtu) echo(bytes, now);
   if (line_) {
-    line_->hear(bytes, now);
+    take_burst(now);  // which ended before these bytes, when nobody could look in time
+    if (!deaf_) line_->hear(bytes, now);
     return;
   }
   if (framing_ == Framing::rtu && !inbox_.empty() && now > last_byte_ + longest_pause) {

@@ -234,40 +234,46 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
     return Finished(arguments, status, *texts, seconds)
 
 
-def run_on_terminal(*arguments, columns=120, environment=None, timeout=DEADLINE, hear=lambda shown, terminal: None):
-    """Runs spindle on a terminal of its own to its end; standard output is all that the terminal got.
-    `hear` is called with that, as far as it has come, and may type something."""
-    arguments = [str(argument) for argument in arguments]
-    began = time.monotonic()
+def talk_on_terminal(arguments, hear, columns, environment):
+    """Runs spindle on a terminal of its own to its end. `hear` gets all that was shown so far whenever there
+    is more, and returns what is typed next, if anything. Returns what was shown, and the status."""
+    program, folder, environment = binary(), home().path, home().environment(**environment)
     pid, terminal = pty.fork()
     if pid == 0:
         fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-        os.chdir(home().path)
-        os.execve(binary(), [binary(), *arguments], home().environment(**{"TERM": "xterm", **(environment or {})}))
+        os.chdir(folder)
+        os.execve(program, [program, *arguments], environment)
     shown = b""
     with contextlib.suppress(OSError):  # the end of the terminal
-        while select.select([terminal], [], [], max(0.0, began + timeout - time.monotonic()))[0]:
+        while select.select([terminal], [], [], DEADLINE)[0]:
             shown += os.read(terminal, 65536)
-            hear(shown, terminal)
+            if typed := hear(shown):
+                os.write(terminal, typed)
         os.kill(pid, signal.SIGKILL)  # it neither ended nor said anything more
     _, status = os.waitpid(pid, 0)
     os.close(terminal)
-    seconds = time.monotonic() - began
-    return Finished(arguments, os.waitstatus_to_exitcode(status), shown.decode(), "", seconds)
+    return shown.decode(), os.waitstatus_to_exitcode(status)
+
+
+def run_on_terminal(*arguments, columns=120, environment=None):
+    """Runs spindle on a terminal of its own to its end; standard output is all that the terminal got."""
+    arguments = [str(argument) for argument in arguments]
+    began = time.monotonic()
+    shown, status = talk_on_terminal(arguments, lambda _: b"", columns, {"TERM": "xterm", **(environment or {})})
+    return Finished(arguments, status, shown, "", time.monotonic() - began)
 
 
 def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):
-    """Runs spindle on a terminal of its own, calls `meanwhile` at its question, and types the answer.
-    Returns what the terminal got, and the status."""
-    answered = []
+    """The same; calls `meanwhile` at its question, and types the answer. Returns text and status."""
+    answers = [answer]
 
-    def hear(shown, terminal):
-        if question in shown and not answered:
-            meanwhile()
-            answered.append(os.write(terminal, answer))
+    def hear(shown):
+        if question not in shown or not answers:
+            return b""
+        meanwhile()
+        return answers.pop()
 
-    finished = run_on_terminal(*arguments, hear=hear)
-    return finished.stdout, finished.status
+    return talk_on_terminal([str(argument) for argument in arguments], hear, 80, {})
 
 
 @contextlib.contextmanager

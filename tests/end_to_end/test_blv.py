@@ -297,11 +297,11 @@ class EndingTest(MotorTest):
 
     def test_answers_that_get_lost(self):
         with Bus("--fault", "lost@every:5") as bus:
-            finished = start(bus.url, "--for", "1s", "--timeout", "100ms", "--json")
+            finished = start(bus.url, "--for", "1s", "--timeout", "250ms", "--json")
             self.assertIn(finished.status, (0, 5), finished)
             self.assertTrue(finished.records()[-1]["stop_confirmed"], finished)
             self.assert_stop_was_sent(bus, finished)
-            self.assertEqual(run("remote-stop", bus.url, "--timeout", "100ms").status, 0)
+            self.assertEqual(run("remote-stop", bus.url, "--timeout", "250ms").status, 0)
 
     def test_an_adapter_that_is_pulled_out(self):
         for where in PLACES:

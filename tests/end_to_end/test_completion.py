@@ -61,6 +61,9 @@ class Zsh:
         "compadd() { local -a found; builtin compadd -O found \"$@\"; print -rl -- $found >>shown; "
         "builtin compadd \"$@\" }",
         "bindkey '^I' complete-word",
+        "finish() { BUFFER=; : >|done }",
+        "zle -N finish",
+        "bindkey '^G' finish",
     )
 
     def __init__(self, folder, environment):
@@ -95,10 +98,11 @@ class Zsh:
         os.write(self.terminal, text.encode())
 
     def _finish(self, typed):
-        """Types, and waits until the shell has got as far as to run another command."""
+        """Types, and waits until the line editor has come to the key behind it. It is never left, as a
+        terminal without a line editor gives other meanings to keys."""
         done = self.folder / "done"
         done.unlink(missing_ok=True)
-        self._type(f"{typed}\x15print -r done >|done\r")  # Ctrl-U: the line is given up
+        self._type(f"{typed}\x07")
         try:
             support.wait_until(done.exists, "zsh is done", self.DEADLINE)
         except AssertionError as error:

@@ -164,8 +164,7 @@ TEST_CASE("streams: a pipe is no terminal") {
   const pid_t child = start(STDIN_FILENO, pipe.reader.number(), [&pipe] {
     ::dup2(pipe.writer.number(), STDOUT_FILENO);
     ::dup2(pipe.writer.number(), STDERR_FILENO);
-    const bool any = posix::is_terminal(posix::Std::in) ||
-                     posix::is_terminal(posix::Std::out) ||
+    const bool any = posix::is_terminal(posix::Std::in) || posix::is_terminal(posix::Std::out) ||
                      posix::is_terminal(posix::Std::err);
     return any ? 1 : 0;
   });

@@ -67,6 +67,14 @@ TEST_CASE("serial peer: an answer comes behind the gap and the driver's own dela
   CHECK(bus.answers() == "45500: " + to_hex(loopback_to_2) + "; ");
 }
 
+TEST_CASE("serial peer: what silence has parted stays apart, however late somebody looks") {
+  Bus bus;
+  bus.peer.receive(read_two, start);
+  bus.peer.receive(loopback_to_2, start + 30ms);
+  CHECK(bus.answers() == "15500: " + two_words + "; 45500: " + to_hex(loopback_to_2) + "; ");
+  CHECK(bus.bank.bad_frames == 0);
+}
+
 TEST_CASE("serial peer: bytes take their time in both directions") {
   Bus bus({}, {.character_time = 1ms});
   bus.peer.receive(read_two, start);

@@ -28,7 +28,7 @@ struct Streams {
   /// Whether err() can write a line without waiting; may be empty, which means yes. A motor must
   /// not run on because nobody takes what is told meanwhile.
   std::function<bool()> err_is_ready = {};
-  /// Cells of a row of the terminal behind err(), 0 where nobody knows; may be empty, which means 0.
+  /// Cells of a row of the terminal behind err(); 0, or an empty function: nobody knows.
   std::function<std::size_t()> err_columns = {};
   Color color = Color::off;
 };
