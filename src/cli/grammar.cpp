@@ -51,8 +51,13 @@ struct Words {
   std::string (*appendix)() = nullptr;
 };
 
+/// How much of the grammar is built: all of it to be described, or the options of the command that
+/// is named, because most of a short run would else be the others'.
+enum class Extent : std::uint8_t { whole, as_named };
+
 /// The grammar while it is being parsed: the innermost command that was named.
 struct Draft {
+  Extent extent = Extent::as_named;
   Typed typed;
   std::map<const CLI::App*, Words> words;
   const CLI::App* chosen = nullptr;
@@ -166,10 +171,11 @@ std::string asked_of(const TypedOptions& typed) {
 }
 
 /// Adds a command whose options struct CLI11 fills while `make_run` turns it into the deed. The
-/// options are copied into the run, because the grammar is gone when it runs.
-template <typename Options, typename MakeRun>
-CLI::App* add_command(CLI::App& parent, Draft& draft, const Words& words, Options& options,
-                      MakeRun make_run) {
+/// options are copied into the run, because the grammar is gone when it runs. `add_options` adds
+/// what may stand behind it.
+template <typename Options, typename MakeRun, typename AddOptions>
+void add_command(CLI::App& parent, Draft& draft, const Words& words, Options& options,
+                 MakeRun make_run, AddOptions add_options) {
   CLI::App* command = parent.add_subcommand(std::string(words.name), std::string(words.meaning));
   command->fallthrough();
   command->set_help_flag();
@@ -184,7 +190,11 @@ CLI::App* add_command(CLI::App& parent, Draft& draft, const Words& words, Option
       });
     };
   });
-  return command;
+  if (draft.extent == Extent::whole) {
+    add_options(command);
+  } else {
+    command->preparse_callback([command, add_options](std::size_t) { add_options(command); });
+  }
 }
 
 /// The options as typed, command by command; what needs converting is text here.
@@ -329,9 +339,10 @@ void add_identify(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (!filled) return tl::unexpected(std::move(filled.error()));
     return commands::identify(identify.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.identify, run);
-  command->add_option("TARGET", typed.identify.options.targets, std::string(target_words));
-  option(command, "--jobs", typed.identify.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.identify, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.identify.options.targets, std::string(target_words));
+    option(command, "--jobs", typed.identify.jobs, "N", std::string(jobs_words));
+  });
 }
 
 void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -340,9 +351,10 @@ void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle list --profile doga-bm\n"
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
-  add_command(app, draft, words, typed.list, commands::list)
-      ->add_option("PATTERN", typed.list.arguments,
-                   "names or patterns; a tool name or URL may stand before them");
+  add_command(app, draft, words, typed.list, commands::list, [&typed](CLI::App* command) {
+    command->add_option("PATTERN", typed.list.arguments,
+                        "names or patterns; a tool name or URL may stand before them");
+  });
 }
 
 void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -361,11 +373,12 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (get.limits) get.options.limits = device::Limits::read;
     return commands::get(get.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.get, run);
-  command->add_option("TARGET", typed.get.options.target, std::string(target_words));
-  command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
-  flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
-  option(command, "--jobs", typed.get.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.get, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.get.options.target, std::string(target_words));
+    command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
+    flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
+    option(command, "--jobs", typed.get.jobs, "N", std::string(jobs_words));
+  });
 }
 
 constexpr std::string_view save_words =
@@ -394,13 +407,14 @@ void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (set.broadcast) set.options.reach = commands::Reach::everybody;
     return commands::set(set.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.set, run);
-  command->add_option("TARGET", typed.set.options.target, std::string(target_words));
-  command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
-  flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
-  flag(command, "--save", typed.set.save, std::string(save_words));
-  flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
-  option(command, "--jobs", typed.set.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.set, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.set.options.target, std::string(target_words));
+    command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
+    flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
+    flag(command, "--save", typed.set.save, std::string(save_words));
+    flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
+    option(command, "--jobs", typed.set.jobs, "N", std::string(jobs_words));
+  });
 }
 
 void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -419,14 +433,15 @@ void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (perform.accept_unverified) perform.options.acceptance = commands::Acceptance::unverified;
     return commands::perform(perform.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.perform, run);
-  command->add_option("TARGET", typed.perform.options.target, std::string(target_words));
-  command->add_option("ACTION", typed.perform.options.actions,
-                      "actions, with =VALUE where they take one");
-  flag(command, "--accept-unverified", typed.perform.accept_unverified,
-       "send what may move or lock the tool although its register is not certain");
-  flag(command, "--broadcast", typed.perform.broadcast, std::string(broadcast_words));
-  option(command, "--jobs", typed.perform.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.perform, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.perform.options.target, std::string(target_words));
+    command->add_option("ACTION", typed.perform.options.actions,
+                        "actions, with =VALUE where they take one");
+    flag(command, "--accept-unverified", typed.perform.accept_unverified,
+         "send what may move or lock the tool although its register is not certain");
+    flag(command, "--broadcast", typed.perform.broadcast, std::string(broadcast_words));
+    option(command, "--jobs", typed.perform.jobs, "N", std::string(jobs_words));
+  });
 }
 
 Result<Outcome> run_ping(TypedPing ping, Context& context) {
@@ -451,11 +466,13 @@ void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle ping station3\n"
                            "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
-  CLI::App* command = add_command(app, draft, words, typed.ping, run_ping);
-  command->add_option("TARGET", typed.ping.options.target, std::string(target_words));
-  option(command, "-c,--count", typed.ping.count, "N", "how many requests (default 4)");
-  option(command, "--interval", typed.ping.interval, "DURATION", "time between them (default 1s)");
-  option(command, "--jobs", typed.ping.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.ping, run_ping, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.ping.options.target, std::string(target_words));
+    option(command, "-c,--count", typed.ping.count, "N", "how many requests (default 4)");
+    option(command, "--interval", typed.ping.interval, "DURATION",
+           "time between them (default 1s)");
+    option(command, "--jobs", typed.ping.jobs, "N", std::string(jobs_words));
+  });
 }
 
 /// "1-3,7": units of a serial line, each once, in the order given.
@@ -500,9 +517,10 @@ void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
                            "spindle scan rtu+tcp://192.168.10.30:4001 --json",
                            scan_words};
-  CLI::App* command = add_command(app, draft, words, typed.scan, run_scan);
-  command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");
-  option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
+  add_command(app, draft, words, typed.scan, run_scan, [&typed](CLI::App* command) {
+    command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");
+    option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
+  });
 }
 
 /// Leaves it as it is where nothing is given.
@@ -621,20 +639,22 @@ void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle watch station3\n"
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
-  CLI::App* command = add_command(app, draft, words, typed.watch, run_watch);
-  TypedWatch& watch = typed.watch;
-  command->add_option("TARGET", watch.arguments, "tools, then names or patterns of values to poll");
-  option(command, "--interval", watch.interval, "DURATION",
-         "time between two polls (default 200ms)");
-  command->add_flag("--all", watch.all, "every polled sample instead of changes");
-  command->add_flag("--initial", watch.initial, "also the first value of everything polled");
-  option(command, "--count", watch.count, "N", "end after so many events and changes");
-  option(command, "--duration", watch.duration, "DURATION", "end after this time");
-  option(command, "--idle-timeout", watch.idle_timeout, "DURATION",
-         "end when nothing came for this time; status 1 if nothing came at all");
-  command->add_flag("--no-push", watch.no_push,
-                    "poll the event counter; for tools whose output another client uses");
-  command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
+  add_command(app, draft, words, typed.watch, run_watch, [&typed](CLI::App* command) {
+    TypedWatch& watch = typed.watch;
+    command->add_option("TARGET", watch.arguments,
+                        "tools, then names or patterns of values to poll");
+    option(command, "--interval", watch.interval, "DURATION",
+           "time between two polls (default 200ms)");
+    command->add_flag("--all", watch.all, "every polled sample instead of changes");
+    command->add_flag("--initial", watch.initial, "also the first value of everything polled");
+    option(command, "--count", watch.count, "N", "end after so many events and changes");
+    option(command, "--duration", watch.duration, "DURATION", "end after this time");
+    option(command, "--idle-timeout", watch.idle_timeout, "DURATION",
+           "end when nothing came for this time; status 1 if nothing came at all");
+    command->add_flag("--no-push", watch.no_push,
+                      "poll the event counter; for tools whose output another client uses");
+    command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
+  });
 }
 
 constexpr std::array<std::pair<std::string_view, catalogue::StopMode>, 2> stop_modes = {
@@ -679,23 +699,24 @@ void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
       "spindle remote-start station3 --for 2s --yes --json\n"
       "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
       "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
-  CLI::App* command = add_command(app, draft, words, typed.remote_start, run_remote_start);
-  auto& options = typed.remote_start.options;
-  command->add_option("TARGET", options.target, "tool name or URL");
-  option(command, "--preset", options.preset, "N", "select this preset first");
-  option(command, "--direction", options.direction, "D", "select this direction first");
-  option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
-  option(command, "--speed", options.speed, "RPM", "speed of a motor (BLV)");
-  flag(command, "--reverse", typed.remote_start.reverse, "turn a motor the other way round");
-  option(command, "--operation", typed.remote_start.operation, "N",
-         "operation data to set and run (default: 2 on BLV)");
-  option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed");
-  option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still");
-  option(command, "--watchdog", typed.remote_start.watchdog, "DURATION",
-         "let the driver itself stop when it hears nothing for so long");
-  option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant");
-  command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
-                    std::string(accept_unverified_words));
+  add_command(app, draft, words, typed.remote_start, run_remote_start, [&typed](CLI::App* command) {
+    auto& options = typed.remote_start.options;
+    command->add_option("TARGET", options.target, "tool name or URL");
+    option(command, "--preset", options.preset, "N", "select this preset first");
+    option(command, "--direction", options.direction, "D", "select this direction first");
+    option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
+    option(command, "--speed", options.speed, "RPM", "speed of a motor (BLV)");
+    flag(command, "--reverse", typed.remote_start.reverse, "turn a motor the other way round");
+    option(command, "--operation", typed.remote_start.operation, "N",
+           "operation data to set and run (default: 2 on BLV)");
+    option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed");
+    option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still");
+    option(command, "--watchdog", typed.remote_start.watchdog, "DURATION",
+           "let the driver itself stop when it hears nothing for so long");
+    option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant");
+    command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
+                      std::string(accept_unverified_words));
+  });
 }
 
 void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -714,12 +735,13 @@ void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (stop.broadcast) stop.options.reach = commands::Reach::everybody;
     return commands::remote_stop(stop.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.remote_stop, run);
-  command->add_option("TARGET", typed.remote_stop.options.targets, std::string(target_words));
-  option(command, "--stop", typed.remote_stop.stop, "HOW",
-         "how a motor stops: decelerate (default) or instant");
-  flag(command, "--broadcast", typed.remote_stop.broadcast,
-       "everybody on the serial line (unit=0): sent, not acknowledged");
+  add_command(app, draft, words, typed.remote_stop, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.remote_stop.options.targets, std::string(target_words));
+    option(command, "--stop", typed.remote_stop.stop, "HOW",
+           "how a motor stops: decelerate (default) or instant");
+    flag(command, "--broadcast", typed.remote_stop.broadcast,
+         "everybody on the serial line (unit=0): sent, not acknowledged");
+  });
 }
 
 void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -738,12 +760,13 @@ void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
     if (alarms.accept_unverified) alarms.options.acceptance = commands::Acceptance::unverified;
     return commands::alarms(alarms.options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.alarms, run);
-  command->add_option("TARGET", typed.alarms.options.target, std::string(target_words));
-  command->add_flag("--reset", typed.alarms.reset, "also reset the present alarm");
-  command->add_flag("--accept-unverified", typed.alarms.accept_unverified,
-                    std::string(accept_unverified_words));
-  option(command, "--jobs", typed.alarms.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.alarms, run, [&typed](CLI::App* command) {
+    command->add_option("TARGET", typed.alarms.options.target, std::string(target_words));
+    command->add_flag("--reset", typed.alarms.reset, "also reset the present alarm");
+    command->add_flag("--accept-unverified", typed.alarms.accept_unverified,
+                      std::string(accept_unverified_words));
+    option(command, "--jobs", typed.alarms.jobs, "N", std::string(jobs_words));
+  });
 }
 
 Result<Outcome> run_backup(TypedBackup typed, Context& context) {
@@ -763,19 +786,21 @@ void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle backup station3\n"
                            "spindle backup station3 -f before-the-change.yaml\n"
                            "spindle backup @line1 --dir backups --force"};
-  CLI::App* command = add_command(app, draft, words, typed.backup, run_backup);
-  auto& options = typed.backup.options;
-  command->add_option("TARGET", options.targets, std::string(target_words));
-  option(command, "-f,--file", options.file, "FILE",
-         "where to (default TARGET.yaml in the present folder); - is standard output")
-      ->each([&draft](const std::string& file) {
-        if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
-      });
-  option(command, "--dir", options.folder, "FOLDER", "one file TARGET.yaml a tool in this folder");
-  command->add_flag("--force", typed.backup.force, "replace files that are there");
-  command->add_flag("--include-secrets", typed.backup.include_secrets,
-                    "also what the profile marks as secret");
-  option(command, "--jobs", typed.backup.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, typed.backup, run_backup, [&typed, &draft](CLI::App* command) {
+    auto& options = typed.backup.options;
+    command->add_option("TARGET", options.targets, std::string(target_words));
+    option(command, "-f,--file", options.file, "FILE",
+           "where to (default TARGET.yaml in the present folder); - is standard output")
+        ->each([&draft](const std::string& file) {
+          if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
+        });
+    option(command, "--dir", options.folder, "FOLDER",
+           "one file TARGET.yaml a tool in this folder");
+    command->add_flag("--force", typed.backup.force, "replace files that are there");
+    command->add_flag("--include-secrets", typed.backup.include_secrets,
+                      "also what the profile marks as secret");
+    option(command, "--jobs", typed.backup.jobs, "N", std::string(jobs_words));
+  });
 }
 
 void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -790,14 +815,15 @@ void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
     }
     return commands::diff(options, context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.diff, run);
-  command->add_option("A", typed.diff.a, "tool, backup file, or 'defaults'");
-  command->add_option("B", typed.diff.b, "the same");
-  command->add_option("NAME", typed.diff.patterns, "compare only these");
-  command->add_option("--ignore", typed.diff.ignored, "leave these out, repeatable")
-      ->type_name("PATTERN")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  add_command(app, draft, words, typed.diff, run, [&typed](CLI::App* command) {
+    command->add_option("A", typed.diff.a, "tool, backup file, or 'defaults'");
+    command->add_option("B", typed.diff.b, "the same");
+    command->add_option("NAME", typed.diff.patterns, "compare only these");
+    command->add_option("--ignore", typed.diff.ignored, "leave these out, repeatable")
+        ->type_name("PATTERN")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  });
 }
 
 Result<Outcome> run_restore(TypedRestore typed, Context& context) {
@@ -816,16 +842,17 @@ void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle restore station3 station3.yaml --dry-run\n"
                            "spindle restore station3 station3.yaml 'preset.1.*'\n"
                            "spindle restore station3 old-tool.yaml --yes --json"};
-  CLI::App* command = add_command(app, draft, words, typed.restore, run_restore);
-  auto& options = typed.restore.options;
-  command->add_option("TARGET", options.target, "tool name or URL");
-  command->add_option("FILE", options.file, "backup file");
-  command->add_option("NAME", options.patterns, "restore only these");
-  command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
-  command->add_flag("--force", typed.restore.force, "also to a tool of another model");
-  command->add_flag("--no-rollback", typed.restore.no_rollback,
-                    "leave what was written when something fails");
-  command->add_flag("--save", typed.restore.save, std::string(save_words));
+  add_command(app, draft, words, typed.restore, run_restore, [&typed](CLI::App* command) {
+    auto& options = typed.restore.options;
+    command->add_option("TARGET", options.target, "tool name or URL");
+    command->add_option("FILE", options.file, "backup file");
+    command->add_option("NAME", options.patterns, "restore only these");
+    command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
+    command->add_flag("--force", typed.restore.force, "also to a tool of another model");
+    command->add_flag("--no-rollback", typed.restore.no_rollback,
+                      "leave what was written when something fails");
+    command->add_flag("--save", typed.restore.save, std::string(save_words));
+  });
 }
 
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -839,39 +866,40 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
       "spindle simulate doga-bm --rundown-every 2s --outage roam=5s@every:30s\n"
       "spindle simulate doga-bm --firmware 4001",
       trouble_words};
-  CLI::App* command = add_command(app, draft, words, typed.simulate, run_simulate);
-  auto& options = typed.simulate.options;
-  command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
-  option(command, "--listen", options.listen, "URL",
-         "where to listen (default a free port of 127.0.0.1)");
-  option(command, "--pty", options.pty, "PATH",
-         "serial tools: make a pseudo terminal that this path leads to");
-  option(command, "--units", typed.simulate.units, "LIST",
-         "serial tools: which units, such as 1-3");
-  option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
-  flag(command, "--no-gap", typed.simulate.no_gap,
-       "serial tools: also hear clients that keep too short a silence");
-  command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
-      ->type_name("FAULT")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
-         "length of the identity: 12, 13 or 17");
-  option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");
-  option(command, "--serial", typed.simulate.serial, "N", "serial number to report");
-  option(command, "--model", typed.simulate.model, "N", "tool model code to report");
-  option(command, "--rundown-every", typed.simulate.rundown_every, "DURATION",
-         "an operator who drives a screw at this interval (default: nobody)");
-  option(command, "--ng-every", typed.simulate.ng_every, "N",
-         "every so many of the operator's screws end NG");
-  option(command, "--burst", typed.simulate.burst, "N",
-         "results that each of the operator's screws brings, all at once (default 1)");
-  command
-      ->add_option("--outage", options.outages,
-                   "let the tool be away at times, repeatable; see below")
-      ->type_name("OUTAGE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  add_command(app, draft, words, typed.simulate, run_simulate, [&typed](CLI::App* command) {
+    auto& options = typed.simulate.options;
+    command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
+    option(command, "--listen", options.listen, "URL",
+           "where to listen (default a free port of 127.0.0.1)");
+    option(command, "--pty", options.pty, "PATH",
+           "serial tools: make a pseudo terminal that this path leads to");
+    option(command, "--units", typed.simulate.units, "LIST",
+           "serial tools: which units, such as 1-3");
+    option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
+    flag(command, "--no-gap", typed.simulate.no_gap,
+         "serial tools: also hear clients that keep too short a silence");
+    command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
+        ->type_name("FAULT")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
+           "length of the identity: 12, 13 or 17");
+    option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");
+    option(command, "--serial", typed.simulate.serial, "N", "serial number to report");
+    option(command, "--model", typed.simulate.model, "N", "tool model code to report");
+    option(command, "--rundown-every", typed.simulate.rundown_every, "DURATION",
+           "an operator who drives a screw at this interval (default: nobody)");
+    option(command, "--ng-every", typed.simulate.ng_every, "N",
+           "every so many of the operator's screws end NG");
+    option(command, "--burst", typed.simulate.burst, "N",
+           "results that each of the operator's screws brings, all at once (default 1)");
+    command
+        ->add_option("--outage", options.outages,
+                     "let the tool be away at times, repeatable; see below")
+        ->type_name("OUTAGE")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  });
 }
 
 void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -884,32 +912,36 @@ void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
   const auto none = [](const Options&, Context&) -> Result<Outcome> {
     return tl::unexpected(missing("profile", "list, show or check"));
   };
-  CLI::App* command = add_command(app, draft, words, typed.profile, none);
   const auto list = [](const Options&, Context& context) {
     return commands::profile_list(context);
   };
-  add_command(*command, draft,
-              {"list", "", "all profiles that can be named", "spindle profile list"},
-              typed.profile_list, list);
   const auto show = [](const Options& options, Context& context) {
     return options.profile.empty()
                ? Result<Outcome>(tl::unexpected(missing("profile show", "PROFILE")))
                : commands::profile_show(options, context);
   };
-  add_command(*command, draft,
-              {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
-              typed.profile_show, show)
-      ->add_option("PROFILE", typed.profile_show.profile, "name or file");
   const auto check = [](const Options& options, Context& context) {
     return options.profile.empty()
                ? Result<Outcome>(tl::unexpected(missing("profile check", "PROFILE")))
                : commands::profile_check(options, context);
   };
-  add_command(*command, draft,
-              {"check", "PROFILE", "every fault of a file, with its place",
-               "spindle profile check ./my-tool.yaml"},
-              typed.profile_check, check)
-      ->add_option("PROFILE", typed.profile_check.profile, "name or file");
+  add_command(app, draft, words, typed.profile, none, [=, &typed, &draft](CLI::App* command) {
+    add_command(*command, draft,
+                {"list", "", "all profiles that can be named", "spindle profile list"},
+                typed.profile_list, list, [](CLI::App*) {});
+    add_command(
+        *command, draft,
+        {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
+        typed.profile_show, show, [&typed](CLI::App* shown) {
+          shown->add_option("PROFILE", typed.profile_show.profile, "name or file");
+        });
+    add_command(*command, draft,
+                {"check", "PROFILE", "every fault of a file, with its place",
+                 "spindle profile check ./my-tool.yaml"},
+                typed.profile_check, check, [&typed](CLI::App* checked) {
+                  checked->add_option("PROFILE", typed.profile_check.profile, "name or file");
+                });
+  });
 }
 
 void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -921,14 +953,15 @@ void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
   const auto run = [](const TypedTools& tools, Context& context) {
     return tools.check ? commands::check_tools(context) : commands::tools(context);
   };
-  CLI::App* command = add_command(app, draft, words, typed.tools, run);
-  command->add_flag_callback(
-      "--check",
-      [&] {
-        typed.tools.check = true;
-        draft.tools_use = Invocation::ToolsFile::only_found;
-      },
-      "every fault of the file, with its place");
+  add_command(app, draft, words, typed.tools, run, [&typed, &draft](CLI::App* command) {
+    command->add_flag_callback(
+        "--check",
+        [&] {
+          typed.tools.check = true;
+          draft.tools_use = Invocation::ToolsFile::only_found;
+        },
+        "every fault of the file, with its place");
+  });
 }
 
 void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
@@ -1144,6 +1177,7 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
 Description describe_grammar() {
   CLI::App app;
   Draft draft;
+  draft.extent = Extent::whole;
   TypedCommands typed;
   build(app, draft, typed);
   return description_of(app, draft);

@@ -191,8 +191,7 @@ TEST_CASE("it is never wider than the terminal, and the counts stay") {
     progress.advance({.what = what, .done = 0, .total = 725});
     return terminal.line();
   };
-  CHECK(shown(36, "tcp://192.168.100.123:5000: reading") ==
-        "...8.100.123:5000: reading 0 of 725");
+  CHECK(shown(36, "tcp://192.168.100.123:5000: reading") == "...8.100.123:5000: reading 0 of 725");
   CHECK(shown(20, "station3: reading") == "...reading 0 of 725");
   CHECK(shown(8, "x") == " 0 o...");
   CHECK(shown(3, "y") == "..");
