@@ -159,10 +159,13 @@ void add_common_options(CLI::App& app, Typed& typed) {
 /// The tool that a command was wanted from, as typed; empty where it is none or several.
 template <typename TypedOptions>
 std::string asked_of(const TypedOptions& typed) {
-  if constexpr (requires { typed.options.target.size(); }) return typed.options.target;
+  const auto is_group = [](const std::string& target) { return target.starts_with('@'); };
+  if constexpr (requires { typed.options.target.size(); }) {
+    return is_group(typed.options.target) ? std::string() : typed.options.target;
+  }
   if constexpr (requires { typed.options.targets.front().size(); }) {
     const auto& targets = typed.options.targets;
-    if (targets.size() == 1 && !targets.front().starts_with('@')) return targets.front();
+    if (targets.size() == 1 && !is_group(targets.front())) return targets.front();
   }
   return {};
 }

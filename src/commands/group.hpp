@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <map>
 #include <memory>
 #include <string>
@@ -53,8 +52,7 @@ auto tape_each(const std::vector<Target>& targets, std::size_t jobs, Context& co
   using Attempt = std::invoke_result_t<Handle, const Target&, Context&>;
   using Part = Performance<typename Attempt::value_type>;
   ProgressLine progress(context);
-  std::atomic<std::size_t> done = 0;
-  return side_by_side(targets, jobs, [&](const Target& target) {
+  const auto handle_one = [&](const Target& target) {
     auto tape = std::make_unique<Tape>();
     Context own = with_renderer(context, *tape);
     Attempt attempt = context.interrupt.signalled()
@@ -64,9 +62,9 @@ auto tape_each(const std::vector<Target>& targets, std::size_t jobs, Context& co
       attempt.error() = of_tool(target, std::move(attempt.error()));
       static_cast<void>(tape->error(attempt.error(), context.clock.wall()));
     }
-    progress.show(fmt::format("{} of {} tools", ++done, targets.size()));
     return Part{std::move(tape), std::move(attempt)};
-  });
+  };
+  return side_by_side(targets, jobs, handle_one, &progress);
 }
 
 /// Shows what was told of each.
