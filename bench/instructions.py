@@ -74,8 +74,9 @@ def main():
             tool.send_signal(signal.SIGTERM)
             tool.wait()
     if options.record:
-        head = f"# {subprocess.run(['g++', '-dumpfullversion'], capture_output=True, text=True, check=True).stdout.strip()}"
-        RECORD.write_text("\n".join([f"{head} of g++, instructions of the whole process", *rows]) + "\n")
+        version = subprocess.run(["g++", "-dumpfullversion"], capture_output=True, text=True, check=True).stdout.strip()
+        head = f"# g++ {version}, release build: instructions of the whole process"
+        RECORD.write_text("\n".join([head, *rows]) + "\n")
 
 
 main()
