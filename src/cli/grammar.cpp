@@ -808,7 +808,7 @@ void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "compare tools, backup files and defaults by parameter name",
                            "spindle diff station3 station3.yaml\n"
                            "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
-                           "spindle diff station3 station4 --ignore 'p*'"};
+                           "spindle diff station3 station4 --ignore 'preset.1.*'"};
   const auto run = [](const commands::DiffOptions& options, Context& context) {
     if (options.a.empty() || options.b.empty()) {
       return Result<Outcome>(tl::unexpected(missing("diff", options.a.empty() ? "A" : "B")));
