@@ -8,7 +8,14 @@ install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/spindle/profile
 install(FILES share/spindle-1.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/spindle)
 install(FILES completions/spindle.bash
   DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME spindle)
-install(FILES completions/_spindle DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+# Debian's zsh looks for what packages bring in another folder than for what was installed by hand.
+install(CODE "
+  set(zsh_folder site-functions)
+  if(CMAKE_INSTALL_PREFIX STREQUAL \"/usr\")
+    set(zsh_folder vendor-completions)
+  endif()
+  file(INSTALL \"${PROJECT_SOURCE_DIR}/completions/_spindle\"
+    DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}/zsh/\${zsh_folder}\" TYPE FILE)")
 install(FILES completions/spindle.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 install(FILES packaging/copyright DESTINATION ${doc_folder})
 install(DIRECTORY man/examples DESTINATION ${doc_folder})

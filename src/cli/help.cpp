@@ -45,7 +45,7 @@ std::string program_help(const Description& description) {
       "Examples:\n{}\nUsage: spindle [OPTIONS] COMMAND [OPTIONS] [TARGET...] [ARGUMENTS]\n\n"
       "Commands:\n{}\nOptions of every command:\n{}\n"
       "A target is tcp://HOST[:PORT], rtu:///dev/ttyUSB0?unit=N, rtu+tcp://HOST:PORT?unit=N,\n"
-      "sim:PROFILE (a simulated tool), or a name of the tools file.\n"
+      "sim:PROFILE (a simulated tool), or a NAME or @GROUP of the tools file.\n"
       "'spindle COMMAND --help' shows examples of a command.\n",
       indented({"spindle identify sim:doga-bm", "spindle get sim:doga-bm 'preset.1.*torque*'",
                 "spindle set tcp://192.168.10.23:5000 preset.1.target-torque=2.80"}),

@@ -149,6 +149,13 @@ report::Record difference_record(const Difference& difference, const std::string
 
 Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& contents,
                      const std::string& target, Context& context) {
+  const bool compared = comparison.same > 0 || !comparison.differences.empty() ||
+                        !contents.first.unreadable.empty() || !contents.second.unreadable.empty();
+  if (!compared) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "no parameter is left to compare",
+                                .hint = "name more of them, or ignore fewer"});
+  }
   Outcome outcome;
   Listing listing(context, columns);
   for (const Difference& difference : comparison.differences) {

@@ -167,7 +167,10 @@ Result<void> parse_network(Endpoint& endpoint, std::string_view body, const Sche
 Result<void> parse_serial(Endpoint& endpoint, std::string_view body, const Scheme& scheme) {
   if (body.starts_with("//")) body.remove_prefix(2);
   if (!body.starts_with('/') || body.size() == 1) {
-    return tl::unexpected(bad_target(endpoint.text, "the path of the serial line is missing",
+    const bool relative = body.size() > 1;
+    return tl::unexpected(bad_target(endpoint.text,
+                                     relative ? "the path of a serial line begins with '/'"
+                                              : "the path of the serial line is missing",
                                      fmt::format("write {}", scheme.form)));
   }
   endpoint.device = body;

@@ -18,7 +18,7 @@ import support
 TABLE = json.loads(pathlib.Path(__file__).with_name("hostile_table.json").read_text("utf-8"))
 TIMEOUT_MS = 500
 CONNECT_TIMEOUT = 1.0
-SLACK = 1.0
+SLACK = 2.5
 SIDE_BY_SIDE = 8
 SUMMARISED = {"set", "do", "ping"}
 NEW_TORQUE = 280
