@@ -1039,6 +1039,10 @@ Error unexpected_argument(const CLI::App& app, const Draft& draft, const std::st
                fmt::format("'spindle {} --help' shows examples", command));
 }
 
+Error empty_value(const std::string& option) {
+  return usage(option + ": its value is empty", "give it one, or leave the option out");
+}
+
 /// CLI11 can only fail on options without their value, or flags with one; everything else is ours.
 Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseError& error) {
   const std::string what = error.what();
@@ -1046,6 +1050,7 @@ Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseEr
     const std::string name = argument.substr(0, argument.find('='));
     const std::string bare = name.substr(std::min(name.size(), name.find_first_not_of('-')));
     if (bare.empty() || bare == name || what.find(bare) == std::string::npos) continue;
+    if (name.size() + 1 == argument.size()) return empty_value(name);
     if (name != argument)
       return usage(fmt::format("'{}' takes no value", name), fmt::format("write {} alone", name));
     return usage(fmt::format("'{}' needs a value", name), fmt::format("write {} VALUE", name));
@@ -1135,6 +1140,22 @@ std::optional<std::string> first_extra(const CLI::App& app) {
   return std::nullopt;
 }
 
+/// An option whose value is empty, as behind a variable of a script that is not set. To go on as if
+/// it were not there could leave a motor running without an end.
+std::optional<std::string> option_without_value(const CLI::App& app) {
+  const auto is_empty = [](const std::string& text) { return text.empty(); };
+  for (const CLI::Option* known : app.get_options()) {
+    const auto& values = known->results();
+    if (known->nonpositional() && std::any_of(values.begin(), values.end(), is_empty)) {
+      return known->get_name();
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) {
+    if (auto found = option_without_value(*command)) return found;
+  }
+  return std::nullopt;
+}
+
 Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   Invocation invocation;
   const auto extra = first_extra(app);
@@ -1146,6 +1167,9 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   }
   const bool wants_version = draft.typed.version && !misspelt;
   if (extra && !wants_version) return tl::unexpected(unexpected_argument(app, draft, *extra));
+  if (const auto empty = option_without_value(app)) {
+    return tl::unexpected(empty_value(*empty));
+  }
   if (auto understood = understand_common(draft.typed, invocation); !understood) {
     return tl::unexpected(std::move(understood.error()));
   }

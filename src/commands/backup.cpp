@@ -7,6 +7,7 @@
 #include "listing.hpp"
 #include "progress.hpp"
 #include "records.hpp"
+#include "shared_lines.hpp"
 #include "side_by_side.hpp"
 #include "snapshots.hpp"
 #include "spindle/commands/commands.hpp"
@@ -188,7 +189,7 @@ Result<Outcome> tell_quietly(const Result<Saved>& result) {
 }  // namespace
 
 Result<Outcome> backup(const BackupOptions& options, Context& context) {
-  const auto targets = resolve_targets(options.targets, context);
+  const auto targets = resolve_compatible_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
   const auto paths = check_paths(*targets, options, context);
   if (!paths) return tl::unexpected(paths.error());

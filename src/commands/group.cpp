@@ -2,13 +2,14 @@
 
 #include <fmt/ranges.h>
 
+#include "shared_lines.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::commands {
 
 Result<std::vector<Target>> resolve_one_or_group(const std::string& text, Reach reach,
                                                  const Context& context) {
-  auto targets = resolve_targets({text}, context);
+  auto targets = resolve_compatible_targets({text}, context);
   if (!targets) return targets;
   if (reach == Reach::everybody && targets->size() > 1) {
     return tl::unexpected(

@@ -6,6 +6,7 @@
 #include "listing.hpp"
 #include "progress.hpp"
 #include "records.hpp"
+#include "shared_lines.hpp"
 #include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
@@ -131,7 +132,7 @@ Result<Identified> identify_one(const Target& target, const Context& context) {
 }  // namespace
 
 Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
-  const auto targets = resolve_targets(options.targets, context);
+  const auto targets = resolve_compatible_targets(options.targets, context);
   if (!targets) return tl::unexpected(targets.error());
   ProgressLine progress(context);
   const auto results = side_by_side(

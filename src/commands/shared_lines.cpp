@@ -49,4 +49,18 @@ Result<void> check_same_settings(const std::vector<Target>& targets,
   return {};
 }
 
+Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::string>& texts,
+                                                       const Context& context) {
+  auto targets = resolve_targets(texts, context);
+  if (!targets) return targets;
+  const auto lines = by_line(*targets);
+  if (lines.size() == targets->size()) return targets;  // each has a line of its own
+  std::vector<catalogue::LinkFacts> facts;
+  for (const Target& target : *targets) {
+    const auto profile = load_profile(target, context);
+    facts.push_back(profile ? profile->link : catalogue::LinkFacts());  // told when it is used
+  }
+  return check_same_settings(*targets, facts).map([&] { return std::move(*targets); });
+}
+
 }  // namespace spindle::commands

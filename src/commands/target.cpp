@@ -296,13 +296,15 @@ link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& prof
 }
 
 Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
-                                      const Context& context,
-                                      SimulatedOperator simulated_operator) {
+                                      const Context& context, SimulatedOperator simulated_operator,
+                                      link::SessionOptions::Past past) {
   if (auto meant = check_reach(target, profile); !meant) {
     return tl::unexpected(std::move(meant.error()));
   }
+  device::LinkOptions options = link_options(target, profile, context);
+  options.past = past;
   auto device = device::Device::open(
-      with_port(target.endpoint, profile), profile, link_options(target, profile, context),
+      with_port(target.endpoint, profile), profile, options,
       with_simulated_tools(context, simulated_options(simulated_operator)), context.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {

@@ -51,11 +51,13 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
   if (known_ == nullptr) {
     if (auto found = find_profile(hurried); !found) return tl::unexpected(std::move(found.error()));
   }
-  auto device = connect_device(target_, known_->profile, hurried, SimulatedOperator::working);
+  auto device =
+      connect_device(target_, known_->profile, hurried, SimulatedOperator::working, past_);
   if (!device) return tl::unexpected(std::move(device.error()));
   if (auto registers = device->require_known_registers(); !registers) {
     return tl::unexpected(std::move(registers.error()));
   }
+  past_ = link::SessionOptions::Past::doubtful;  // it is opened again after trouble only
   std::string identity = device->identity_text();
   return device::Watcher::Link{std::move(*device), std::move(identity)};
 }

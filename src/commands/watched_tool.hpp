@@ -59,6 +59,7 @@ class WatchedTool {
   ProfileShelf* shelf_;
   const Context* context_;
   const KnownProfile* known_ = nullptr;
+  link::SessionOptions::Past past_ = link::SessionOptions::Past::clean;
 };
 
 /// Resolves targets, asking none of them. Those of one line have the same settings.

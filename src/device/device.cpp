@@ -133,6 +133,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
     session.echo =
         endpoint.medium == link::Medium::simulated ? link::LocalEcho::absent : endpoint.echo;
     session.in_use_until = now;
+    session.past = options.past;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;

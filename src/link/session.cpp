@@ -15,6 +15,10 @@ constexpr std::size_t max_queued = 4096;
 // A tool that answers at all has long done so; whoever pressed Ctrl-C hardly notices.
 constexpr Duration longest_settling = std::chrono::milliseconds(250);
 
+// Times the answer timeout, behind the quarantine: nobody knows how late an answer can be, but it
+// hardly is by more, and every proof takes time that a stop may be waiting for.
+constexpr Duration::rep longest_doubt = 2;
+
 constexpr std::uint16_t first_transaction = 0x8000;
 
 using modbus::FunctionCode;
@@ -71,7 +75,9 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       trace_(std::move(trace)),
       created_(clock.now()),
       last_activity_(options_.in_use_until),
-      echo_(options_.echo) {}
+      echo_(options_.echo) {
+  if (options_.past == SessionOptions::Past::doubtful) doubt_answers(created_);
+}
 
 Session::~Session() {
   if (trace_.bytes) trace_.bytes(Direction::received, {});
@@ -103,7 +109,32 @@ Result<modbus::Pdu> Session::ask(const modbus::Pdu& request) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
-  return exchange(request);
+  const bool provable = is_rtu() && options_.proof == SessionOptions::Proof::loopback;
+  const bool doubtful = clock_->now() < doubtful_until_ && !is_repeated_by_answer(request);
+  return provable && doubtful ? ask_with_proof(request) : exchange(request);
+}
+
+/// Units answer in order. So an answer is one to an earlier request when yet another one comes
+/// before that of a loop-back sent behind it.
+Result<modbus::Pdu> Session::ask_with_proof(const modbus::Pdu& request) {
+  auto answer = exchange(request);
+  if (!answer) return answer;
+  const std::uint64_t strays = counters_.strays;
+  const Duration round_trip = last_round_trip_;
+  auto proved = exchange(modbus::loopback_request(fresh_word()));
+  if (!proved) return tl::unexpected(std::move(proved.error()));
+  last_round_trip_ = round_trip;
+  if (counters_.strays == strays) return answer;
+  quarantined_until_ = clock_->now() + options_.answer_timeout;
+  doubt_answers(*quarantined_until_);
+  return tl::unexpected(Error{.code = Errc::no_answer,
+                              .message = "only the late answer to an earlier request came",
+                              .hint = "a longer --timeout waits for a slow unit",
+                              .tried = modbus::describe_request(request)});
+}
+
+void Session::doubt_answers(TimePoint since) {
+  doubtful_until_ = since + longest_doubt * options_.answer_timeout;
 }
 
 Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
@@ -137,6 +168,7 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   if (!is_rtu()) return answer;
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
+    doubt_answers(*quarantined_until_);
     buffer_.clear();
     const bool mistakable = !is_repeated_by_answer(outstanding.request.pdu);
     if (mistakable) abandoned_ = outstanding.request;

@@ -227,8 +227,12 @@ bool file_exists(const std::string& path) {
 }
 
 std::string user_name() {
-  const passwd* entry = ::getpwuid(::geteuid());
-  return entry == nullptr ? std::to_string(::geteuid()) : std::string(entry->pw_name);
+  passwd entry{};
+  passwd* found = nullptr;
+  std::array<char, 4096> text{};  // more than any name and folder need
+  const int failed = ::getpwuid_r(::geteuid(), &entry, text.data(), text.size(), &found);
+  return failed != 0 || found == nullptr ? std::to_string(::geteuid())
+                                         : std::string(found->pw_name);
 }
 
 }  // namespace

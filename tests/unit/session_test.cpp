@@ -122,6 +122,11 @@ SessionOptions rtu(SessionOptions::Proof proof = SessionOptions::Proof::none) {
 Reaction tcp_answer(Duration after, Pdu pdu) { return answer(Framing::tcp, after, std::move(pdu)); }
 Reaction rtu_answer(Duration after, Pdu pdu) { return answer(Framing::rtu, after, std::move(pdu)); }
 
+/// FC 08 repeats its request.
+std::vector<Arrival> repeat(ByteView request) {
+  return {{15ms, Bytes(request.begin(), request.end())}};
+}
+
 Bytes tcp_response(ByteView request, Pdu pdu) {
   return test::response_to(Framing::tcp, request, std::move(pdu));
 }
@@ -659,23 +664,57 @@ TEST_CASE("rtu: after a failure the line is silent for one more answer time and 
     CAPTURE(row.what);
     Line line(rtu(SessionOptions::Proof::loopback));
     line.script.on_request(row.reaction);
-    line.script.on_request([](ByteView request) {  // FC 08 repeats its request
-      return std::vector<Arrival>{{15ms, Bytes(request.begin(), request.end())}};
-    });
+    line.script.on_request(repeat);
     line.script.on_request(rtu_answer(15ms, two_values));
+    line.script.on_request(repeat);
     CHECK(line.session.transact(read_two).error().code == row.code);
     CHECK(line.elapsed() == timeout);
     CHECK(line.session.transact(read_two) == two_values);
-    REQUIRE(line.script.sent.size() == 3);
+    REQUIRE(line.script.sent.size() == 4);
     CHECK(line.sent_at(1) == 2 * timeout);
     CHECK(line.script.sent[1].bytes[1] == 0x08);
     CHECK(line.sent_at(2) == 2 * timeout + 15ms + gap);
+    CHECK(line.script.sent[3].bytes[1] == 0x08);
     CHECK(line.count(Decision::resync) == 2);
 
+    line.clock.advance(4 * timeout);
     line.script.on_request(rtu_answer(15ms, two_values));  // and then all is as before
     CHECK(line.session.transact(read_two) == two_values);
-    CHECK(line.script.sent.size() == 4);
+    CHECK(line.script.sent.size() == 5);
   }
+}
+
+TEST_CASE("rtu: an answer that comes later than the quarantine lasts is not the next one's") {
+  // Behind the end of the quarantine (2 s) and the loop-back that proves the line.
+  for (const Duration late : {2030ms, 2034ms, 2100ms, 3000ms, 3900ms}) {
+    CAPTURE(late.count());
+    Line line(rtu(SessionOptions::Proof::loopback));
+    line.script.on_request(say(late, rtu_frame(1, holding({1, 1}))));
+    line.script.otherwise = [](ByteView request) {
+      if (request[1] == 0x08) return repeat(request);
+      return std::vector<Arrival>{{15ms, rtu_frame(1, two_values)}};
+    };
+    CHECK(line.session.transact(read_two).error().code == Errc::no_answer);
+    for (int i = 0; i < 100; ++i) {
+      const auto answered = line.session.transact(read_two);
+      if (answered) CHECK(*answered == two_values);
+      if (!answered) CHECK(answered.error().code == Errc::no_answer);
+    }
+    CHECK(line.session.transact(read_two) == two_values);
+  }
+}
+
+TEST_CASE("rtu: a session behind one that had trouble believes only what is proved") {
+  SessionOptions options = rtu(SessionOptions::Proof::loopback);
+  options.past = SessionOptions::Past::doubtful;
+  Line line(options);
+  line.script.arrive(line.clock.now() + 10ms, rtu_frame(1, holding({1, 1})));
+  line.script.on_request(rtu_answer(15ms, two_values));
+  line.script.otherwise = repeat;
+  CHECK(line.session.transact(read_two).error().code == Errc::no_answer);
+  line.script.on_request(repeat);
+  line.script.on_request(rtu_answer(15ms, two_values));
+  CHECK(line.session.transact(read_two) == two_values);
 }
 
 TEST_CASE("rtu: bytes at the end of the quarantine prolong it until the line is silent") {
@@ -731,6 +770,7 @@ TEST_CASE("rtu: a device that refuses FC 08 has answered it all the same") {
   line.script.on_request(silence());
   line.script.on_request(rtu_answer(15ms, modbus::exception_response(0x08, 1)));
   line.script.on_request(rtu_answer(15ms, two_values));
+  line.script.on_request(rtu_answer(15ms, modbus::exception_response(0x08, 1)));
   CHECK_FALSE(line.session.transact(read_two));
   CHECK(line.session.transact(read_two) == two_values);
 }

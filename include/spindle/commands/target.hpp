@@ -63,10 +63,12 @@ Result<catalogue::Profile> load_profile(const Target& target, const Context& con
 /// Whether somebody works with a tool of sim:, so that there is something to watch.
 enum class SimulatedOperator : std::uint8_t { absent, working };
 
-/// Connects with a profile that outlives the device, and asks nothing.
+/// Connects with a profile that outlives the device, and asks nothing. `past` says whether an
+/// earlier connection to this tool had trouble.
 Result<device::Device> connect_device(
     const Target& target, const catalogue::Profile& profile, const Context& context,
-    SimulatedOperator simulated_operator = SimulatedOperator::absent);
+    SimulatedOperator simulated_operator = SimulatedOperator::absent,
+    link::SessionOptions::Past past = link::SessionOptions::Past::clean);
 
 /// The same with a profile to keep.
 Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context);

@@ -29,6 +29,7 @@ struct LinkOptions {
   std::optional<unsigned> retries = std::nullopt;  ///< of reads
   link::Trace trace = {};
   std::string shown = {};  ///< how errors name the tool; empty: by its endpoint's text
+  link::SessionOptions::Past past = link::SessionOptions::Past::clean;
 };
 
 /// One parameter as read. `registers` and `value` hold the same error when it could not be.

@@ -33,6 +33,8 @@ struct SessionOptions {
   LocalEcho echo = LocalEcho::automatic;
   /// RTU: until when others may have used the line; the first gap counts from then.
   TimePoint in_use_until = {};
+  /// RTU: whether a late answer may come that an earlier session on this line did not wait for.
+  enum class Past : std::uint8_t { clean, doubtful } past = Past::clean;
 };
 
 /// A frame that nobody asked for, with the time when its last byte arrived.
@@ -112,6 +114,8 @@ class Session {
   class Turn;
 
   Result<modbus::Pdu> ask(const modbus::Pdu& request);
+  Result<modbus::Pdu> ask_with_proof(const modbus::Pdu& request);
+  void doubt_answers(TimePoint since);
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
   Result<modbus::Pdu> send_and_await(Outstanding& outstanding);
   Result<void> send(const modbus::Adu& adu, ByteView bytes);
@@ -149,6 +153,8 @@ class Session {
   TimePoint last_activity_;
   /// RTU: when no answer to an abandoned request can come any more.
   std::optional<TimePoint> quarantined_until_ = std::nullopt;
+  /// RTU: until when answers are only believed when a loop-back behind them is answered next.
+  TimePoint doubtful_until_ = {};
   /// RTU: the last request whose answer may still come and be mistaken.
   std::optional<modbus::Adu> abandoned_ = std::nullopt;
   LocalEcho echo_;  ///< as far as it is known
