@@ -47,6 +47,7 @@ Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
   }
   device::MotorStopper stopper(*motor, mode);
   tool.device.set_retries(0);  // it is better to send the stop soon, and again
+  tool.device.session().waive_proofs();
   stopper.observe(tool.device);
   auto stopped = stopper.stop(tool.device, context.clock);
   for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {

@@ -88,6 +88,7 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt, TimePoint limit) {
   }
   link::Session& session = device_->session();
   session.shield();
+  session.waive_proofs();
   session.set_answer_timeout(patience_of(attempt));
   device_->set_retries(0);  // it is better to send the stop again
   return motion_.stop(*device_, *calm_);

@@ -109,7 +109,8 @@ Result<modbus::Pdu> Session::ask(const modbus::Pdu& request) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
-  const bool provable = is_rtu() && options_.proof == SessionOptions::Proof::loopback;
+  const bool provable =
+      is_rtu() && options_.proof == SessionOptions::Proof::loopback && proves_ == Proves::in_doubt;
   const bool doubtful = clock_->now() < doubtful_until_ && !is_repeated_by_answer(request);
   return provable && doubtful ? ask_with_proof(request) : exchange(request);
 }

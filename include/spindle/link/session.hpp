@@ -96,6 +96,10 @@ class Session {
   /// After this, interrupts no longer end waits on this connection.
   void shield() { transport_->shield(); }
 
+  /// RTU: from now on answers are believed without a proof behind them, also after trouble: a stop
+  /// and its confirmation must not wait for more answers than they need.
+  void waive_proofs() { proves_ = Proves::never; }
+
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
   /// Whom the requests from now on are for.
   void set_unit(modbus::UnitId unit) { options_.unit = unit; }
@@ -155,6 +159,7 @@ class Session {
   std::optional<TimePoint> quarantined_until_ = std::nullopt;
   /// RTU: until when answers are only believed when a loop-back behind them is answered next.
   TimePoint doubtful_until_ = {};
+  enum class Proves : std::uint8_t { in_doubt, never } proves_ = Proves::in_doubt;
   /// RTU: the last request whose answer may still come and be mistaken.
   std::optional<modbus::Adu> abandoned_ = std::nullopt;
   LocalEcho echo_;  ///< as far as it is known
