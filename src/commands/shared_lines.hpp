@@ -31,8 +31,8 @@ class SharedLines {
 Result<void> check_same_settings(const std::vector<Target>& targets,
                                  const std::vector<catalogue::LinkFacts>& facts);
 
-/// resolve_targets() for commands that go on with all of them: refuses tools of one line that do not
-/// mean the same settings, as a frame at a wrong rate can stop a motor that runs there.
+/// resolve_targets() for commands that go on with all of them: refuses tools of one line that do
+/// not mean the same settings, as a frame at a wrong rate can stop a motor that runs there.
 Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::string>& texts,
                                                        const Context& context);
 
