@@ -32,6 +32,29 @@ Result<device::StopResult> stop_one(const Target& target, const RemoteStopOption
   return stopped;
 }
 
+/// The answer is of no interest here, so hardly waited for.
+constexpr int haste = 5;
+
+/// On a line that several share each waits for those before it, and one that is not there costs
+/// timeouts. So all motors are told to stop before any is asked whether it stands still.
+void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::size_t>& line,
+                  const RemoteStopOptions& options, const Context& context) {
+  for (const std::size_t index : line) {
+    const auto profile = load_profile(targets[index], context);
+    if (!profile) continue;  // told when its turn comes, as all that fails here
+    const auto motor = device::Motor::of(*profile);
+    if (!motor) continue;
+    Context hurried = context;
+    hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / haste;
+    auto device = connect_device(targets[index], *profile, hurried);
+    if (!device) continue;
+    const catalogue::RunFacts& facts = motor->facts();
+    const bool instant = options.stop == catalogue::StopMode::instant;
+    static_cast<void>(
+        motor->command(*device, instant ? facts.instant_always : facts.decelerate_always));
+  }
+}
+
 }  // namespace
 
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
@@ -39,7 +62,12 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   if (!targets) return tl::unexpected(targets.error());
   for (Target& target : *targets) target.reach = options.reach;
   // A stop waits for no other one.
+  const auto lines = by_line(*targets);
   const auto results = side_by_side(*targets, targets->size(), [&](const Target& target) {
+    for (const auto& line : lines) {
+      const bool begins = line.size() > 1 && &target == &(*targets)[line.front()];
+      if (begins) tell_to_stop(*targets, line, options, context);
+    }
     return stop_one(target, options, context);
   });
   Outcome outcome;

@@ -400,6 +400,15 @@ class StopTest(MotorTest):
                         self.values(bus.unit(u), "status.driver-output")), "the motor stands still")
                     self.assert_stands_still(bus.unit(unit))
 
+    def test_a_stop_of_several_waits_for_no_unit_that_is_not_there(self):
+        with Bus(units="1") as bus:
+            stopped = run("remote-stop", bus.unit(8), bus.unit(9), bus.unit(1), "--json")
+            self.assertEqual(stopped.status, 9, stopped)
+            self.assertEqual([r["target"] for r in stopped.records("action")], [bus.unit(1)], stopped)
+            told = [tuple(request[:2]) for request in bus.requests()]
+            self.assertEqual(told[:3], [(8, 6), (9, 6), (1, 6)], told)
+            self.assertFalse(bus.commands()[0] & START_BITS, bus.commands())
+
     def test_what_is_set_for_everybody(self):
         with Bus() as bus:
             sent = run("set", bus.unit(0), "operation.5.speed=900", "--broadcast", "--yes", "--json")
