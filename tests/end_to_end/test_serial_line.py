@@ -1,6 +1,7 @@
 """A serial line: the real binary and a bus of units on a pseudo terminal that is as strict about silence
 as a motor driver."""
 
+import contextlib
 import os
 import pathlib
 import re
@@ -62,6 +63,12 @@ class Bus:
         """Once it has ended: (nanoseconds, '>' or '<', bytes) in order."""
         found = re.findall(r"^(\d+) ([<>]) (.*)$", self._log.read_text(), re.MULTILINE)
         return [(int(at), way, bytes.fromhex(text)) for at, way, text in found]
+
+    def is_open_in(self, pid):
+        line = os.path.realpath(self.path)
+        with contextlib.suppress(OSError):  # files are opened and closed meanwhile
+            return any(os.readlink(entry) == line for entry in pathlib.Path(f"/proc/{pid}/fd").iterdir())
+        return False
 
     def bad_frames(self):
         return int(re.search(r"^bad (\d+)$", self._log.read_text(), re.MULTILINE)[1])
@@ -165,10 +172,12 @@ class PortTest(unittest.TestCase):
 
     def test_an_adapter_that_vanishes_while_an_answer_is_waited_for(self):
         with Bus("--fault", "lost") as bus:
-            timer = threading.Timer(0.3, bus.kill)
-            timer.start()
-            finished = run("get", f"{bus.url}?unit=1", "@holding:7", "--timeout", "10s")
-            timer.join()
+            arguments = ("get", f"{bus.url}?unit=1", "@holding:7", "--profile", str(DRIVE), "--json", "--timeout", "10s")
+            with support.Running(*arguments) as waiting:
+                support.wait_until(lambda: bus.is_open_in(waiting.pid), "the port is open")
+                time.sleep(0.3)
+                bus.kill()
+                finished = waiting.finish()
             self.assertEqual(finished.status, 5, finished)
             self.assertIn("the serial port is gone", finished.stderr)
             self.assertLess(finished.seconds, 5)
@@ -177,6 +186,7 @@ class PortTest(unittest.TestCase):
         with Bus("--fault", "lost") as bus:
             with support.Running("get", f"{bus.url}?unit=1", "@holding:7", "--profile", str(DRIVE), "--timeout",
                                  "20s") as waiting:
+                support.wait_until(lambda: bus.is_open_in(waiting.pid), "the port is open")
                 time.sleep(0.3)
                 began = time.monotonic()
                 waiting.process.send_signal(signal.SIGINT)
