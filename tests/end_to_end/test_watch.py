@@ -16,6 +16,7 @@ import unittest
 
 import support
 from event_server import ARM_REGISTER, NUMBERS, Chance, EventServer
+from hostile_server import EVENT_FIRST
 
 LONG = os.environ.get("SPINDLE_LONG") == "1"
 EVENTS, RATE = (10000, 200) if LONG else (2000, 1000)
@@ -156,7 +157,10 @@ class CompletenessTest(unittest.TestCase):
         with EventServer() as server:
             arguments = (server.url, *JSON, "--no-push", "--interval", "20ms", "--count", 3)
             with Watching(*arguments) as watching:
-                support.wait_until(lambda: server.asked(support.READ_INPUT, 3213), "it is connected")
+                # The counter, the last event and the counter behind it, and then the first poll.
+                support.wait_until(
+                    lambda: len(server.asked(support.READ_INPUT, EVENT_FIRST)) > 3, "what was there is read"
+                )
                 for count in range(1, 4):
                     server.event()
                     support.wait_until(lambda: len(watching.numbers()) == count, "it is polled")
