@@ -4,15 +4,18 @@
 
 namespace spindle::commands {
 
+bool can_ask(const Context& context) {
+  return context.common.consent == Consent::ask && context.io.in_is_terminal &&
+         context.io.err_is_terminal;
+}
+
 namespace {
 
 /// What the user typed; empty: --yes answers.
 Result<std::optional<std::string>> ask(std::string_view what, std::string_view question,
                                        const Context& context) {
   if (context.common.consent == Consent::given) return std::nullopt;
-  const bool can_ask = context.common.consent == Consent::ask && context.io.in_is_terminal &&
-                       context.io.err_is_terminal;
-  if (!can_ask) {
+  if (!can_ask(context)) {
     return tl::unexpected(Error{.code = Errc::not_confirmed,
                                 .message = fmt::format("{}: this has to be confirmed", what),
                                 .hint = "add --yes when you are sure"});

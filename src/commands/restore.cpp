@@ -153,9 +153,7 @@ Result<void> ask(const RestoreTask& task, const RestoreOptions& options, const T
   const bool stores = options.storing == Storing::yes;
   if (task.plan.writes.empty() && !stores) return {};
   context.renderer.note(fmt::format("{}: {}", target.shown, counts_of(task)));
-  const bool is_asked = context.common.consent == Consent::ask && context.io.in_is_terminal &&
-                        context.io.err_is_terminal;
-  if (is_asked) {
+  if (can_ask(context)) {
     if (auto shown = show_plan(task, target, context); !shown) return shown;
   }
   return ask_consent(fmt::format("write {} to {}{}", counted(task.plan.writes.size(), "parameter"),

@@ -117,9 +117,7 @@ Result<void> ask(const Ready& ready, const SetOptions& options, std::size_t of, 
   std::vector<std::string> names;
   for (const Target& target : touched(ready, options.storing)) names.push_back(target.shown);
   if (names.empty()) return {};
-  const bool is_asked = context.common.consent == Consent::ask && context.io.in_is_terminal &&
-                        context.io.err_is_terminal;
-  if (is_asked) {
+  if (can_ask(context)) {
     if (auto shown = show_plan(ready, context); !shown) return shown;
   }
   return ask_consent(fmt::format("write {} to {}{}", counted(counts_of(ready).changed, "value"),

@@ -55,10 +55,15 @@ Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::st
   if (!targets) return targets;
   const auto lines = by_line(*targets);
   if (lines.size() == targets->size()) return targets;  // each has a line of its own
+  std::map<std::string, catalogue::LinkFacts> known;    // each profile is read once
   std::vector<catalogue::LinkFacts> facts;
   for (const Target& target : *targets) {
-    const auto profile = load_profile(target, context);
-    facts.push_back(profile ? profile->link : catalogue::LinkFacts());  // told when it is used
+    const auto [entry, is_new] = known.try_emplace(target.profile);
+    if (is_new) {
+      const auto profile = load_profile(target, context);
+      if (profile) entry->second = profile->link;  // else told when it is used
+    }
+    facts.push_back(entry->second);
   }
   return check_same_settings(*targets, facts).map([&] { return std::move(*targets); });
 }

@@ -6,6 +6,8 @@
 #include <array>
 #include <utility>
 
+#include "spindle/base/text.hpp"
+
 namespace spindle::link {
 namespace {
 
@@ -401,7 +403,7 @@ Result<void> Session::wait_for_silence(TimePoint not_before) {
 void Session::note_noise(std::size_t bytes) {
   if (bytes == 0) return;
   counters_.noise_bytes += bytes;
-  decide(Decision::junk, fmt::format("{} byte{} skipped", bytes, bytes == 1 ? "" : "s"));
+  decide(Decision::junk, counted(bytes, "byte") + " skipped");
 }
 
 /// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
@@ -473,17 +475,20 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
 }
 
 /// A serial line has no ids.
-std::string Session::describe_frame(const modbus::Adu& adu) const {
+std::string Session::describe_address(const modbus::Adu& adu) const {
   const std::string id = is_rtu() ? "" : fmt::format("id {:04X}, ", adu.transaction.value);
-  return fmt::format("{}unit {}, function {:02X}, data {}", id, adu.unit.value, adu.pdu.function,
+  return fmt::format("{}unit {}", id, adu.unit.value);
+}
+
+std::string Session::describe_frame(const modbus::Adu& adu) const {
+  return fmt::format("{}, function {:02X}, data {}", describe_address(adu), adu.pdu.function,
                      to_hex(adu.pdu.data));
 }
 
 void Session::decide(Decision decision, const modbus::Adu& adu) const {
   if (!trace_.decision) return;
   const bool is_ours = decision == Decision::request || decision == Decision::echo;
-  const std::string id = is_rtu() ? "" : fmt::format("id {:04X}, ", adu.transaction.value);
-  decide(decision, fmt::format("{}unit {}: {}", id, adu.unit.value,
+  decide(decision, fmt::format("{}: {}", describe_address(adu),
                                is_ours ? modbus::explain_request(adu.pdu)
                                        : modbus::explain_response(adu.pdu)));
 }

@@ -142,6 +142,7 @@ class Session {
   void note_noise(std::size_t bytes);
   void decide(Decision decision, const modbus::Adu& adu) const;
   void decide(Decision decision, std::string_view text) const;
+  [[nodiscard]] std::string describe_address(const modbus::Adu& adu) const;
   [[nodiscard]] std::string describe_frame(const modbus::Adu& adu) const;
 
   std::unique_ptr<Transport> transport_;
