@@ -49,6 +49,7 @@ struct Words {
   std::string_view examples;  ///< one a line
   /// What stands behind the command's options, with its own heading; may be absent.
   std::string (*appendix)() = nullptr;
+  Invocation::ToolsFile tools_file = Invocation::ToolsFile::loaded;
 };
 
 /// How much of the grammar is built: all of it to be described, or the options of the command that
@@ -61,7 +62,8 @@ struct Draft {
   Typed typed;
   std::map<const CLI::App*, Words> words;
   const CLI::App* chosen = nullptr;
-  Invocation::ToolsFile tools_use = Invocation::ToolsFile::loaded;
+  /// Instead of what the command's words say.
+  std::optional<Invocation::ToolsFile> tools_file = std::nullopt;
   std::string only_as_text;  ///< why neither JSON nor CSV can be had; empty: they can
   Run run;
 };
@@ -720,11 +722,15 @@ void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
 }
 
 void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
-  constexpr Words words = {"remote-stop", "TARGET...", "stop now; never asks",
+  constexpr Words words = {"remote-stop",
+                           "TARGET...",
+                           "stop now; never asks",
                            "spindle remote-stop station3\n"
                            "spindle remote-stop @line1\n"
                            "spindle remote-stop 'rtu:///dev/ttyUSB0?unit=0' --profile "
-                           "orientalmotor-blv --broadcast"};
+                           "orientalmotor-blv --broadcast",
+                           nullptr,
+                           Invocation::ToolsFile::salvaged};
   const auto run = [](TypedRemoteStop stop, Context& context) {
     if (stop.options.targets.empty()) {
       return Result<Outcome>(tl::unexpected(missing("remote-stop", "TARGET")));
@@ -958,7 +964,7 @@ void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
         "--check",
         [&] {
           typed.tools.check = true;
-          draft.tools_use = Invocation::ToolsFile::only_found;
+          draft.tools_file = Invocation::ToolsFile::only_found;
         },
         "every fault of the file, with its place");
   });
@@ -1184,7 +1190,7 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
-  invocation.tools_use = draft.tools_use;
+  invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
   invocation.run = std::move(draft.run);
   return invocation;
 }

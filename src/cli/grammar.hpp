@@ -24,8 +24,10 @@ struct Invocation {
   report::Talk talk = report::Talk::normal;
   ColorChoice color = ColorChoice::automatic;
   std::string tools_file = {};  ///< --tools; empty: look for one
-  /// Whether the command wants the tools file whole, or is about its faults.
-  enum class ToolsFile : std::uint8_t { loaded, only_found } tools_use = ToolsFile::loaded;
+  /// Whether the command wants the tools file without a fault, makes do with what can be read of
+  /// it, or is about its faults.
+  enum class ToolsFile : std::uint8_t { loaded, salvaged, only_found };
+  ToolsFile tools_use = ToolsFile::loaded;
   commands::CommonOptions common = {};
   std::function<Result<commands::Outcome>(commands::Context&)> run = {};
 };

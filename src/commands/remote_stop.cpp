@@ -58,22 +58,24 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
 }  // namespace
 
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
-  auto targets = resolve_targets(options.targets, context);
-  if (!targets) return tl::unexpected(targets.error());
-  for (Target& target : *targets) target.reach = options.reach;
+  // Nobody's wrong name keeps another tool running.
+  Resolution resolution = resolve_each_target(options.targets, context);
+  std::vector<Target>& targets = resolution.targets;
+  if (targets.empty()) return tl::unexpected(std::move(resolution.faults.front()));
+  for (Target& target : targets) target.reach = options.reach;
   // A stop waits for no other one.
-  const auto lines = by_line(*targets);
-  const auto results = side_by_side(*targets, targets->size(), [&](const Target& target) {
+  const auto lines = by_line(targets);
+  const auto results = side_by_side(targets, targets.size(), [&](const Target& target) {
     for (const auto& line : lines) {
-      const bool begins = line.size() > 1 && &target == &(*targets)[line.front()];
-      if (begins) tell_to_stop(*targets, line, options, context);
+      const bool begins = line.size() > 1 && &target == &targets[line.front()];
+      if (begins) tell_to_stop(targets, line, options, context);
     }
     return stop_one(target, options, context);
   });
   Outcome outcome;
   Listing listing(context, stop_columns());
   for (std::size_t index = 0; index < results.size(); ++index) {
-    const Target& target = (*targets)[index];
+    const Target& target = targets[index];
     const Result<device::StopResult>& result = results[index];
     if (result) listing.add(stop_record(*result, target, context.clock));
     std::optional<Error> error;
@@ -85,6 +87,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
     } else {
       outcome.succeed();
     }
+  }
+  for (const Error& fault : resolution.faults) {
+    outcome.fail(fault);
+    listing.add(fault);
   }
   const bool everybody = options.reach == Reach::everybody;
   return finish(listing, outcome,

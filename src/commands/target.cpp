@@ -224,8 +224,7 @@ bool is_target(std::string_view text, const Context& context) {
   return text.starts_with('@') && context.tools.groups.contains(std::string(text.substr(1)));
 }
 
-Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
-                                            const Context& context) {
+Resolution resolve_each_target(const std::vector<std::string>& texts, const Context& context) {
   std::vector<std::string> names;
   for (const std::string& text : texts) {
     const auto group = text.starts_with('@') ? context.tools.groups.find(text.substr(1))
@@ -236,13 +235,23 @@ Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& text
       names.insert(names.end(), group->second.begin(), group->second.end());
     }
   }
-  std::vector<Target> targets;
+  Resolution resolution;
   for (const std::string& name : names) {
     auto target = single_target(name, context);
-    if (!target) return tl::unexpected(std::move(target.error()));
-    targets.push_back(std::move(*target));
+    if (target) {
+      resolution.targets.push_back(std::move(*target));
+    } else {
+      resolution.faults.push_back(std::move(target.error()));
+    }
   }
-  return targets;
+  return resolution;
+}
+
+Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
+                                            const Context& context) {
+  Resolution resolution = resolve_each_target(texts, context);
+  if (!resolution.faults.empty()) return tl::unexpected(std::move(resolution.faults.front()));
+  return std::move(resolution.targets);
 }
 
 Result<Target> resolve_target(const std::string& text, const Context& context,

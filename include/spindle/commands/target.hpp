@@ -36,6 +36,15 @@ struct OpenTool {
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Context& context);
 
+/// The targets that are known, and the errors of resolve_targets() for those that are not.
+struct Resolution {
+  std::vector<Target> targets = {};
+  std::vector<Error> faults = {};
+};
+
+/// For a command that must not leave out a tool because the name of another is wrong.
+Resolution resolve_each_target(const std::vector<std::string>& texts, const Context& context);
+
 /// Why a command does not take a group, and what helps instead, before the name of the first tool.
 struct OneTool {
   std::string_view why = "this command takes one";
