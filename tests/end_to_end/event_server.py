@@ -46,6 +46,7 @@ class EventServer(support.Port):
         self._held = b""
         self._recent = []
         self._client = None
+        self._met_at = 0  # place of the first request of this client
         self._lock = threading.RLock()
         self._store(0)
 
@@ -87,10 +88,26 @@ class EventServer(support.Port):
                 self._client = None
                 self.cuts += 1
 
+    def miss(self, count=1):
+        """Events that happen while nobody is connected."""
+        with self._lock:
+            self.cut()
+            for _ in range(count):
+                self.event()
+
     @property
     def armed(self):
         with self._lock:
             return self._client is not None and time.monotonic() < self._armed_until
+
+    @property
+    def caught_up(self):
+        """Armed, and what was there before is read, to the counter behind it: what comes now is pushed."""
+        with self._lock:
+            asked = [request for _, request in self.requests[self._met_at:]]
+            arming = [request.words == (ARM_REGISTER, 1) for request in asked]
+            counting = [request.words == (hostile_server.EVENT_FIRST, 1) for request in asked]
+            return self.armed and any(counting[arming.index(True):])
 
     # --- what was asked ---
 
@@ -156,6 +173,7 @@ class EventServer(support.Port):
             self._client = client
             self._armed_until = 0.0
             self._held = b""
+            self._met_at = len(self.requests)
         super()._meet(client)
 
     def _serve(self, client):

@@ -26,6 +26,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEADLINE = 20.0  # for what must happen at all; never waited out when things go well
+SOON = 6.0  # for what takes milliseconds where a wrong way takes ten seconds and more: a busy machine has time
 POLL = 0.001
 
 READ_HOLDING, READ_INPUT, WRITE_SINGLE, REPORT_SERVER_ID = 0x03, 0x04, 0x06, 0x11

@@ -8,8 +8,7 @@ import unittest
 import hostile_server
 import support
 
-# The contract says 100 ms. The rest is allowed for a machine that has more to do than this.
-PROMPT = 0.25
+PROMPT = 0.1  # the contract's
 SIGNALS = ((signal.SIGINT, 130), (signal.SIGTERM, 143))
 SILENT = {"on": ["identity", "read", "write", "read-back"], "reply": []}
 TORQUE = "preset.1.target-torque"
@@ -20,20 +19,27 @@ def tearDownModule():
 
 
 class SignalTest(unittest.TestCase):
-    slowest = 0.0
+    ends = []  # seconds that each took
 
     @classmethod
     def tearDownClass(cls):
-        print(f"slowest end after a signal: {1000 * cls.slowest:.1f} ms")
+        """What else the machine does delays one end or another; a wait that is not prompt delays all of its kind."""
+        in_order = sorted(cls.ends)
+        median, slowest = in_order[len(in_order) // 2], in_order[-1]
+        print(f"end after a signal: median {1000 * median:.1f} ms, slowest {1000 * slowest:.1f} ms")
+        assert median < PROMPT, in_order
+
+    def assert_ended(self, finished, status):
+        self.assertEqual(finished.status, status, finished)
+        self.assertLess(finished.seconds, support.SOON, finished)
+        self.ends.append(finished.seconds)
 
     def interrupt(self, number, status, waits_until, *arguments):
         with support.Running(*arguments, "--json") as running:
             support.wait_until(lambda: waits_until(running), f"{arguments[0]} waits")
             running.send_signal(number)
             finished = running.finish()
-        self.assertEqual(finished.status, status, finished)
-        self.assertLess(finished.seconds, PROMPT, finished)
-        type(self).slowest = max(self.slowest, finished.seconds)
+        self.assert_ended(finished, status)
         return finished
 
     def test_while_connecting(self):
@@ -88,8 +94,7 @@ class SignalTest(unittest.TestCase):
                     self.assertIn('"type":"ping"', running.line())
                     running.send_signal(number)
                     finished = running.finish()
-                self.assertEqual(finished.status, status, finished)
-                self.assertLess(finished.seconds, PROMPT, finished)
+                self.assert_ended(finished, status)
                 summary = finished.records("summary")
                 self.assertEqual([(s["received"], s["exit_status"]) for s in summary], [(1, status)])
 
@@ -110,8 +115,7 @@ class SignalTest(unittest.TestCase):
                     self.assertRegex(running.line(), r"^tcp://127\.0\.0\.1:\d+$")
                     running.send_signal(number)
                     finished = running.finish()
-                self.assertEqual(finished.status, status, finished)
-                self.assertLess(finished.seconds, PROMPT, finished)
+                self.assert_ended(finished, status)
                 self.assertEqual(finished.stdout, "", finished)
                 self.assertRegex(finished.stderr, r"^0 connections, 0 requests\n", finished)
 

