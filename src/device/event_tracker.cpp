@@ -37,7 +37,6 @@ Tracked EventTracker::track(std::uint16_t number, RegisterView block) {
   });
   if (known) return {Novelty::repeat};
   const Tracked tracked = judge(number, block);
-  if (tracked.novelty == Novelty::repeat) return tracked;
   last_ = number;
   recent_.emplace_back(block.begin(), block.end());
   if (recent_.size() > remembered) recent_.pop_front();

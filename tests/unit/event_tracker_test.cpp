@@ -94,6 +94,15 @@ TEST_CASE("a late repeat of an older event is no restart") {
   }
 }
 
+TEST_CASE("a late repeat of the event before the first is no restart") {
+  EventTracker tracker;
+  tracker.set_baseline(1961);
+  CHECK(track(tracker, 1961).novelty == Novelty::repeat);  // read behind its number
+  CHECK(track(tracker, 1962).novelty == Novelty::next);
+  CHECK(track(tracker, 1961).novelty == Novelty::repeat);
+  CHECK(track(tracker, 1963).novelty == Novelty::next);
+}
+
 TEST_CASE("the number decides: the last one with other registers is still a repeat") {
   EventTracker tracker;
   tracker.set_baseline(1962);
