@@ -16,7 +16,8 @@ struct KindInfo {
 
 template <typename T>
 constexpr KindInfo kind_info(Kind kind, std::string_view text) {
-  return {kind, text, sizeof(T) / sizeof(std::uint16_t), std::numeric_limits<T>::min(),
+  constexpr std::size_t register_bytes = 2;
+  return {kind, text, sizeof(T) / register_bytes, std::numeric_limits<T>::min(),
           std::numeric_limits<T>::max()};
 }
 

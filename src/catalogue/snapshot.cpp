@@ -136,6 +136,14 @@ std::string unit_of(const SnapshotEntry* a, const SnapshotEntry* b) {
   return b == nullptr ? std::string() : b->unit;
 }
 
+/// One of both is there.
+Difference difference_between(const SnapshotEntry* a, const SnapshotEntry* b) {
+  Difference difference{.parameter = (a != nullptr ? a : b)->parameter, .unit = unit_of(a, b)};
+  if (a != nullptr) difference.a = a->value;
+  if (b != nullptr) difference.b = b->value;
+  return difference;
+}
+
 /// Whether a side says nothing about a parameter, rather than that it does not exist.
 bool says_nothing(const Snapshot& side, const std::string& name, Lacking lacking) {
   if (lacking == Lacking::is_not_compared) return true;
@@ -259,17 +267,13 @@ Comparison compare(const Snapshot& a, const Snapshot& b, const Selection& select
       ++comparison.same;
       continue;
     }
-    Difference difference{.parameter = entry.parameter, .a = entry.value};
-    if (other != nullptr) difference.b = other->value;
-    difference.unit = unit_of(&entry, other);
-    comparison.differences.push_back(std::move(difference));
+    comparison.differences.push_back(difference_between(&entry, other));
   }
   for (const SnapshotEntry& entry : b.entries) {
     const std::string& name = entry.parameter.name;
     if (!selection.contains(entry.parameter) || a.find(name) != nullptr) continue;
     if (says_nothing(a, name, lacking)) continue;
-    comparison.differences.push_back(
-        {.parameter = entry.parameter, .b = entry.value, .unit = entry.unit});
+    comparison.differences.push_back(difference_between(nullptr, &entry));
   }
   return comparison;
 }

@@ -66,7 +66,8 @@ std::string list_labels(const Parameter& parameter) {
 }
 
 std::string with_suggestion(std::string hint, const std::string& suggested) {
-  return suggested.empty() ? hint : hint + "; " + suggested;
+  if (!suggested.empty()) hint += "; " + suggested;
+  return hint;
 }
 
 Error not_a_label(const Parameter& parameter, std::string_view text) {

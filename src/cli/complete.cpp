@@ -30,17 +30,23 @@ struct Slot {
   bool repeats = false;
 };
 
+/// Where the first word ends: at a blank outside of brackets.
+std::size_t word_end(std::string_view synopsis) {
+  std::size_t depth = 0;
+  for (std::size_t at = 0; at < synopsis.size(); ++at) {
+    if (synopsis[at] == '[') ++depth;
+    if (synopsis[at] == ']') --depth;
+    if (synopsis[at] == ' ' && depth == 0) return at;
+  }
+  return synopsis.size();
+}
+
 /// "TARGET... [NAME|PATTERN...] [--count N]" has two; bracketed options are none.
 std::vector<Slot> slots_of(std::string_view synopsis) {
   std::vector<Slot> slots;
   while (!synopsis.empty()) {
     const bool is_optional = synopsis.front() == '[';
-    std::size_t depth = 0;
-    std::size_t end = 0;
-    for (; end < synopsis.size() && (depth > 0 || synopsis[end] != ' '); ++end) {
-      if (synopsis[end] == '[') ++depth;
-      if (synopsis[end] == ']') --depth;
-    }
+    const std::size_t end = word_end(synopsis);
     std::string_view word = synopsis.substr(0, end);
     synopsis.remove_prefix(std::min(end + 1, synopsis.size()));
     if (is_optional) word = word.substr(1, word.size() - 2);
@@ -51,28 +57,36 @@ std::vector<Slot> slots_of(std::string_view synopsis) {
   return slots;
 }
 
+/// Places of slots; one behind the last is the end.
+using Places = std::set<std::size_t>;
+
+/// With those that are reached by leaving out what is optional.
+Places past_optional(const std::vector<Slot>& slots, Places places) {
+  for (std::size_t at = 0; at < slots.size(); ++at) {
+    if (places.contains(at) && slots[at].is_optional) places.insert(at + 1);
+  }
+  return places;
+}
+
+/// Where the next argument may stand when one stands in any of these.
+Places behind(const std::vector<Slot>& slots, const Places& places) {
+  Places next;
+  for (const std::size_t at : places) {
+    if (at == slots.size()) continue;
+    if (slots[at].repeats) next.insert(at);
+    next.insert(at + 1);
+  }
+  return past_optional(slots, std::move(next));
+}
+
 /// Slots in which the argument behind `given` others may stand.
 std::vector<Slot> possible_slots(const std::vector<Slot>& slots, std::size_t given) {
-  std::set<std::size_t> places = {0};
-  const auto pass_optional = [&] {
-    for (std::size_t at = 0; at < slots.size(); ++at) {
-      if (places.contains(at) && slots[at].is_optional) places.insert(at + 1);
-    }
-  };
-  pass_optional();
-  for (std::size_t argument = 0; argument < given; ++argument) {
-    std::set<std::size_t> next;
-    for (const std::size_t at : places) {
-      if (at < slots.size() && slots[at].repeats) next.insert(at);
-      if (at < slots.size()) next.insert(at + 1);
-    }
-    places = std::move(next);
-    pass_optional();
-  }
+  Places places = past_optional(slots, {0});
+  for (std::size_t argument = 0; argument < given; ++argument) places = behind(slots, places);
+  places.erase(slots.size());
   std::vector<Slot> possible;
-  for (const std::size_t at : places) {
-    if (at < slots.size()) possible.push_back(slots[at]);
-  }
+  possible.reserve(places.size());
+  for (const std::size_t at : places) possible.push_back(slots[at]);
   return possible;
 }
 
@@ -208,16 +222,22 @@ class Completer {
     }
     if (is_side) add("defaults", "what the profile says");
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
-    if (slot.name == "PROFILE") {
-      for (const Candidate& profile : profiles()) add(profile.text, profile.meaning);
-      if (typed_.command->name.starts_with("profile")) found_.paths = Paths::files;
+    if (slot.name == "PROFILE") offer_profiles();
+    if (slot.name == "PATTERN" || slot.name.starts_with("NAME") ||
+        slot.name.starts_with("ACTION")) {
+      offer_of_profile(slot, word);
     }
-    const bool is_name = slot.name == "PATTERN" || slot.name.starts_with("NAME");
-    const bool is_action = slot.name.starts_with("ACTION");
-    if (!is_name && !is_action) return;
+  }
+
+  void offer_profiles() {
+    for (const Candidate& profile : profiles()) add(profile.text, profile.meaning);
+    if (typed_.command->name.starts_with("profile")) found_.paths = Paths::files;
+  }
+
+  void offer_of_profile(const Slot& slot, const std::string& word) {
     const auto profile = profile_of_target();
     if (!profile) return;
-    if (is_action) return offer_actions(*profile, word);
+    if (slot.name.starts_with("ACTION")) return offer_actions(*profile, word);
     if (slot.name == "NAME=VALUE") return offer_assignments(*profile, word);
     offer_names(names_of(*profile), word);
   }

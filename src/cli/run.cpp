@@ -27,7 +27,7 @@ std::string variable(const World& world, std::string_view name) {
 /// XDG Base Directory Specification: a variable, or its default below the home folder; empty when
 /// neither is known.
 std::string xdg_folder(const World& world, std::string_view name, std::string_view below_home) {
-  if (const std::string folder = variable(world, name); folder.starts_with('/')) return folder;
+  if (std::string folder = variable(world, name); folder.starts_with('/')) return folder;
   const std::string home = variable(world, "HOME");
   return home.empty() ? std::string() : home + "/" + std::string(below_home);
 }

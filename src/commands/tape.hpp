@@ -16,6 +16,7 @@ class Tape final : public report::Renderer {
   Tape() = default;
   Tape(const Tape&) = delete;
   Tape& operator=(const Tape&) = delete;
+  ~Tape() override = default;
 
   Result<void> begin(std::span<const report::Column> columns) override;
   Result<void> record(const report::Record& record) override;

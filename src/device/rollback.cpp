@@ -1,6 +1,7 @@
 #include "spindle/device/rollback.hpp"
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 namespace spindle::device {
@@ -21,8 +22,8 @@ std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes) {
   std::vector<PutBackReport> reports;
   reports.reserve(writes.size());
   TimePoint deadline = calm_->now() + patience;
-  for (auto write = writes.rbegin(); write != writes.rend(); ++write) {
-    reports.push_back(put_back(*write, deadline));
+  for (const TriedWrite& write : std::views::reverse(writes)) {
+    reports.push_back(put_back(write, deadline));
   }
   return reports;
 }

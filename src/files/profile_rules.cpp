@@ -411,7 +411,8 @@ void numbered_are_usable(const ProfileDraft& draft, Findings& findings) {
   if (!draft.profile.numbered) return;
   const catalogue::NumberedFacts& numbered = *draft.profile.numbered;
   const std::string& prefix = numbered.prefix;
-  if (prefix.empty() || prefix.find_first_not_of("abcdefghijklmnopqrstuvwxyz") != prefix.npos) {
+  if (prefix.empty() ||
+      prefix.find_first_not_of("abcdefghijklmnopqrstuvwxyz") != std::string::npos) {
     findings.add_once(draft.numbered.of("prefix"), "a prefix is made of lower-case letters");
   }
   if (numbered.from > numbered.to) {

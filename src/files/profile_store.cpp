@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <ranges>
 
 #include "files/profile_file.hpp"
 #include "files/profile_rules.hpp"
@@ -130,9 +131,8 @@ Result<Chain> read_chain(const std::string& path, Documents documents,
 Profile build(const Chain& chain, Findings& findings) {
   ProfileDraft draft;
   draft.profile.path = chain.front()->path;
-  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
-    if ((*layer)->documents.empty()) continue;
-    read_profile((*layer)->documents.front(), draft, findings);
+  for (const Layer* layer : std::views::reverse(chain)) {
+    if (!layer->documents.empty()) read_profile(layer->documents.front(), draft, findings);
   }
   const bool complete = findings.empty();
   const bool concrete = !chain.front()->head.abstract;
@@ -147,8 +147,8 @@ Profile build(const Chain& chain, Findings& findings) {
 
 catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
   catalogue::CodeTables codes;
-  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
-    if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
+  for (const Layer* layer : std::views::reverse(chain)) {
+    if (const YamlNode* part = find_part(layer->documents, "texts", findings)) {
       read_texts(*part, codes, findings);
     }
   }
@@ -215,7 +215,12 @@ Result<std::string> locate(std::string_view name_or_file, const std::vector<std:
 /// A profile's files, read, with what was found wrong in them so far.
 struct OpenChain {
   explicit OpenChain(std::string file) : path(std::move(file)) {}
-  OpenChain(OpenChain&&) = default;  // a copy would point into the library of the first one
+  // A copy would point into the library of the first one.
+  OpenChain(const OpenChain&) = delete;
+  OpenChain& operator=(const OpenChain&) = delete;
+  OpenChain(OpenChain&&) = default;
+  OpenChain& operator=(OpenChain&&) = default;
+  ~OpenChain() = default;
 
   std::string path;
   Library library;

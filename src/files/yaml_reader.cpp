@@ -15,6 +15,8 @@
 #include <unordered_set>
 #include <utility>
 
+#include "spindle/base/utf8.hpp"
+
 namespace spindle::files {
 namespace {
 
@@ -200,33 +202,12 @@ void parse_documents(std::string_view text, std::size_t file, Documents wanted, 
   }
 }
 
-/// Length of the UTF-8 sequence at the front (RFC 3629); 0 when there is no valid one.
-std::size_t sequence_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
-  };
-  const auto continues = [&](std::size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
-  const unsigned lead = byte(0);
-  if (lead < 0x80U) return 1;
-  if (lead >= 0xC2U && lead <= 0xDFU) return continues(1) ? 2 : 0;
-  if (lead >= 0xE0U && lead <= 0xEFU) {
-    const bool overlong = lead == 0xE0U && byte(1) < 0xA0U;
-    const bool surrogate = lead == 0xEDU && byte(1) >= 0xA0U;
-    return continues(1) && continues(2) && !overlong && !surrogate ? 3 : 0;
-  }
-  if (lead >= 0xF0U && lead <= 0xF4U) {
-    const bool outside = (lead == 0xF0U && byte(1) < 0x90U) || (lead == 0xF4U && byte(1) >= 0x90U);
-    return continues(1) && continues(2) && continues(3) && !outside ? 4 : 0;
-  }
-  return 0;
-}
-
 /// Checked before the parser sees the text, because it replaces what it does not understand.
 bool check_characters(std::string_view text, std::size_t file, Findings& findings) {
   Position at{file, 1, 1};
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = sequence_length(text.substr(i));
-    if (length == 0) {
+    const CodePoint character = first_code_point(text.substr(i));
+    if (!character.well_formed) {
       findings.add(at, "not valid UTF-8");
       return false;
     }
@@ -235,8 +216,8 @@ bool check_characters(std::string_view text, std::size_t file, Findings& finding
       return false;
     }
     at = text[i] == '\n' ? Position{file, at.line + 1, 1}
-                         : Position{file, at.line, at.column + static_cast<int>(length)};
-    i += length;
+                         : Position{file, at.line, at.column + static_cast<int>(character.length)};
+    i += character.length;
   }
   return true;
 }

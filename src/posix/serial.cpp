@@ -228,6 +228,7 @@ class SerialTransport final : public link::Transport {
 
  private:
   [[nodiscard]] bool hung_up() const;
+  [[nodiscard]] Result<bool> wait_behind(ssize_t outcome, short event, TimePoint deadline) const;
   Result<void> drain() const;
 
   Port port_;
@@ -245,6 +246,15 @@ bool SerialTransport::hung_up() const {
   return ::poll(&port, 1, 0) > 0 && (port.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
 }
 
+/// Behind a read or write that moved no bytes: whether another is worth trying before the deadline.
+Result<bool> SerialTransport::wait_behind(ssize_t outcome, short event, TimePoint deadline) const {
+  if (outcome < 0 && errno == EINTR) return true;
+  if (outcome < 0 && errno != EAGAIN) return tl::unexpected(unplugged_error(errno));
+  // No bytes is what a port says both when there are none and when it is gone.
+  if (hung_up()) return tl::unexpected(unplugged_error(EIO));
+  return wait_.until_ready({port_.number(), event}, deadline);
+}
+
 Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
   while (!bytes.empty()) {
     if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
@@ -253,10 +263,7 @@ Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
       continue;
     }
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0 && errno != EAGAIN) return tl::unexpected(unplugged_error(errno));
-    if (hung_up()) return tl::unexpected(unplugged_error(EIO));
-    const Result<bool> ready = wait_.until_ready({port_.number(), POLLOUT}, deadline);
+    const Result<bool> ready = wait_behind(sent, POLLOUT, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) {
       return tl::unexpected(
@@ -280,11 +287,7 @@ Result<std::size_t> SerialTransport::receive(std::span<std::uint8_t> into, TimeP
     if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
     const ssize_t received = ::read(port_.number(), into.data(), into.size());
     if (received > 0) return static_cast<std::size_t>(received);
-    if (received < 0 && errno == EINTR) continue;
-    if (received < 0 && errno != EAGAIN) return tl::unexpected(unplugged_error(errno));
-    // No bytes is what a port says both when there are none and when it is gone.
-    if (hung_up()) return tl::unexpected(unplugged_error(EIO));
-    const Result<bool> ready = wait_.until_ready({port_.number(), POLLIN}, deadline);
+    const Result<bool> ready = wait_behind(received, POLLIN, deadline);
     if (!ready) return tl::unexpected(ready.error());
     if (!*ready) return 0;
   }

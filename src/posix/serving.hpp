@@ -23,6 +23,7 @@ class Serving {
         outages_(service.options.outages, clock.now()) {}
   Serving(const Serving&) = delete;
   Serving& operator=(const Serving&) = delete;
+  ~Serving() = default;
 
   /// Takes clients from this socket.
   void listen(Descriptor listener) { listener_ = std::move(listener); }

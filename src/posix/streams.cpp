@@ -44,24 +44,30 @@ Result<void> write_out(std::string_view text) {
 
 void write_err(std::string_view text) { write_all(STDERR_FILENO, text); }
 
+namespace {
+
+std::optional<std::string> read_line(const Clock& clock, const Interrupt& interrupt) {
+  // Byte by byte: what follows the line belongs to the next reader of standard input.
+  std::string line;
+  char byte = 0;
+  for (;;) {
+    // A user who presses Ctrl-C at a question wants out, also just before the wait begins.
+    const Woken woken = wait_for({STDIN_FILENO, POLLIN}, TimePoint::max(), clock, interrupt);
+    const ssize_t got = woken == Woken::ready ? ::read(STDIN_FILENO, &byte, 1) : -1;
+    if (got < 0) return std::nullopt;
+    if (got == 0) break;
+    if (byte == '\n') return line;
+    line += byte;
+  }
+  if (line.empty()) return std::nullopt;
+  return line;
+}
+
+}  // namespace
+
 std::function<std::optional<std::string>()> line_reader(const Clock& clock,
                                                         const Interrupt& interrupt) {
-  return [&clock, &interrupt]() -> std::optional<std::string> {
-    // Byte by byte: what follows the line belongs to the next reader of standard input.
-    std::string line;
-    char byte = 0;
-    for (;;) {
-      // A user who presses Ctrl-C at a question wants out, also just before the wait begins.
-      const Woken woken = wait_for({STDIN_FILENO, POLLIN}, TimePoint::max(), clock, interrupt);
-      const ssize_t got = woken == Woken::ready ? ::read(STDIN_FILENO, &byte, 1) : -1;
-      if (got < 0) return std::nullopt;
-      if (got == 0) break;
-      if (byte == '\n') return line;
-      line += byte;
-    }
-    if (line.empty()) return std::nullopt;
-    return line;
-  };
+  return [&clock, &interrupt] { return read_line(clock, interrupt); };
 }
 
 bool is_terminal(Std stream) {

@@ -4,18 +4,9 @@
 #include <string>
 #include <string_view>
 
+#include "spindle/base/utf8.hpp"
+
 namespace spindle::report {
-
-/// A code point and the number of bytes that it took.
-struct CodePoint {
-  char32_t value;
-  std::size_t length;
-};
-
-/// The first code point of a text that is not empty. An ill-formed sequence yields U+FFFD once for
-/// its longest valid beginning, or for one byte (The Unicode Standard 15.0, section 3.9, "U+FFFD
-/// Substitution of Maximal Subparts").
-CodePoint first_code_point(std::string_view text);
 
 /// Appends the first character of `text`, which is `first`, or U+FFFD for what is none.
 void append_first(std::string& out, const CodePoint& first, std::string_view text);

@@ -19,7 +19,6 @@ namespace {
 using catalogue::EventKind;
 using modbus::ExceptionCode;
 using modbus::Pdu;
-using modbus::RegisterTable;
 
 // How long a screw turns freely before it is snug. The real time depends on the screw.
 constexpr Duration free_run = std::chrono::milliseconds(900);

@@ -75,6 +75,7 @@ Result<Outage> parse_outage(std::string_view text) {
 
 std::vector<OutageHelp> outage_help() {
   std::vector<OutageHelp> help;
+  help.reserve(kinds.size());
   for (const KindInfo& row : kinds) {
     help.push_back({fmt::format("{}=TIME@every:TIME", row.name), row.meaning});
   }

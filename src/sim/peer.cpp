@@ -194,7 +194,8 @@ Peer::Peer(Server& server, ConnectionId connection, Framing framing, const Fault
       counter_(&counter),
       character_time_(framing == Framing::rtu ? line.character_time : Duration::zero()) {
   const Duration gap = server_->required_gap();
-  if (framing_ == Framing::rtu && line.gaps == LineModel::Gaps::enforced && gap > gap.zero()) {
+  if (framing_ == Framing::rtu && line.gaps == LineModel::Gaps::enforced &&
+      gap > Duration::zero()) {
     line_.emplace(gap, character_time_);
   }
   server_->connected(connection_);

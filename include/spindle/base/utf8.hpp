@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace spindle {
+
+/// A code point and the number of bytes that it took.
+struct CodePoint {
+  char32_t value;
+  std::size_t length;
+  bool well_formed = true;
+};
+
+/// The first code point of a text that is not empty. An ill-formed sequence yields U+FFFD once for
+/// its longest valid beginning, or for one byte (The Unicode Standard 15.0, section 3.9, "U+FFFD
+/// Substitution of Maximal Subparts").
+CodePoint first_code_point(std::string_view text);
+
+}  // namespace spindle
