@@ -128,33 +128,47 @@ Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& targe
   return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
 }
 
+namespace {
+
+/// What is asked of a group: each deed once, to whatever tool it is done.
+struct GroupQuestion {
+  std::vector<std::string> ordinary = {};
+  std::map<std::string, std::string> dangerous = {};  ///< what a deed may cost, by its name
+
+  void add(const Action& action) {
+    if (action.hazard == Hazard::link) {
+      dangerous.emplace(action.name, action.note);
+    } else if (std::find(ordinary.begin(), ordinary.end(), action.name) == ordinary.end()) {
+      ordinary.push_back(action.name);
+    }
+  }
+};
+
+/// Whether the question itself tells what the deed may cost.
+bool is_told_by_question(const Deed& deed, const Context& context) {
+  return deed.action.hazard == Hazard::link && context.common.consent != Consent::given;
+}
+
+}  // namespace
+
 Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
                            std::size_t of, const Context& context) {
   std::vector<std::string> names;
-  std::vector<std::string> ordinary;
-  std::map<std::string, std::string> dangerous;  // what a deed may cost, by its name
+  GroupQuestion question;
   for (const Target& target : targets) {
     names.push_back(target.shown);
     for (const Deed& deed : deeds.at(target.shown)) {
-      const std::string& name = deed.action.name;
-      const bool is_dangerous = deed.action.hazard == Hazard::link;
-      const bool is_in_question = is_dangerous && context.common.consent != Consent::given;
-      if (!is_in_question) tell_notes(deed, target, context);
-      if (is_dangerous) {
-        dangerous.emplace(name, deed.action.note);
-        continue;
-      }
-      const bool is_new = std::find(ordinary.begin(), ordinary.end(), name) == ordinary.end();
-      if (is_new) ordinary.push_back(name);
+      if (!is_told_by_question(deed, context)) tell_notes(deed, target, context);
+      question.add(deed.action);
     }
   }
   const std::string tools = tools_in_words(names, of);
-  for (const auto& [name, note] : dangerous) {
+  for (const auto& [name, note] : question.dangerous) {
     const std::string what = fmt::format("{} on {}: {}", name, tools, note);
     if (auto given = ask_typed_consent(what, name, context); !given) return given;
   }
-  if (ordinary.empty()) return {};
-  return ask_consent(fmt::format("{} on {}", fmt::join(ordinary, ", "), tools), context);
+  if (question.ordinary.empty()) return {};
+  return ask_consent(fmt::format("{} on {}", fmt::join(question.ordinary, ", "), tools), context);
 }
 
 std::string_view to_text(device::ActionResult result) {

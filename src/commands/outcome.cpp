@@ -12,15 +12,24 @@ bool ends_all(ExitStatus status) {
 
 Context calm_context(const Context& context) {
   const Calm& calm = context.calm;
-  return {{.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, context, context};
+  const Surroundings& surroundings = context;
+  const Telling& telling = context;
+  return {
+      {.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, surroundings, telling};
 }
 
 Context with_lines(const Context& context, const device::OpenTransport& open) {
-  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open}, context, context};
+  const Surroundings& surroundings = context;
+  const Telling& telling = context;
+  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open},
+          surroundings,
+          telling};
 }
 
 Context with_renderer(const Context& context, report::Renderer& renderer) {
-  return {context, context, {.renderer = renderer}};
+  const Waiting& waiting = context;
+  const Surroundings& surroundings = context;
+  return {waiting, surroundings, {.renderer = renderer}};
 }
 
 void Outcome::fail(const Error& error) { note_failures(1, error.status()); }

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
@@ -55,54 +58,61 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
   }
 }
 
-}  // namespace
-
-Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
-  // Nobody's wrong name keeps another tool running.
-  Resolution resolution = resolve_each_target(options.targets, context);
-  std::vector<Target>& targets = resolution.targets;
-  if (targets.empty()) return tl::unexpected(std::move(resolution.faults.front()));
-  for (Target& target : targets) target.reach = options.reach;
-  // A stop waits for no other one.
+/// A stop waits for no other one. The results are in the order of the targets.
+std::vector<Result<device::StopResult>> stop_all(const std::vector<Target>& targets,
+                                                 const RemoteStopOptions& options,
+                                                 const Context& context) {
   const auto lines = by_line(targets);
-  const auto results = side_by_side(targets, targets.size(), [&](const Target& target) {
+  return side_by_side(targets, targets.size(), [&](const Target& target) {
     for (const auto& line : lines) {
       const bool begins = line.size() > 1 && &target == &targets[line.front()];
       if (begins) tell_to_stop(targets, line, options, context);
     }
     return stop_one(target, options, context);
   });
+}
+
+/// Why a tool may still run.
+std::optional<Error> failure_of(const Result<device::StopResult>& result, const Target& target) {
+  if (!result) return result.error();
+  if (result == device::StopResult::unconfirmed) return still_runs(target);
+  return std::nullopt;
+}
+
+Summary summary_of(const Outcome& outcome, Reach reach) {
+  const bool everybody = reach == Reach::everybody;
+  return {.counts = {{everybody ? "sent" : "stopped", count(outcome.succeeded())},
+                     {"failed", count(outcome.failed())}},
+          .sentence =
+              fmt::format("{} {}, {} failed{}", outcome.succeeded(),
+                          everybody ? "sent, not acknowledged" : "stopped", outcome.failed(),
+                          outcome.failed() == 0
+                              ? ""
+                              : "; what could not be stopped may still run: stop it at the tool")};
+}
+
+}  // namespace
+
+Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
+  // Nobody's wrong name keeps another tool running.
+  auto [targets, faults] = resolve_each_target(options.targets, context);
+  if (targets.empty()) return tl::unexpected(std::move(faults.front()));
+  for (Target& target : targets) target.reach = options.reach;
+  const auto results = stop_all(targets, options, context);
   Outcome outcome;
   Listing listing(context, stop_columns());
+  const auto fail = [&](const Error& error) {
+    outcome.fail(error);
+    listing.add(error);
+  };
   for (std::size_t index = 0; index < results.size(); ++index) {
-    const Target& target = targets[index];
     const Result<device::StopResult>& result = results[index];
-    if (result) listing.add(stop_record(*result, target, context.clock));
-    std::optional<Error> error;
-    if (!result) error = result.error();
-    if (result == device::StopResult::unconfirmed) error = still_runs(target);
-    if (error) {
-      outcome.fail(*error);
-      listing.add(*error);
-    } else {
-      outcome.succeed();
-    }
+    if (result) listing.add(stop_record(*result, targets[index], context.clock));
+    const auto failure = failure_of(result, targets[index]);
+    failure ? fail(*failure) : outcome.succeed();
   }
-  for (const Error& fault : resolution.faults) {
-    outcome.fail(fault);
-    listing.add(fault);
-  }
-  const bool everybody = options.reach == Reach::everybody;
-  return finish(listing, outcome,
-                {.counts = {{everybody ? "sent" : "stopped", count(outcome.succeeded())},
-                            {"failed", count(outcome.failed())}},
-                 .sentence = fmt::format(
-                     "{} {}, {} failed{}", outcome.succeeded(),
-                     everybody ? "sent, not acknowledged" : "stopped", outcome.failed(),
-                     outcome.failed() == 0
-                         ? ""
-                         : "; what could not be stopped may still run: stop it at the tool")},
-                context);
+  std::for_each(faults.begin(), faults.end(), fail);
+  return finish(listing, outcome, summary_of(outcome, options.reach), context);
 }
 
 }  // namespace spindle::commands
