@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "change_log.hpp"
 #include "deeds.hpp"
 #include "group.hpp"
 #include "listing.hpp"
@@ -172,6 +173,7 @@ Result<void> reset(const Deed& deed, Asked asked, OpenTool& tool, Findings& find
   }
   if (asked == Asked::no) tell_notes(deed, tool.target, context);
   const auto result = perform_deed(deed, tool, context);
+  ChangeLog("alarms", tool, context).add(logged(deed, result));
   if (!result) return tl::unexpected(result.error());
   Listing listing(context, deed_columns());
   listing.add(deed_record(deed, *result, tool.target, context.clock));
@@ -263,6 +265,23 @@ std::string sentence_of(std::size_t present, std::size_t failed, std::size_t of)
   return found + failed_in_words(failed, of);
 }
 
+/// How many tools of a group had an alarm, have one still, and could not be examined or reset.
+struct Tally {
+  std::size_t present = 0;
+  std::size_t remaining = 0;
+  std::size_t failed = 0;
+};
+
+Tally tally_of(const std::vector<Performance<Findings>>& performances) {
+  Tally tally;
+  for (const auto& [tape, found] : performances) {
+    if (found && found->was_present()) ++tally.present;
+    if (found && found->is_present()) ++tally.remaining;
+    if (!found || found->outcome.failed() > 0) ++tally.failed;
+  }
+  return tally;
+}
+
 Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOptions& options,
                               Context& context) {
   const bool resets = options.reset == AlarmReset::yes;
@@ -283,19 +302,13 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
         return examine(target, options, resets ? Asked::yes : Asked::no, own);
       });
   outcome.add(outcome_of_all(performances, [](const Findings& found) { return found.outcome; }));
-  std::size_t present = 0;
-  std::size_t remaining = 0;
-  std::size_t failed = targets.size() - reached.size();
-  for (const auto& [tape, found] : performances) {
-    if (found && found->was_present()) ++present;
-    if (found && found->is_present()) ++remaining;
-    if (!found || found->outcome.failed() > 0) ++failed;
-  }
+  const Tally tally = tally_of(performances);
+  const std::size_t failed = targets.size() - reached.size() + tally.failed;
   return play(performances, context)
       .and_then([&] {
-        return tell(
-            summary_of(present, outcome, sentence_of(remaining, failed, targets.size()), {}),
-            outcome, context);
+        return tell(summary_of(tally.present, outcome,
+                               sentence_of(tally.remaining, failed, targets.size()), {}),
+                    outcome, context);
       })
       .map([&] { return outcome; });
 }

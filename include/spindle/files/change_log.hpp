@@ -12,7 +12,7 @@ namespace spindle::files {
 struct Change {
   std::string time;  ///< "2026-11-22T10:15:30.123Z"
   std::string user;
-  std::string command;  ///< "set", "do", "restore", "remote-start"
+  std::string command;  ///< "set", "do", "restore", "alarms", "remote-start"
   std::string target;   ///< as the user named it
   std::string serial;   ///< empty: not known
   std::string name;     ///< parameter or action
