@@ -1,7 +1,6 @@
 #include "spindle/device/rollback.hpp"
 
 #include <algorithm>
-#include <ranges>
 #include <utility>
 
 namespace spindle::device {
@@ -22,8 +21,8 @@ std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes) {
   std::vector<PutBackReport> reports;
   reports.reserve(writes.size());
   TimePoint deadline = calm_->now() + patience;
-  for (const TriedWrite& write : std::views::reverse(writes)) {
-    reports.push_back(put_back(write, deadline));
+  for (auto write = writes.rbegin(); write != writes.rend(); ++write) {
+    reports.push_back(put_back(*write, deadline));
   }
   return reports;
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <ranges>
 
 #include "files/profile_file.hpp"
 #include "files/profile_rules.hpp"
@@ -131,8 +130,9 @@ Result<Chain> read_chain(const std::string& path, Documents documents,
 Profile build(const Chain& chain, Findings& findings) {
   ProfileDraft draft;
   draft.profile.path = chain.front()->path;
-  for (const Layer* layer : std::views::reverse(chain)) {
-    if (!layer->documents.empty()) read_profile(layer->documents.front(), draft, findings);
+  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+    if ((*layer)->documents.empty()) continue;
+    read_profile((*layer)->documents.front(), draft, findings);
   }
   const bool complete = findings.empty();
   const bool concrete = !chain.front()->head.abstract;
@@ -147,8 +147,8 @@ Profile build(const Chain& chain, Findings& findings) {
 
 catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
   catalogue::CodeTables codes;
-  for (const Layer* layer : std::views::reverse(chain)) {
-    if (const YamlNode* part = find_part(layer->documents, "texts", findings)) {
+  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+    if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
       read_texts(*part, codes, findings);
     }
   }
