@@ -318,8 +318,7 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, Reach::one, context);
   if (!targets) return tl::unexpected(targets.error());
-  const bool asks = options.reset == AlarmReset::yes && asks_as_group(options.target, Reach::one);
-  if (asks || targets->size() > 1) return examine_group(*targets, options, context);
+  if (is_group(options.target, Reach::one)) return examine_group(*targets, options, context);
   return examine(targets->front(), options, Asked::no, context).map([](const Findings& findings) {
     return findings.outcome;
   });

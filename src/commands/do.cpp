@@ -180,13 +180,13 @@ Result<Outcome> perform_on_group(const std::vector<Target>& targets, const DoOpt
 Result<Outcome> perform(const DoOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, options.reach, context);
   if (!targets) return tl::unexpected(targets.error());
-  if (options.actions.empty()) {
-    return targets->size() == 1 ? list_actions(targets->front(), context)
-                                : list_for_group(*targets, options, context);
+  const bool listing = options.actions.empty();
+  if (is_group(options.target, options.reach)) {
+    return listing ? list_for_group(*targets, options, context)
+                   : perform_on_group(*targets, options, context);
   }
-  return asks_as_group(options.target, options.reach)
-             ? perform_on_group(*targets, options, context)
-             : perform_on_one(targets->front(), options, context);
+  return listing ? list_actions(targets->front(), context)
+                 : perform_on_one(targets->front(), options, context);
 }
 
 }  // namespace spindle::commands

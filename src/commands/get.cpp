@@ -52,8 +52,8 @@ Result<Outcome> get_group(const std::vector<Target>& targets, const GetOptions& 
 Result<Outcome> get(const GetOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, Reach::one, context);
   if (!targets) return tl::unexpected(targets.error());
-  return targets->size() == 1 ? get_one(targets->front(), options, context)
-                              : get_group(*targets, options, context);
+  return is_group(options.target, Reach::one) ? get_group(*targets, options, context)
+                                              : get_one(targets->front(), options, context);
 }
 
 }  // namespace spindle::commands

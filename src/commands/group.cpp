@@ -23,8 +23,8 @@ Result<std::vector<Target>> resolve_one_or_group(const std::string& text, Reach 
   return targets;
 }
 
-bool asks_as_group(const std::string& text, Reach reach) {
-  return text.starts_with('@') && reach == Reach::one;
+bool is_group(const std::string& text, Reach reach) {
+  return names_group(text) && reach == Reach::one;
 }
 
 std::string tools_in_words(const std::vector<std::string>& names, std::size_t of) {

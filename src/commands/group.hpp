@@ -21,9 +21,9 @@ namespace spindle::commands {
 Result<std::vector<Target>> resolve_one_or_group(const std::string& text, Reach reach,
                                                  const Context& context);
 
-/// Whether what changes these tools is asked about as a whole: a group is, even one of a single
-/// tool. A broadcast has one target and asks in its own words.
-bool asks_as_group(const std::string& text, Reach reach);
+/// Whether the targets of this text are told of, and asked about, as a group: even one of a single
+/// tool is, so that a program can rely on the columns. A broadcast has one target.
+bool is_group(const std::string& text, Reach reach);
 
 /// "2 of 3 tools (station3, station4)"; without "of 3" where these are all.
 std::string tools_in_words(const std::vector<std::string>& names, std::size_t of);

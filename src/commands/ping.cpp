@@ -181,8 +181,8 @@ Result<Outcome> ping_group(const std::vector<Target>& targets, const PingOptions
 Result<Outcome> ping(const PingOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, Reach::one, context);
   if (!targets) return tl::unexpected(targets.error());
-  return targets->size() == 1 ? ping_one(targets->front(), options, context)
-                              : ping_group(*targets, options, context);
+  return is_group(options.target, Reach::one) ? ping_group(*targets, options, context)
+                                              : ping_one(targets->front(), options, context);
 }
 
 }  // namespace spindle::commands

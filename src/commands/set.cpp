@@ -70,8 +70,8 @@ Result<Outcome> set_one(const Target& target, const SetOptions& options, Context
 Result<Outcome> set(const SetOptions& options, Context& context) {
   const auto targets = resolve_one_or_group(options.target, options.reach, context);
   if (!targets) return tl::unexpected(targets.error());
-  return asks_as_group(options.target, options.reach) ? set_group(*targets, options, context)
-                                                      : set_one(targets->front(), options, context);
+  return is_group(options.target, options.reach) ? set_group(*targets, options, context)
+                                                 : set_one(targets->front(), options, context);
 }
 
 }  // namespace spindle::commands

@@ -46,7 +46,8 @@ Result<Target> target_of_url(const std::string& url, const Context& context) {
 Result<Target> target_of_tool(const files::Tool& tool, const Context& context) {
   auto target = target_of_url(tool.url, context);
   if (!target) {
-    target.error().name = tool.name;
+    target.error().target = tool.name;
+    target.error().endpoint = tool.url;
     target.error().code = Errc::bad_file;
     return target;
   }
@@ -219,16 +220,18 @@ Error unproven(const Target& target) {
                "shows all"});
 }
 
+bool names_group(std::string_view text) { return text.starts_with('@'); }
+
 bool is_target(std::string_view text, const Context& context) {
   if (link::looks_like_url(text) || find_tool(context.tools, text) != nullptr) return true;
-  return text.starts_with('@') && context.tools.groups.contains(std::string(text.substr(1)));
+  return names_group(text) && context.tools.groups.contains(std::string(text.substr(1)));
 }
 
 Resolution resolve_each_target(const std::vector<std::string>& texts, const Context& context) {
   std::vector<std::string> names;
   for (const std::string& text : texts) {
-    const auto group = text.starts_with('@') ? context.tools.groups.find(text.substr(1))
-                                             : context.tools.groups.end();
+    const auto group =
+        names_group(text) ? context.tools.groups.find(text.substr(1)) : context.tools.groups.end();
     if (group == context.tools.groups.end()) {
       names.push_back(text);
     } else {

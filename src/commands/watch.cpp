@@ -225,8 +225,10 @@ Result<void> check(const WatchOptions& options, const WatchedTool& tool, Profile
 }
 
 /// Motors have other columns than tools that count their results.
-std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools) {
-  const Tools shown = tools.size() == 1 ? Tools::one : Tools::several;
+std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools,
+                                        const WatchOptions& options) {
+  const bool one = tools.size() == 1 && !names_group(options.targets.front());
+  const Tools shown = one ? Tools::one : Tools::several;
   const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
     return tool.known() != nullptr && tool.known()->profile.run && !tool.known()->profile.events;
   });
@@ -267,7 +269,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   for (const WatchedTool& tool : *tools) targets.push_back(tool.target());
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
-  Stage stage(options, tools->size(), columns_for(*tools), context);
+  Stage stage(options, tools->size(), columns_for(*tools, options), context);
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
     auto watched = watch_one(tool, open_transport, stage, options, context);
     if (!watched) watched.error().asked_of = tool.target().shown;

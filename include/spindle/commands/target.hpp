@@ -60,6 +60,9 @@ Result<Target> resolve_target(const std::string& text, const Context& context,
 /// its own.
 std::string shared_line(const link::Endpoint& endpoint);
 
+/// Whether a target's text names a group.
+bool names_group(std::string_view text);
+
 /// Whether a first argument is meant as a target rather than a parameter pattern.
 bool is_target(std::string_view text, const Context& context);
 
