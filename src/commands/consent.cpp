@@ -22,8 +22,10 @@ Result<std::optional<std::string>> ask(std::string_view what, std::string_view q
   }
   context.io.err(fmt::format("{}. {} ", what, question));
   const auto answer = context.io.read_line();
-  if (!answer && context.interrupt.signalled()) return tl::unexpected(context.interrupt.error());
-  return answer.value_or("");
+  if (answer) return *answer;
+  context.io.err("\n");  // behind a question that nobody answered, the terminal's line goes on
+  if (context.interrupt.signalled()) return tl::unexpected(context.interrupt.error());
+  return "";
 }
 
 Error refused(std::string_view what) {
