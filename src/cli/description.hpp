@@ -21,7 +21,7 @@ struct CommandDescription {
   std::string synopsis = {};  ///< behind the name; may be empty
   std::string meaning = {};
   std::vector<std::string> examples = {};
-  std::string appendix = {};  ///< more about it, with its own headings; may be empty
+  std::string (*appendix)() = nullptr;  ///< more about it, with its own headings; may be absent
   std::vector<OptionDescription> options = {};
   std::vector<CommandDescription> commands = {};  ///< below this one
 };

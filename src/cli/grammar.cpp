@@ -1118,10 +1118,10 @@ std::vector<CommandDescription> commands_of(const CLI::App& app, const Draft& dr
     CommandDescription described{.name = path_of(command),
                                  .synopsis = std::string(words.synopsis),
                                  .meaning = std::string(words.meaning),
+                                 .appendix = words.appendix,
                                  .options = options_of(*command),
                                  .commands = commands_of(*command, draft)};
     for (const auto example : split(words.examples, '\n')) described.examples.emplace_back(example);
-    if (words.appendix != nullptr) described.appendix = words.appendix();
     commands.push_back(std::move(described));
   }
   return commands;

@@ -62,7 +62,7 @@ std::string command_help(const Description& description, const CommandDescriptio
   if (!command.options.empty()) {
     text += fmt::format("\nArguments and options:\n{}", option_lines(command.options));
   }
-  if (!command.appendix.empty()) text += "\n" + command.appendix;
+  if (command.appendix != nullptr) text += "\n" + command.appendix();
   return text + fmt::format("\nOptions of every command:\n{}", option_lines(description.common));
 }
 

@@ -121,7 +121,7 @@ std::string heading_of(const CommandDescription& command) {
 std::string command_text(const CommandDescription& command) {
   std::string text = heading_of(command) + mdoc_prose(sentence(command.meaning));
   text += option_list(command.options);
-  text += appendix_text(command.appendix);
+  if (command.appendix != nullptr) text += appendix_text(command.appendix());
   if (!command.examples.empty()) text += ".Pp\nExamples:\n" + mdoc_literal(command.examples);
   for (const CommandDescription& below : command.commands) text += command_text(below);
   return text;

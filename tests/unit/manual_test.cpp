@@ -172,7 +172,11 @@ TEST_CASE("manual: an appendix is text and terms, a command below another has it
       .commands = {{.name = "a",
                     .synopsis = "X",
                     .meaning = "does it",
-                    .appendix = "Words (of it):\n  one[=N]   the first\n  two\n\nAnd more.\n",
+                    .appendix =
+                        [] {
+                          return std::string(
+                              "Words (of it):\n  one[=N]   the first\n  two\n\nAnd more.\n");
+                        },
                     .commands = {{.name = "a b", .meaning = "below"}}}}};
   CHECK(cli::manual_holes(description).front().text ==
         ".Ss a\n.Dl spindle a X\\&\n.Pp\nDoes it.\n.Pp\nWords (of it):\n.Pp\n.Bl -tag -width Ds "
