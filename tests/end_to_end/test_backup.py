@@ -190,12 +190,12 @@ class RoundTripTest(BackupTest):
     def test_every_fifth_answer_is_lost(self):
         path = self.backup(self.url, "a.yaml")
         with support.simulator("doga-bm", "--fault", "lost@every:5") as url:
-            changed = support.run("set", url, *PROFILE, "--timeout", "100ms", "p300=7", "p301=8", "p302=9")
+            changed = support.run("set", url, *PROFILE, "--timeout", "300ms", "p300=7", "p301=8", "p302=9")
             self.assertEqual(changed.status, 0, changed)
-            restored = self.restore(url, path, "--timeout", "100ms")
+            restored = self.restore(url, path, "--timeout", "300ms")
             self.assertEqual(restored.status, 0, restored)
             self.assertEqual([r["result"] for r in restored.records("write")], ["written"] * 3)
-            compared = support.run("diff", path, url, *PROFILE, "--timeout", "100ms")
+            compared = support.run("diff", path, url, *PROFILE, "--timeout", "300ms")
             self.assertEqual(compared.status, 0, compared)
 
 

@@ -237,8 +237,8 @@ class InterruptionTest(GroupTest):
         self.group(silent=silent.url, one=one)
         for command in (["get", "@line", TORQUE], ["set", "@line", f"{TORQUE}=2.80", "--yes"]):
             with self.subTest(command[0]):
+                count = len(silent.requests)
                 with support.Running(*command, "--json", "--timeout", "60s") as running:
-                    count = len(silent.requests)
                     support.wait_until(lambda: len(silent.requests) >= count + 2, "it is read from")
                     running.send_signal(signal.SIGTERM)
                     finished = running.finish()

@@ -18,7 +18,6 @@ import support
 TABLE = json.loads(pathlib.Path(__file__).with_name("hostile_table.json").read_text("utf-8"))
 TIMEOUT_MS = 500
 CONNECT_TIMEOUT = 1.0
-SLACK = 2.5
 SIDE_BY_SIDE = 8
 SUMMARISED = {"set", "do", "ping"}
 NEW_TORQUE = 280
@@ -95,9 +94,9 @@ class Judge:
         self.demand(
             finished.status in self.expected, f"status {finished.status}, not of {self.expected}"
         )
-        allowed = row.get("waits", 2) * row.get("timeout_ms", TIMEOUT_MS) / 1000 + SLACK
+        allowed = row.get("waits", 2) * row.get("timeout_ms", TIMEOUT_MS) / 1000 + support.SOON
         if row.get("accept") == "full":
-            allowed = CONNECT_TIMEOUT + SLACK
+            allowed = CONNECT_TIMEOUT + support.SOON
         self.demand(finished.seconds <= allowed, f"{finished.seconds:.2f} s, allowed {allowed:.2f} s")
         said = [line for line in finished.stderr.split("\n") if line.startswith("spindle: ")]
         if finished.status == 0:

@@ -271,7 +271,7 @@ class EndingTest(RemoteStartTest):
             with self.running(station, "--json", stdout=writing) as run:
                 os.close(writing)
                 os.close(reading)
-                finished = run.finish(timeout=5)
+                finished = run.finish()
             self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
             self.assert_stopped(station, finished)
 
@@ -466,12 +466,12 @@ class RemoteStopTest(RemoteStartTest):
             urls = [stations[0].url, url, *(station.url for station in stations[1:])]
             run = stack.enter_context(
                 support.Running(
-                    "remote-stop", *urls, "--profile", "doga-bm", "--connect-timeout", "2s", "--json"
+                    "remote-stop", *urls, "--profile", "doga-bm", "--connect-timeout", "6s", "--json"
                 )
             )
             support.wait_until(somebody_waits, "a connection is tried")
             for station in stations:
-                support.wait_until(lambda s=station: s.writes() == [0], "the others are stopped", 1.5)
+                support.wait_until(lambda s=station: s.writes() == [0], "the others are stopped", 5)
             self.assertIsNone(run.process.poll())
             finished = run.finish()
         self.assertEqual(finished.status, 9, finished)

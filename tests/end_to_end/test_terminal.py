@@ -68,7 +68,7 @@ class ProgressTest(unittest.TestCase):
         with support.simulator("orientalmotor-blv", "--units", "1,3", listen="rtu+tcp://127.0.0.1:0") as url:
             bus = url.split("?")[0]
             finished = support.run_on_terminal(
-                "scan", bus, "--profile", "orientalmotor-blv", "--units", "1-4", "--timeout", "100ms", "--json"
+                "scan", bus, "--profile", "orientalmotor-blv", "--units", "1-4", "--timeout", "500ms", "--json"
             )
         self.assertEqual(finished.status, 0, finished)
         records = [support.parse_json(line) for line in screen(finished.stdout) if line]

@@ -6,6 +6,8 @@ of keep-alives.
 """
 
 import contextlib
+import itertools
+import math
 import os
 import pty
 import select
@@ -20,7 +22,7 @@ from hostile_server import EVENT_FIRST
 
 LONG = os.environ.get("SPINDLE_LONG") == "1"
 EVENTS, RATE = (10000, 200) if LONG else (2000, 1000)
-SECONDS = 30 if LONG else 5
+SECONDS = 30 if LONG else 8
 PROFILE = ("--profile", "doga-bm")
 JSON = (*PROFILE, "--json")
 KEEP_ALIVE, ARM_EXPIRES = 1.0, 10.0
@@ -165,6 +167,13 @@ class CompletenessTest(unittest.TestCase):
             self.assertEqual(server.full_block_reads(), [])
 
 
+def assert_disarmed(server):
+    """The last that was asked; the tool may come to it when the program has ended."""
+    support.wait_until(
+        lambda: server.requests and server.requests[-1][1].words == (ARM_REGISTER, 0), "the output is off"
+    )
+
+
 class WireTest(unittest.TestCase):
     def watch_wire(self):
         """Watches for a while, and returns the longest pause between two keep-alives."""
@@ -182,7 +191,7 @@ class WireTest(unittest.TestCase):
             self.assertGreaterEqual(len(armed), 1 + SECONDS // 5)
             self.assertLess(max(between, default=0), ARM_EXPIRES)
             self.assertEqual(server.full_block_reads(), [])
-            self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
+            assert_disarmed(server)
         return max(later - earlier for earlier, later in zip(alive, alive[1:]))
 
     def test_keep_alive_and_arming(self):
@@ -204,9 +213,6 @@ class WireTest(unittest.TestCase):
 
 
 class EndingTest(unittest.TestCase):
-    def assert_disarmed(self, server):
-        self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
-
     def test_signals(self):
         for number, expected in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
             with self.subTest(number), EventServer() as server:
@@ -222,7 +228,7 @@ class EndingTest(unittest.TestCase):
                     (summary["type"], summary["events"], summary["exit_status"]),
                     ("summary", 1, expected),
                 )
-                self.assert_disarmed(server)
+                assert_disarmed(server)
 
     def test_signal_while_reconnecting(self):
         with support.refusing_port() as url, Watching(url, *JSON) as watching:
@@ -252,8 +258,10 @@ class EndingTest(unittest.TestCase):
                 with server._lock:  # the farewell gets no answer
                     watching.process.send_signal(signal.SIGINT)
                     threading.Event().wait(0.1)
-                    self.assertIsNone(watching.process.poll())
-                    status, seconds, stderr = watching.end(signal.SIGINT)
+                    too_late = watching.process.poll() is not None
+                    status, seconds, stderr = watching.end(None if too_late else signal.SIGINT)
+            if too_late:
+                seconds = math.inf
             return support.Finished(watching.arguments, status, "", stderr, seconds)
 
         self.assertEqual(support.quickest(end, 0.3, attempts=10).status, 130)
@@ -271,7 +279,7 @@ class EndingTest(unittest.TestCase):
                     # No event comes: the end of the reader is noticed all the same.
                     finished = running.finish()
                 self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
-                self.assert_disarmed(server)
+                assert_disarmed(server)
 
     def test_count_and_duration(self):
         with EventServer() as server:
@@ -281,12 +289,12 @@ class EndingTest(unittest.TestCase):
                     server.event()
                 self.assertEqual(watching.end(None)[0], 0)
                 self.assertEqual(len(watching.numbers()), 2)
-            self.assert_disarmed(server)
+            assert_disarmed(server)
         with EventServer() as server:
             finished = support.run("watch", server.url, *JSON, "--duration", "1s")
             self.assertEqual(finished.status, 0, finished)
             self.assertLess(finished.seconds, 1 + support.SOON)
-            self.assert_disarmed(server)
+            assert_disarmed(server)
 
     def test_idle_timeout(self):
         with EventServer() as server:
@@ -368,7 +376,6 @@ class ReconnectingTest(unittest.TestCase):
 
     def test_outages(self):
         """A tool that sleeps, roams, restarts or serves somebody else at times, and works on."""
-        first_event = 1962  # of the simulated tool
         for outage, states, gap in (
             ("sleep=500ms@every:2s", ["connected"], None),
             ("roam=700ms@every:2s", ["lost", "connected"], None),
@@ -386,17 +393,24 @@ class ReconnectingTest(unittest.TestCase):
                 if gap:
                     self.assertIn(gap, watching.records("gap")[0]["reason"])
                 else:
-                    last = watching.numbers()[-1]
-                    self.assertEqual(unaccounted(watching.records(), first_event, last), "")
+                    numbers = watching.numbers()
+                    before_first = list(
+                        itertools.takewhile(lambda record: record["type"] != "event", watching.records())
+                    )
+                    missed = sum(record["missed"] for record in before_first if record["type"] == "gap")
+                    self.assertEqual(
+                        unaccounted(watching.records(), numbers[0] - missed, numbers[-1]), ""
+                    )
 
     def test_another_tool_is_said(self):
         with EventServer() as server:
             with Watching(server.url, *JSON) as watching:
                 support.wait_until(lambda: server.armed, "the watch arms the output")
                 other = EventServer(serial=1021100099, first=7)
-                server.tool, server.number = other.tool, other.number
                 other._listening.close()
-                server.cut()
+                with server._lock:
+                    server.tool, server.number = other.tool, other.number
+                    server.cut()
                 support.wait_until(lambda: watching.links().count("connected") == 2, "it is back")
                 support.wait_until(lambda: server.armed, "the output is armed")
                 server.event()
@@ -500,7 +514,7 @@ class ValuesTest(unittest.TestCase):
             finished = support.run("watch", server.url, "p564", *JSON)
             self.assertEqual(finished.status, 6, finished)
             self.assertEqual(finished.records("error")[0]["name"], "p564")
-            self.assertEqual(server.requests[-1][1].words, (ARM_REGISTER, 0))
+            assert_disarmed(server)
 
 
 if __name__ == "__main__":

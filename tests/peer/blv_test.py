@@ -151,8 +151,8 @@ class Wireshark(support.PeerTest):
                 drivers.ask("get", 2, "@holding:9000"),
                 drivers.ask("do", 2, "alarm-reset", "--yes"),
                 drivers.ask("set", 0, "operation.5.speed=900", "--broadcast", "--yes"),
-                drivers.ask("remote-start", 2, "--speed", "300", "--for", "200ms", "--yes"),
                 drivers.ask("remote-stop", 0, "--broadcast"),
+                drivers.ask("remote-start", 2, "--speed", "300", "--for", "200ms", "--yes"),
             ]
         finally:
             drivers.stop()
