@@ -69,33 +69,18 @@ std::string find_tools_file(const World& world, const Invocation& invocation) {
   return {};
 }
 
-struct FoundTools {
-  files::Tools tools = {};
-  std::optional<Error> left_out = std::nullopt;  ///< why not all of the file is there
-};
-
-/// What a file with faults still says: whoever wants to stop a tool is not sent away to mend it.
-FoundTools salvage_tools(const std::string& path) {
-  auto loaded = files::load_tools(path);
-  if (loaded) return {std::move(*loaded)};
-  auto checked = files::check_tools(path);
-  return {checked ? std::move(checked->tools) : files::Tools{.path = path},
-          std::move(loaded.error())};
-}
-
-Result<FoundTools> find_tools(const World& world, const Invocation& invocation) {
+Result<files::Tools> find_tools(const World& world, const Invocation& invocation) {
   const std::string path = find_tools_file(world, invocation);
-  if (path.empty()) return FoundTools();
+  if (path.empty()) return files::Tools();
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
-      return files::load_tools(path).map(
-          [](files::Tools tools) { return FoundTools{std::move(tools)}; });
+      return files::load_tools(path);
     case Invocation::ToolsFile::salvaged:
-      return salvage_tools(path);
+      return files::salvage_tools(path);
     case Invocation::ToolsFile::only_found:
       break;
   }
-  return FoundTools{{.path = path}};
+  return files::Tools{.path = path};
 }
 
 /// A terminal that shows text and nothing else.
@@ -124,12 +109,8 @@ Result<void> begin_capture(const std::string& path, const Disk& disk) {
 
 Result<commands::Outcome> run_command(const Invocation& invocation, World& world,
                                       report::Renderer& renderer) {
-  const auto found = find_tools(world, invocation);
-  if (!found) return tl::unexpected(found.error());
-  if (found->left_out) {
-    renderer.note(
-        fmt::format("warning: not all of the tools file counts: {}", describe(*found->left_out)));
-  }
+  const auto tools = find_tools(world, invocation);
+  if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles(profile_folders(world));
   const std::string state = state_folder(world);
   commands::Context context{
@@ -142,7 +123,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
        .state_folder = state,
        .version = version,
        .profiles = profiles,
-       .tools = found->tools,
+       .tools = *tools,
        .common = invocation.common},
       {.renderer = renderer}};
   if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
@@ -162,11 +143,11 @@ int tell(const Error& error, World& world, report::Renderer& renderer) {
 /// What the shells' completion scripts ask. A broken file must not make a shell noisy.
 int run_completion(const std::vector<std::string>& words, World& world) {
   const auto typed = parse(words);
-  const auto found = find_tools(world, typed.value_or(Invocation()));
+  const auto tools = find_tools(world, typed.value_or(Invocation()));
   const files::Tools none;
   const files::ProfileStore profiles(profile_folders(world));
   const Completion completion =
-      complete(words, describe_grammar(), {found ? found->tools : none, profiles});
+      complete(words, describe_grammar(), {tools ? *tools : none, profiles});
   const auto written = world.io.out(to_text(completion));
   return exit_status(written ? ExitStatus::ok : written.error().status());
 }

@@ -94,9 +94,22 @@ Summary summary_of(const Outcome& outcome, Reach reach) {
 }  // namespace
 
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
-  // Nobody's wrong name keeps another tool running.
+  // Nobody's wrong name keeps another tool running, and no fault of the tools file.
   auto [targets, faults] = resolve_each_target(options.targets, context);
-  if (targets.empty()) return tl::unexpected(std::move(faults.front()));
+  if (const auto& left_out = context.tools.left_out) {
+    const bool may_lack_some =
+        std::any_of(options.targets.begin(), options.targets.end(), names_group);
+    if (may_lack_some) {
+      faults.push_back({.code = left_out->code,
+                        .message = fmt::format("not all of the tools file counts, so a group may "
+                                               "lack tools: {}",
+                                               describe(*left_out)),
+                        .hint = "name each tool, or stop it at the tool"});
+    } else {
+      context.renderer.note(
+          fmt::format("warning: not all of the tools file counts: {}", describe(*left_out)));
+    }
+  }
   for (Target& target : targets) target.reach = options.reach;
   const auto results = stop_all(targets, options, context);
   Outcome outcome;

@@ -58,12 +58,35 @@ Result<Target> target_of_tool(const files::Tool& tool, const Context& context) {
   return target;
 }
 
-Result<Target> single_target(const std::string& text, const Context& context) {
-  if (const files::Tool* tool = find_tool(context.tools, text)) {
-    return target_of_tool(*tool, context);
+/// The tools of this name, or that of this URL. Only a file with faults can have a name twice.
+std::vector<Result<Target>> named_targets(const std::string& name, const Context& context) {
+  std::vector<Result<Target>> found;
+  for (const files::Tool& tool : context.tools.tools) {
+    if (tool.name == name) found.push_back(target_of_tool(tool, context));
   }
-  if (link::looks_like_url(text)) return target_of_url(text, context);
-  return tl::unexpected(unknown_target(text, context.tools));
+  if (!found.empty()) return found;
+  if (link::looks_like_url(name)) {
+    found.push_back(target_of_url(name, context));
+  } else {
+    found.emplace_back(tl::unexpected(unknown_target(name, context.tools)));
+  }
+  return found;
+}
+
+void add(Result<Target> found, Resolution& resolution) {
+  if (!found) {
+    resolution.faults.push_back(std::move(found.error()));
+    return;
+  }
+  const bool known =
+      std::any_of(resolution.targets.begin(), resolution.targets.end(), [&](const Target& target) {
+        return target.shown == found->shown && target.endpoint.text == found->endpoint.text;
+      });
+  if (!known) resolution.targets.push_back(std::move(*found));
+}
+
+void add_named(const std::string& name, const Context& context, Resolution& resolution) {
+  for (Result<Target>& found : named_targets(name, context)) add(std::move(found), resolution);
 }
 
 device::LinkOptions link_options(const Target& target, const catalogue::Profile& profile,
@@ -228,23 +251,18 @@ bool is_target(std::string_view text, const Context& context) {
 }
 
 Resolution resolve_each_target(const std::vector<std::string>& texts, const Context& context) {
-  std::vector<std::string> names;
+  Resolution resolution;
   for (const std::string& text : texts) {
     const auto group =
         names_group(text) ? context.tools.groups.find(text.substr(1)) : context.tools.groups.end();
     if (group == context.tools.groups.end()) {
-      names.push_back(text);
-    } else {
-      names.insert(names.end(), group->second.begin(), group->second.end());
+      add_named(text, context, resolution);
+      continue;
     }
-  }
-  Resolution resolution;
-  for (const std::string& name : names) {
-    auto target = single_target(name, context);
-    if (target) {
-      resolution.targets.push_back(std::move(*target));
-    } else {
-      resolution.faults.push_back(std::move(target.error()));
+    for (const std::string& name : group->second) add_named(name, context, resolution);
+    if (group->second.empty()) {
+      resolution.faults.push_back(
+          {.code = Errc::bad_file, .message = fmt::format("'{}' names no tools", text)});
     }
   }
   return resolution;

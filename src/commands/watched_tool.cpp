@@ -58,9 +58,10 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
     return tl::unexpected(std::move(registers.error()));
   }
   past_ = link::SessionOptions::Past::doubtful;  // it is opened again after trouble only
-  // A port opens whether or not the unit is there.
   if (known_->profile.link.loopback) {
-    if (auto alive = device->ping(); !alive) return tl::unexpected(std::move(alive.error()));
+    if (auto there = device->require_answer(); !there) {
+      return tl::unexpected(std::move(there.error()));
+    }
   }
   std::string identity = device->identity_text();
   return device::Watcher::Link{std::move(*device), std::move(identity)};

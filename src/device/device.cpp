@@ -679,6 +679,12 @@ Result<Duration> Device::ping() {
   return session_->last_round_trip();
 }
 
+Result<void> Device::require_answer() {
+  auto answered = client_.loopback(session_->fresh_word());
+  if (answered || answered.error().code == Errc::exception_response) return {};
+  return tl::unexpected(located(std::move(answered.error())));
+}
+
 Result<Probe> Device::probe(modbus::UnitId unit) {
   session_->set_unit(unit);
   auto response = session_->transact(modbus::loopback_request(session_->fresh_word()));

@@ -271,7 +271,8 @@ Result<void> Watcher::poll() {
       if (auto fetched = fetch_polled(*number); !fetched) return fetched;
     }
   }
-  return polls_values() ? poll_values() : Result<void>();
+  if (!polls_values()) return {};
+  return poll_values().map([&] { served_ = true; });
 }
 
 /// Fetches the event of a counter that has changed; one that runs away is told as it was seen.

@@ -36,7 +36,8 @@ void check_name(const YamlEntry& entry, Findings& findings) {
 
 std::vector<std::string> read_words(const YamlNode& list, Findings& findings) {
   std::vector<std::string> words;
-  if (!expect(list, YamlNode::Kind::sequence, findings)) return words;
+  expect(list, YamlNode::Kind::sequence, findings);
+  if (list.kind == YamlNode::Kind::scalar) words.push_back(list.text);  // what was meant by it
   for (const YamlNode& item : list.items) {
     auto word = to_text(item, findings);
     if (!word) continue;
@@ -91,7 +92,8 @@ void read_group(const YamlEntry& entry, Tools& tools, Findings& findings) {
     if (std::find(known.begin(), known.end(), item.text) != known.end()) continue;
     findings.add_once(item.at, unknown_word("tool", item.text, known));
   }
-  tools.groups.emplace(entry.key, std::move(members));
+  auto& group = tools.groups[entry.key];
+  group.insert(group.end(), members.begin(), members.end());
 }
 
 void read_tools(const YamlNode& document, Tools& tools, Findings& findings) {
@@ -130,6 +132,15 @@ Result<Tools> load_tools(const std::string& path) {
   Error error = findings.error();
   if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
   return tl::unexpected(std::move(error));
+}
+
+Tools salvage_tools(const std::string& path) {
+  auto loaded = load_tools(path);
+  if (loaded) return std::move(*loaded);
+  auto checked = check_tools(path);
+  Tools tools = checked ? std::move(checked->tools) : Tools{.path = path};
+  tools.left_out = std::move(loaded.error());
+  return tools;
 }
 
 Result<CheckedTools> check_tools(const std::string& path) {

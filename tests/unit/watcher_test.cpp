@@ -372,6 +372,29 @@ TEST_CASE("a link that never serves is tried ever more seldom") {
   CHECK(shop.told<LinkNews>().size() > 6);
 }
 
+TEST_CASE("a link whose values were polled has served, and attempts are counted anew") {
+  Workshop shop;
+  shop.profile.link.keep_alive = Duration::zero();  // as serial lines do without
+  shop.plan.events = EventMode::none;
+  shop.plan.values = {shop.profile.find("status.running").value()};
+  for (const Duration after : {5s, 15s, 25s}) {
+    shop.clock.at(shop.clock.now() + after, [&] {
+      shop.lose_line();
+      shop.unreachable_until = shop.clock.now() + 1s;
+    });
+  }
+  REQUIRE(shop.watch(30s));
+  const auto links = shop.told<LinkNews>();
+  std::size_t lost = 0;
+  for (std::size_t at = 1; at < links.size(); ++at) {
+    if (links[at - 1].state != LinkState::lost) continue;
+    ++lost;
+    CHECK(links[at].state == LinkState::reconnecting);
+    CHECK(links[at].attempt == 1);
+  }
+  CHECK(lost == 3);
+}
+
 TEST_CASE("one lost answer to a keep-alive or an arming is no reason to reconnect") {
   Workshop shop(busy());
   shop.profile.link.retries = 1;

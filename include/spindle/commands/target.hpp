@@ -32,7 +32,8 @@ struct OpenTool {
   device::Device device;
 };
 
-/// Name, @group or URL to targets. Errors `bad_target` and `unknown_name` with a suggestion.
+/// Name, @group or URL to targets, each once. Errors `bad_target` and `unknown_name` with a
+/// suggestion.
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Context& context);
 

@@ -172,6 +172,10 @@ class Device {
   /// response counts as an answer.
   Result<Duration> ping();
 
+  /// Whether the unit is there, which an open serial port does not say: FC 08, again where no
+  /// answer comes. An exception response counts as an answer.
+  Result<void> require_answer();
+
   /// FC 08 to this unit of a serial line, once; all later requests go to it too. An exception
   /// response counts as an answer.
   Result<Probe> probe(modbus::UnitId unit);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,11 +26,17 @@ struct Tools {
   std::string path;  ///< empty: no file
   std::vector<Tool> tools = {};
   std::map<std::string, std::vector<std::string>> groups = {};
+  /// Why not all of the file is here; only of salvage_tools().
+  std::optional<Error> left_out = std::nullopt;
 };
 
 /// Strict: unknown and duplicate keys, unknown members of groups and torque units are `bad_file`
 /// with file:line:col.
 Result<Tools> load_tools(const std::string& path);
+
+/// The same for who must not be sent away to mend the file first: what can be read of it, with
+/// names that are given twice as often as they are there.
+Tools salvage_tools(const std::string& path);
 
 /// What could be read of a tools file, and everything that load_tools() would refuse in it.
 struct CheckedTools {
