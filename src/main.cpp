@@ -7,17 +7,17 @@
 
 int main(int count, char** arguments) {
   using namespace spindle::posix;
+  if (!hold_standard_descriptors()) return static_cast<int>(spindle::ExitStatus::internal);
   SignalWatch signals;
   SteadyClock clock(signals.interrupt());
-  const spindle::Interrupt calm;
-  SteadyClock calm_clock(calm);
+  CalmTime calm;
   spindle::cli::World world{
       .io = {write_out, write_err, line_reader(clock, signals.interrupt()), is_terminal(Std::in),
              is_terminal(Std::out), is_terminal(Std::err), out_is_open, err_is_ready, err_columns},
       .clock = clock,
       .interrupt = signals.interrupt(),
       .open = line_opener(clock, signals.interrupt()),
-      .calm = {calm_clock, calm, line_opener(calm_clock, calm), [&] { signals.stay_awake(); }},
+      .calm = {calm.clock, calm.interrupt, line_opener(calm), [&] { signals.stay_awake(); }},
       .serve = tool_server(clock, signals.interrupt()),
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,

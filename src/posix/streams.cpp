@@ -1,5 +1,6 @@
 #include "spindle/posix/streams.hpp"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -30,6 +31,16 @@ int write_all(int descriptor, std::string_view text) {
 }
 
 }  // namespace
+
+bool hold_standard_descriptors() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(number, F_GETFD) != -1) continue;
+    // Opened the wrong way round: whoever uses it is told so, as if it were closed still.
+    const int direction = number == STDIN_FILENO ? O_WRONLY : O_RDONLY;
+    if (::open("/dev/null", direction) != number) return false;  // the lowest free one
+  }
+  return true;
+}
 
 Result<void> write_out(std::string_view text) {
   const int failure = write_all(STDOUT_FILENO, text);

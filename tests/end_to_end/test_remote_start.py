@@ -185,6 +185,27 @@ class ResultTest(RemoteStartTest):
         self.assertEqual(finished.stderr, "NG; the tool stands still\n", finished)
 
 
+class ClosedStreamTest(RemoteStartTest):
+    """With a standard stream closed, no socket takes its number and hears what is meant for people."""
+
+    def test_closed_from_the_beginning(self):
+        for closed in ("<&-", ">&-", "2>&-", "<&- >&-", "<&- 2>&-", ">&- 2>&-", "<&- >&- 2>&-"):
+            for command in (["remote-start", *GO[2:], "--for", "200ms"], ["remote-stop"]):
+                with self.subTest(closed, command=command[0]), Station(**SLOW) as station:
+                    words = [support.binary(), *command, station.url, *GO[:2], "--verbose"]
+                    subprocess.run(
+                        ["sh", "-c", f'exec "$@" {closed}', "sh", *words],
+                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
+                        env=support.home().environment(), cwd=support.home().path, timeout=support.DEADLINE,
+                    )
+                    expected = [1, 0] if command[0] == "remote-start" else [0]
+                    support.wait_until(lambda s=station: s.writes(), "it is commanded")
+                    self.assertEqual((station.writes()[0], station.writes()[-1]), (expected[0], 0))
+                    self.assertEqual(station.writes().count(1), expected.count(1))
+                    self.assertEqual((station.own_faults, station.faults_of_client), ([], []))
+                    self.assertFalse(station.tool.running)
+
+
 class EndingTest(RemoteStartTest):
     def test_signals(self):
         # Ctrl-Z too: a suspended program would stop no motor.

@@ -17,4 +17,10 @@ class SteadyClock final : public Clock {
   const Interrupt* interrupt_;
 };
 
+/// A clock whose sleeps nothing ends, for what has to be done after a signal.
+struct CalmTime {
+  const Interrupt interrupt = Interrupt();  ///< never raised
+  SteadyClock clock = SteadyClock(interrupt);
+};
+
 }  // namespace spindle::posix

@@ -12,6 +12,11 @@
 
 namespace spindle::posix {
 
+/// Takes the numbers of those standard streams that are closed, so that no socket or serial line
+/// gets one and hears what is meant for people. False when that can not be done. To be called
+/// before anything is opened.
+bool hold_standard_descriptors();
+
 /// Writes everything to standard output; `closed_pipe` when its reader is gone, `internal` (with
 /// the system's words) on any other failure, such as a full disk. Restarts after signals.
 Result<void> write_out(std::string_view text);

@@ -11,6 +11,7 @@
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/link/endpoint.hpp"
 #include "spindle/link/transport.hpp"
+#include "spindle/posix/clock.hpp"
 #include "spindle/posix/streams.hpp"
 
 namespace spindle::posix {
@@ -19,6 +20,9 @@ namespace spindle::posix {
 std::function<Result<std::unique_ptr<link::Transport>>(
     const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>
 line_opener(Clock& clock, const Interrupt& interrupt);
+
+/// The same for lines that no signal ends.
+inline auto line_opener(CalmTime& calm) { return line_opener(calm.clock, calm.interrupt); }
 
 /// A variable of the environment; empty when it is not set.
 std::optional<std::string> environment(std::string_view name);
