@@ -23,8 +23,22 @@ constexpr Duration farewell_timeout = std::chrono::milliseconds(500);
 /// How many frames are taken at once: a tool that never falls silent must not keep us from others.
 constexpr std::size_t max_taken = 4096;
 
+/// Whether who refused says that it only can not do it now (1.1b3, section 7).
+bool is_busy(std::uint8_t exception) {
+  switch (static_cast<modbus::ExceptionCode>(exception)) {
+    case modbus::ExceptionCode::acknowledge:
+    case modbus::ExceptionCode::server_device_busy:
+    case modbus::ExceptionCode::gateway_path_unavailable:
+    case modbus::ExceptionCode::gateway_target_failed_to_respond:
+      return true;
+    default:
+      return false;
+  }
+}
+
 /// Trouble that may pass by itself, so that trying again makes sense.
 bool may_pass(const Error& error) {
+  if (error.exception && is_busy(*error.exception)) return true;
   switch (error.status()) {
     case ExitStatus::unreachable:
     case ExitStatus::no_answer:

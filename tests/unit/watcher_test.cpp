@@ -405,6 +405,20 @@ TEST_CASE("one lost answer to a keep-alive or an arming is no reason to reconnec
   CHECK(shop.numbers().size() > 20);
 }
 
+TEST_CASE("a tool that is busy for a moment is asked again, and nothing is lost in silence") {
+  Workshop shop(busy());
+  shop.faults = {sim::parse_fault("exception=6@every:7").value()};
+  REQUIRE(shop.watch(120s));
+  std::size_t lost = 0;
+  for (const LinkNews& link : shop.told<LinkNews>()) lost += link.state == LinkState::lost ? 1 : 0;
+  CHECK(lost > 3);
+  std::uint32_t missed = 0;
+  for (const GapNews& gap : shop.told<GapNews>()) missed += gap.missed.value_or(0);
+  const auto numbers = shop.numbers();
+  REQUIRE(numbers.size() > 20);
+  CHECK(numbers.back() - numbers.front() + 1U == numbers.size() + missed);
+}
+
 TEST_CASE("a restarted tool is said, and what stands in its registers is no event") {
   Workshop shop(busy());
   shop.clock.at(shop.clock.now() + 10s, [&] {

@@ -26,6 +26,10 @@ enum class ExceptionCode : std::uint8_t {
   illegal_data_address = 0x02,
   illegal_data_value = 0x03,
   server_device_failure = 0x04,
+  acknowledge = 0x05,
+  server_device_busy = 0x06,
+  gateway_path_unavailable = 0x0A,
+  gateway_target_failed_to_respond = 0x0B,
 };
 
 /// Limits of 1.1b3: a PDU has at most 253 bytes, which gives these register counts (6.1, 6.12).
