@@ -31,6 +31,9 @@ Error busy_error(const std::string& path, int descriptor) {
   if (!holder.empty()) {
     error.message = fmt::format("the serial port is in use by {}", holder);
     error.hint = "close the other program, or wait until it has ended";
+    if (holder.starts_with("spindle ")) {
+      error.hint += "; a 'remote-start' stops its motor on Ctrl-C or 'kill -INT'";
+    }
   }
   return error;
 }
