@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
+#include "group.hpp"
 #include "guarded_run.hpp"
 
 namespace spindle::commands {
@@ -94,7 +97,12 @@ Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& valu
   if (!reading.value) return tl::unexpected(reading.value.error());
   if (*reading.value == value) return {};
   const auto written = tool_->device.write(parameter, *reading.value, value);
-  if (!written) return tl::unexpected(written.error());
+  if (!written) {
+    const bool refused = written.error().code == Errc::exception_response;
+    log_->add(logged(parameter, *reading.value, refused ? *reading.value : value,
+                     refused ? "refused" : "unknown"));
+    return tl::unexpected(written.error());
+  }
   const bool done = written->result == device::WriteResult::written;
   log_->add(logged(parameter, *reading.value, written->now, done ? "written" : "coerced"));
   if (done) return {};
@@ -108,7 +116,13 @@ Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& valu
 
 Result<void> MotorSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
-    if (auto written = write_one(parameter, value); !written) return written;
+    if (auto written = write_one(parameter, value); !written) {
+      if (!is_interruption(written.error())) return written;
+      Error error = std::move(written.error());
+      error.name = parameter.name;
+      error.hint = "whether it was written is not known: read it again";
+      return tl::unexpected(std::move(error));
+    }
     const bool is_stop =
         parameter.name == catalogue::numbered_name(facts().deceleration, plan_->operation);
     if (is_stop) {
@@ -121,7 +135,13 @@ Result<void> MotorSetup::write_settings() {
 
 Result<void> MotorSetup::set_watchdog() {
   const bool is_off = !found_.watchdog || found_.watchdog->number == Decimal(0);
-  if (plan_->watchdog) return write_one(*plan_->watchdog_parameter, *plan_->watchdog);
+  if (plan_->watchdog) {
+    const Parameter& parameter = *plan_->watchdog_parameter;
+    if (found_.watchdog && !(*plan_->watchdog == *found_.watchdog)) {
+      watchdog_write_ = {parameter, *found_.watchdog, *plan_->watchdog};
+    }
+    return write_one(parameter, *plan_->watchdog);
+  }
   if (is_off && plan_->watchdog_parameter) {
     context_->renderer.note(
         fmt::format("{}: {} is off: if this program or the line fails, the motor runs on; with "
@@ -132,18 +152,21 @@ Result<void> MotorSetup::set_watchdog() {
 }
 
 void MotorSetup::restore_watchdog() {
-  const bool changed =
-      plan_->watchdog && found_.watchdog && !(*plan_->watchdog == *found_.watchdog);
-  if (!changed) return;
-  const auto restored =
-      tool_->device.write(*plan_->watchdog_parameter, *plan_->watchdog, *found_.watchdog);
-  const bool done = restored && restored->result == device::WriteResult::written;
-  log_->add(logged(*plan_->watchdog_parameter, *plan_->watchdog, *found_.watchdog,
+  if (!watchdog_write_) return;
+  if (context_->calm.stay_awake) context_->calm.stay_awake();
+  const device::TriedWrite write = *std::exchange(watchdog_write_, std::nullopt);
+  device::Rollback rollback(
+      tool_->device, [this](Duration patience) { return calm_line_.connect(patience); },
+      context_->calm.clock);
+  const auto report = rollback.run({&write, 1}).front();
+  if (report.result == device::PutBack::kept) return;
+  const bool done = report.result == device::PutBack::done;
+  log_->add(logged(write.parameter, report.found.value_or(write.tried), write.before,
                    done ? "written" : "unknown"));
   if (done) return;
-  context_->renderer.note(fmt::format("{}: {} could not be set back to {}", tool_->target.shown,
-                                      plan_->watchdog_parameter->name,
-                                      found_.watchdog->to_string()));
+  context_->renderer.note(fmt::format(
+      "{}: {} could not be set back to {}: {}; the driver stops with an alarm when nobody asks it",
+      tool_->target.shown, write.parameter.name, write.before.to_string(), report.trouble));
 }
 
 }  // namespace spindle::commands

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <optional>
 
+#include "calm_line.hpp"
 #include "change_log.hpp"
 #include "motor_plan.hpp"
+#include "spindle/device/rollback.hpp"
 
 namespace spindle::commands {
 
@@ -13,13 +15,14 @@ class MotorSetup {
  public:
   /// All must outlive it.
   MotorSetup(const MotorPlan& plan, OpenTool& tool, Context& context, ChangeLog& log)
-      : plan_(&plan), tool_(&tool), context_(&context), log_(&log) {}
+      : plan_(&plan), tool_(&tool), context_(&context), log_(&log), calm_line_(tool, context) {}
 
   /// Reads what the run depends on, and checks that the motor may be started; then writes the
   /// operation data and the watchdog. The motor does not turn.
   Result<void> prepare();
 
-  /// Of a motor that stands still.
+  /// Of a motor that stands still, also after prepare() failed. Not ended by an interrupt, and
+  /// reopens a lost link.
   void restore_watchdog();
 
   /// By which the words of the run are chosen.
@@ -54,7 +57,9 @@ class MotorSetup {
   OpenTool* tool_;
   Context* context_;
   ChangeLog* log_;
+  CalmLine calm_line_;
   Found found_ = {};
+  std::optional<device::TriedWrite> watchdog_write_ = std::nullopt;  ///< to be taken back
 };
 
 }  // namespace spindle::commands

@@ -44,7 +44,10 @@ class MotorRun {
         stopper_(plan.motor, options.stop.value_or(catalogue::StopMode::decelerate)) {}
 
   Result<Outcome> run() {
-    if (auto ready = setup_.prepare(); !ready) return tl::unexpected(std::move(ready.error()));
+    if (auto ready = setup_.prepare(); !ready) {
+      setup_.restore_watchdog();
+      return tl::unexpected(std::move(ready.error()));
+    }
     const std::uint16_t word = start_word();
     stopper_.started(word, setup_.input_mode(), setup_.stopping());
     const auto [followed, stop] = guarded_.run(

@@ -223,6 +223,19 @@ class EndingTest(MotorTest):
                 self.assertGreater(finished.seconds, 0.4)
                 self.assert_stopped(bus, finished)
 
+    def test_a_signal_while_the_watchdog_is_set(self):
+        """The motor was not started yet; the driver would stop with an alarm when nobody asks any more."""
+        for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            with self.subTest(number), Bus() as bus:
+                with support.Running(*arguments_of_start(bus.url, "--watchdog", "1s", "--json")) as started:
+                    support.wait_until(lambda: bus.written(TIMEOUT), "the watchdog is set")
+                    started.send_signal(number)
+                    finished = started.finish()
+                self.assertEqual(finished.status, status, finished)
+                self.assertEqual(bus.written(TIMEOUT)[-1], 0, finished)
+                self.assert_stands_still(bus.url)
+                self.assertEqual(self.values(bus.url, "communication.timeout"), {"communication.timeout": 0})
+
     def test_signals(self):
         # Ctrl-Z too: a suspended program would stop no motor.
         endings = ((signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 143), (signal.SIGTSTP, 130))
