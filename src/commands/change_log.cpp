@@ -15,15 +15,15 @@ LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Valu
   return change;
 }
 
+std::string_view result_of_failure(const Error& error) {
+  return error.code == Errc::exception_response ? "refused" : "unknown";
+}
+
 LoggedChange logged(const Deed& deed, const Result<device::ActionResult>& result) {
   LoggedChange change{.name = deed.action.name,
                       .register_address = deed.action.address.value,
                       .new_value = Decimal(deed.value)};
-  if (result) {
-    change.result = std::string(to_text(*result));
-  } else {
-    change.result = result.error().code == Errc::exception_response ? "refused" : "unknown";
-  }
+  change.result = result ? to_text(*result) : result_of_failure(result.error());
   return change;
 }
 

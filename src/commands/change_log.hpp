@@ -22,6 +22,10 @@ struct LoggedChange {
 LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
                     const catalogue::Value& after, std::string_view result);
 
+/// The result of a change that failed: "refused" by the tool, or "unknown" where nobody can say
+/// whether it was made.
+std::string_view result_of_failure(const Error& error);
+
 /// An action as it was sent, and what became of it.
 LoggedChange logged(const Deed& deed, const Result<device::ActionResult>& result);
 

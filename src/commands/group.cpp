@@ -69,4 +69,11 @@ bool is_interruption(const Error& error) {
   return error.code == Errc::interrupted || error.code == Errc::terminated;
 }
 
+Error of_write(const std::string& parameter, Error error) {
+  if (!is_interruption(error)) return error;
+  error.name = parameter;
+  error.hint = "whether it was written is not known: read it again";
+  return error;
+}
+
 }  // namespace spindle::commands

@@ -112,6 +112,9 @@ bool refuses_all(const Error& error);
 
 bool is_interruption(const Error& error);
 
+/// The error of a write; of one that was cut off it also says that its effect is not known.
+Error of_write(const std::string& parameter, Error error);
+
 /// Calls `make_plan(target, context)` side by side and tells what failed. Changes nothing. Error
 /// `interrupted` when a signal ends it.
 template <typename MakePlan>

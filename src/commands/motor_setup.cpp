@@ -98,10 +98,11 @@ Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& valu
   if (*reading.value == value) return {};
   const auto written = tool_->device.write(parameter, *reading.value, value);
   if (!written) {
-    const bool refused = written.error().code == Errc::exception_response;
+    const Error& error = written.error();
+    const bool refused = error.code == Errc::exception_response;
     log_->add(logged(parameter, *reading.value, refused ? *reading.value : value,
-                     refused ? "refused" : "unknown"));
-    return tl::unexpected(written.error());
+                     result_of_failure(error)));
+    return tl::unexpected(error);
   }
   const bool done = written->result == device::WriteResult::written;
   log_->add(logged(parameter, *reading.value, written->now, done ? "written" : "coerced"));
@@ -117,11 +118,7 @@ Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& valu
 Result<void> MotorSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
     if (auto written = write_one(parameter, value); !written) {
-      if (!is_interruption(written.error())) return written;
-      Error error = std::move(written.error());
-      error.name = parameter.name;
-      error.hint = "whether it was written is not known: read it again";
-      return tl::unexpected(std::move(error));
+      return tl::unexpected(of_write(parameter.name, std::move(written.error())));
     }
     const bool is_stop =
         parameter.name == catalogue::numbered_name(facts().deceleration, plan_->operation);

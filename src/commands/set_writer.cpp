@@ -77,15 +77,11 @@ void SetWriter::write_one(const SetStep& step) {
   }
   ++result_.counts.failed;
   if (!written) {
-    Error& error = written.error();
+    const Error& error = written.error();
     const bool refused = error.code == Errc::exception_response;
     if (refused) note(step, Ending::refused, *step.before);
-    log(step, refused ? to_text(Ending::refused) : "unknown", refused ? *step.before : wanted);
-    if (is_interruption(error)) {
-      error.name = step.assignment.parameter.name;
-      error.hint = "whether it was written is not known: read it again";
-    }
-    return fail(error);
+    log(step, result_of_failure(error), refused ? *step.before : wanted);
+    return fail(of_write(step.assignment.parameter.name, error));
   }
   const bool same = written->result == device::WriteResult::mismatch;
   const Ending ending = same ? Ending::mismatch : Ending::coerced;

@@ -123,24 +123,28 @@ Result<Tools> read_tools_file(const std::string& path, Findings& findings) {
   return tools;
 }
 
+/// What is said of a file that has these faults.
+Error refusal_of(const Findings& findings) {
+  Error error = findings.error();
+  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
+  return error;
+}
+
 }  // namespace
 
 Result<Tools> load_tools(const std::string& path) {
   Findings findings;
   auto tools = read_tools_file(path, findings);
   if (!tools || findings.empty()) return tools;
-  Error error = findings.error();
-  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
-  return tl::unexpected(std::move(error));
+  return tl::unexpected(refusal_of(findings));
 }
 
 Tools salvage_tools(const std::string& path) {
-  auto loaded = load_tools(path);
-  if (loaded) return std::move(*loaded);
-  auto checked = check_tools(path);
-  Tools tools = checked ? std::move(checked->tools) : Tools{.path = path};
-  tools.left_out = std::move(loaded.error());
-  return tools;
+  Findings findings;
+  auto tools = read_tools_file(path, findings);
+  if (!tools) return {.path = path, .left_out = std::move(tools.error())};
+  if (!findings.empty()) tools->left_out = refusal_of(findings);
+  return std::move(*tools);
 }
 
 Result<CheckedTools> check_tools(const std::string& path) {
