@@ -26,6 +26,8 @@ SECONDS = 30 if LONG else 8
 PROFILE = ("--profile", "doga-bm")
 JSON = (*PROFILE, "--json")
 KEEP_ALIVE, ARM_EXPIRES = 1.0, 10.0
+NOT_DELAYED = 1.0  # seconds until an event is told, at least of every other one on a busy machine
+QUICK = 0.75  # seconds that an end may take, farewell included; the quickest of several on a busy machine
 
 
 def tearDownModule():
@@ -214,7 +216,8 @@ class WireTest(unittest.TestCase):
 
 class EndingTest(unittest.TestCase):
     def test_signals(self):
-        for number, expected in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        ends = []
+        for number, expected in ((signal.SIGTERM, 143), (signal.SIGINT, 130)) * 2:
             with self.subTest(number), EventServer() as server:
                 with Watching(server.url, *JSON) as watching:
                     support.wait_until(lambda: server.armed, "the watch arms the output")
@@ -223,12 +226,14 @@ class EndingTest(unittest.TestCase):
                     status, seconds, stderr = watching.end(number)
                 self.assertEqual((status, stderr), (expected, ""))
                 self.assertLess(seconds, support.SOON)
+                ends.append(seconds)
                 summary = watching.records()[-1]
                 self.assertEqual(
                     (summary["type"], summary["events"], summary["exit_status"]),
                     ("summary", 1, expected),
                 )
                 assert_disarmed(server)
+        self.assertLess(min(ends), QUICK, ends)
 
     def test_signal_while_reconnecting(self):
         with support.refusing_port() as url, Watching(url, *JSON) as watching:
@@ -441,11 +446,14 @@ class ReconnectingTest(unittest.TestCase):
             with self.subTest(known), EventServer() as server, support.full_backlog() as (dead, _):
                 with Watching(dead, server.url, *known, "--json", "--connect-timeout", "60s") as watching:
                     support.wait_until(lambda: server.armed, "the other one is watched")
+                    delays = []
                     for count in range(1, 21):
                         sent = time.monotonic()
                         server.event()
                         support.wait_until(lambda: len(watching.numbers()) == count, "it is told")
-                        self.assertLess(time.monotonic() - sent, support.SOON)
+                        delays.append(time.monotonic() - sent)
+                        self.assertLess(delays[-1], support.SOON)
+                    self.assertLess(sorted(delays)[len(delays) // 2], NOT_DELAYED, delays)
                     status, seconds, _ = watching.end()
                 self.assertEqual(status, 143)
                 self.assertLess(seconds, support.SOON)
