@@ -330,6 +330,7 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
     read_operation(*part, run, need, findings);
   }
   assign(run.watchdog, map.text("watchdog"));
+  assign(run.still_runs, map.text("still-runs"));
   map.finish();
 }
 

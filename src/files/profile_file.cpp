@@ -102,6 +102,9 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
                                                  need_of(draft.link.entry != nullptr)));
   assign(link.port, map.number<std::uint16_t>("port"));
   assign(link.unit, map.number<std::uint8_t>("unit"));
+  if (const auto units = map.range("units", last_byte)) {
+    link.units = {static_cast<std::uint8_t>(units->from), static_cast<std::uint8_t>(units->to)};
+  }
   map.word<bool>("transaction", "transaction", transaction_words);
   assign(link.max_read, map.number<std::uint16_t>("max-read"));
   assign(link.max_write, map.number<std::uint16_t>("max-write"));

@@ -326,6 +326,17 @@ void link_is_usable(const ProfileDraft& draft, Findings& findings) {
   };
   check("max-read", link.max_read, modbus::max_read_count);
   check("max-write", link.max_write, modbus::max_write_count);
+  if (!link.units) return;
+  // 0 is everybody, and 248 to 255 are reserved on a serial line.
+  constexpr unsigned highest_unit = 247;
+  if (link.units->first == 0 || link.units->last > highest_unit) {
+    findings.add_once(draft.link.of("units"),
+                      fmt::format("units must be a range from 1 to {}", highest_unit));
+  } else if (!link.units->contains({link.unit})) {
+    findings.add_once(draft.link.of("unit"),
+                      fmt::format("unit {} is none of the units {} to {}", link.unit,
+                                  link.units->first, link.units->last));
+  }
 }
 
 void identity_slices_fit(const ProfileDraft& draft, Findings& findings) {

@@ -100,9 +100,80 @@ TEST_CASE("blv: what cannot be known stays unknown") {
     CHECK_FALSE(profile.find(name)->default_value);
   }
   CHECK(profile.find("operation.0.torque-limit")->default_value == Decimal(200));
-  CHECK(profile.find("operation.2.speed")->evidence == catalogue::Evidence::sibling);
-  CHECK(profile.find("communication.parity")->evidence == catalogue::Evidence::sibling);
+  CHECK_FALSE(profile.find("motor.speed-increasing-ratio")->default_value);
+  CHECK_FALSE(profile.find("io.net-in.6")->default_value);
   CHECK_FALSE(profile.identity);
+}
+
+TEST_CASE("blv: every fact has the evidence that it was found with") {
+  using catalogue::Evidence;
+  const Profile profile = blv();
+  const std::pair<const char*, Evidence> expected[] = {
+      {"operation.2.speed", Evidence::transcribed},
+      {"operation.2.acceleration-time", Evidence::transcribed},
+      {"operation.2.torque-limit", Evidence::transcribed},
+      {"motor.rotation-direction", Evidence::transcribed},
+      {"motor.analog-input", Evidence::transcribed},
+      {"motor.speed-increasing-ratio", Evidence::manual},
+      {"communication.parity", Evidence::transcribed},
+      {"communication.stop-bits", Evidence::transcribed},
+      {"communication.error-limit", Evidence::transcribed},
+      {"protection.undervoltage-warning", Evidence::manual},
+      {"protection.power-on-prevention", Evidence::inferred},
+      {"protection.overload-warning", Evidence::inferred},
+      {"io.net-in.6", Evidence::sibling},
+      {"io.net-in.7", Evidence::manual},
+      {"io.net-in.8", Evidence::manual},
+      {"io.net-in.9", Evidence::sibling},
+      {"io.net-out.7", Evidence::manual},
+      {"io.net-out.8", Evidence::sibling},
+  };
+  for (const auto& [name, evidence] : expected) {
+    CAPTURE(name);
+    CHECK(profile.find(name)->evidence == evidence);
+  }
+  CHECK(profile.find_action("initialize")->evidence == Evidence::sibling);
+}
+
+TEST_CASE("blv: initial values and limits that the manual and its readers show") {
+  const Profile profile = blv();
+  const auto start = [&](const char* name) { return profile.find(name)->default_value; };
+  CHECK(start("io.net-in.7") == Decimal(20));
+  CHECK(start("io.net-in.8") == Decimal(0));
+  CHECK(start("io.net-out.7") == Decimal(65));
+  CHECK(start("motor.analog-input") == Decimal(0));
+  CHECK(address_of(profile, "io.net-in.0") == 0x1160);
+  CHECK(address_of(profile, "io.net-in.15") == 0x117E);
+  CHECK(address_of(profile, "io.net-out.0") == 0x1180);
+  CHECK(address_of(profile, "io.net-out.15") == 0x119E);
+  const auto takes = [&](const char* name, const char* text) {
+    return catalogue::parse_value(profile.find(name).value(), text).has_value();
+  };
+  for (const char* mode : {"0", "1", "2", "3", "4", "5", "digital"}) {
+    CHECK(takes("motor.analog-input", mode));
+  }
+  CHECK_FALSE(takes("motor.analog-input", "6"));
+  CHECK(takes("command.driver-input", "0x8000"));
+  CHECK_FALSE(takes("command.driver-input", "65536"));
+  CHECK(takes("communication.error-limit", "0"));
+  CHECK_FALSE(takes("communication.error-limit", "11"));
+  REQUIRE(profile.link.units);
+  CHECK(profile.link.units->contains({31}));
+  CHECK_FALSE(profile.link.units->contains({32}));
+}
+
+TEST_CASE("blv: what a user has to know stands beside the entry") {
+  const Profile profile = blv();
+  const auto note = [&](const char* name) { return profile.find(name)->note; };
+  CHECK(note("operation.0.speed").find("took it as 0") != std::string::npos);
+  CHECK(note("status.driver-output").find("bit 7 is on in an alarm") != std::string::npos);
+  CHECK(profile.find_action("configure")->note.find("up to 1 s") != std::string::npos);
+  CHECK(profile.find_action("initialize")->title.find("waiting time") != std::string::npos);
+  CHECK(profile.run->still_runs.find("CN4") != std::string::npos);
+  const auto tables = shipped().load_code_tables("orientalmotor-blv");
+  REQUIRE(tables);
+  CHECK(tables->error.at(0x46).remedy ==
+        "switch the run inputs off, then switch the main supply off and on");
 }
 
 // Protocol notes, sections 2.1 and 5.

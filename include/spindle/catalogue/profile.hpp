@@ -40,11 +40,22 @@ struct SerialFacts {
   Duration broadcast_pause = {};  ///< on top of the gap
 };
 
+/// Unit identifiers, both inclusive.
+struct UnitRange {
+  std::uint8_t first = 1;
+  std::uint8_t last = 1;
+  [[nodiscard]] bool contains(modbus::UnitId unit) const {
+    return unit.value >= first && unit.value <= last;
+  }
+};
+
 /// How to talk to this product. Values come from the profile, each with its evidence there.
 struct LinkFacts {
   modbus::Framing framing = modbus::Framing::tcp;
   std::uint16_t port = 502;
   std::uint8_t unit = 0;
+  /// Those that the product can have; another one is asked all the same. Empty: not known.
+  std::optional<UnitRange> units = std::nullopt;
   std::uint16_t max_read = 125;
   std::uint16_t max_write = 1;  ///< registers per write; 1: only FC 06
   Duration keep_alive = {};     ///< zero: none needed

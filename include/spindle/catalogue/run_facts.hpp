@@ -58,6 +58,8 @@ struct RunFacts {
   std::string alarm = {};           ///< present alarm; 0: none
   std::string warning = {};         ///< present warning; may be empty
   std::string watchdog = {};        ///< time without a query after which the driver stops; 0: never
+  /// What to look at when a stop is not confirmed, as one sentence; may be empty.
+  std::string still_runs = {};
   Evidence evidence = Evidence::inferred;
   std::string source = {};
 
