@@ -2,6 +2,10 @@
 
 Everything that is started here is stopped here, by its own pid. Ports are chosen by the system, and
 every wait is for a condition and has a deadline.
+
+No test judges by bare seconds: a busy machine would break it. Upper limits are seconds of `paced()`, a
+clock that goes as slowly as the machine is busy; `Finished.paced` is how long a run took by it. Real
+seconds (`Finished.seconds`) are for lower limits only: nothing ever makes a pause shorter.
 """
 
 import contextlib
@@ -13,7 +17,6 @@ import os
 import pathlib
 import pty
 import select
-import selectors
 import shutil
 import signal
 import socket
@@ -26,7 +29,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEADLINE = 20.0  # for what must happen at all; never waited out when things go well
-SOON = 6.0  # for what takes milliseconds where a wrong way takes ten seconds and more: a busy machine has time
+SOON = 6.0  # for what takes milliseconds where a wrong way takes ten seconds and more
 POLL = 0.001
 
 READ_HOLDING, READ_INPUT, WRITE_SINGLE, REPORT_SERVER_ID = 0x03, 0x04, 0x06, 0x11
@@ -39,25 +42,124 @@ def binary():
     return os.path.abspath(path)
 
 
+def sanitizer_options():
+    return {name: os.environ[name] for name in os.environ if name.endswith("SAN_OPTIONS")}
+
+
+class PacedClock:
+    """Seconds that are as long as the machine makes them.
+
+    A thread sleeps for a little while and then lets spindle say its version, again and again; the clock
+    goes on by what was slept, once both are done. On an idle machine that is a little less than real time.
+    Where a process has to wait before it may run, the clock waits as well: its second lasts as long as the
+    same machine needs for the same work beside the test. It is never ahead of real time.
+    """
+
+    SLEEP = 0.02  # seconds between two pieces of work
+    SHARE = 5  # the work takes one part in so many of a processor, or less
+
+    def __init__(self):
+        self._seconds = 0.0
+        self._thread = threading.Thread(target=self._go, daemon=True)
+        self._thread.start()
+
+    def seconds(self):
+        if not self._thread.is_alive():
+            raise AssertionError("the paced clock stands still")
+        return self._seconds
+
+    def _go(self):
+        pause, pause_for = threading.Event(), self.SLEEP
+        while True:
+            pause.wait(pause_for)
+            used = self._work()
+            self._seconds += pause_for
+            pause_for = max(self.SLEEP, used * (self.SHARE - 1))
+
+    @staticmethod
+    def _work():
+        """The known piece of work; returns the seconds of a processor that it took."""
+        silent = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1, 2)]
+        program, environment = binary(), sanitizer_options() | {"PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8"}
+        pid = os.posix_spawn(program, [program, "--version"], environment, file_actions=silent)
+        _, status, used = os.wait4(pid, 0)
+        if status != 0:
+            raise AssertionError(f"spindle --version ended with {os.waitstatus_to_exitcode(status)}")
+        return used.ru_utime + used.ru_stime
+
+
+_clock = None
+
+
+def paced():
+    """Seconds of the paced clock, which begins to go when it is first asked. For every upper limit."""
+    global _clock
+    if _clock is None:
+        _clock = PacedClock()
+    return _clock.seconds()
+
+
 def wait_until(condition, what, deadline=DEADLINE):
-    """Returns the first true value of the condition."""
-    end = time.monotonic() + deadline
+    """Returns the first true value of the condition. The deadline is in seconds of the paced clock."""
+    end = paced() + deadline
     pause = threading.Event()
     while True:
         value = condition()
         if value:
             return value
-        if time.monotonic() > end:
+        if paced() > end:
             raise AssertionError(f"waited {deadline:g} s in vain: {what}")
         pause.wait(POLL)
 
 
+def wait_for_end(process, deadline=DEADLINE):
+    """The status with which a process ends; the deadline is in seconds of the paced clock."""
+    end = paced() + deadline
+    while True:
+        try:
+            return process.wait(max(POLL, end - paced()))
+        except subprocess.TimeoutExpired:
+            if paced() >= end:
+                raise
+
+
+def completed(command, deadline=DEADLINE, capture_output=False, check=False, **how):
+    """As subprocess.run: any program, run to its end. The deadline is in seconds of the paced clock."""
+    if capture_output:
+        how |= {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    end = paced() + deadline
+    with subprocess.Popen(command, **how) as process:
+        try:
+            while True:
+                try:
+                    stdout, stderr = process.communicate(timeout=max(POLL, end - paced()))
+                    break
+                except subprocess.TimeoutExpired:
+                    if paced() >= end:
+                        raise
+        except BaseException:
+            process.kill()
+            raise
+    if check and process.returncode:
+        raise AssertionError(f"{command} ended with {process.returncode}")
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def is_readable(descriptor, deadline=DEADLINE):
+    """Waits until there is something to read, or the end of it; false when the deadline came first."""
+    end = paced() + deadline
+    while not select.select([descriptor], [], [], max(POLL, end - paced()))[0]:
+        if paced() >= end:
+            return False
+    return True
+
+
 def quickest(attempt, limit, attempts=5):
-    """What the first attempt returns that takes less than `limit` seconds. A machine that has more to do
-    slows one attempt or another; a program that is too slow is so in all of them."""
+    """What the first attempt returns that takes less than `limit` seconds of the paced clock. A machine that
+    has more to do slows one attempt or another; a program that is too slow is so in all of them."""
     for _ in range(attempts):
         finished = attempt()
-        if finished.seconds < limit:
+        if finished.paced < limit:
             return finished
     raise AssertionError(f"{attempts} attempts took {limit:g} s or more each, the last: {finished}")
 
@@ -81,14 +183,13 @@ class Home:
         self.path = pathlib.Path(tempfile.mkdtemp(prefix="spindle-end-to-end-"))
 
     def environment(self, **extra):
-        kept = {name: os.environ[name] for name in os.environ if name.endswith("SAN_OPTIONS")}
         own = {
             "HOME": str(self.path),
             "PATH": "/usr/bin:/bin",
             "LC_ALL": "C.UTF-8",
             "SPINDLE_PROFILE_PATH": str(ROOT / "profiles"),
         }
-        return {**kept, **own, **extra}
+        return {**sanitizer_options(), **own, **extra}
 
     def remove(self):
         shutil.rmtree(self.path, ignore_errors=True)
@@ -130,7 +231,8 @@ class Finished:
     status: int
     stdout: str
     stderr: str
-    seconds: float
+    seconds: float  # of real time: for lower limits
+    paced: float  # seconds of the paced clock: for upper limits
 
     def records(self, kind=None):
         """All of standard output as JSON lines, or those of one type."""
@@ -141,7 +243,7 @@ class Finished:
 
     def __str__(self):
         return (
-            f"spindle {' '.join(self.arguments)}\n  status {self.status} after {self.seconds:.3f} s\n"
+            f"spindle {' '.join(self.arguments)}\n  status {self.status} after {self.seconds:.3f} s, paced {self.paced:.3f} s\n"
             f"  stdout: {self.stdout[-2000:]!r}\n  stderr: {self.stderr[-1000:]!r}"
         )
 
@@ -151,7 +253,7 @@ class Running:
 
     def __init__(self, *arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, environment=None):
         self.arguments = [str(argument) for argument in arguments]
-        self._began = time.monotonic()
+        self._mark()
         self.process = subprocess.Popen(
             [binary(), *self.arguments],
             stdin=stdin,
@@ -177,51 +279,60 @@ class Running:
     def pid(self):
         return self.process.pid
 
+    def _mark(self):
+        """What it took is counted from here."""
+        self._began, self._began_paced = time.monotonic(), paced()
+
     def line(self, deadline=DEADLINE):
         """The next line of standard output, without its end."""
-        end = time.monotonic() + deadline
-        with selectors.DefaultSelector() as selector:
-            selector.register(self.process.stdout, selectors.EVENT_READ)
-            while b"\n" not in self._unread:
-                if not selector.select(max(0.0, end - time.monotonic())):
-                    raise AssertionError(f"no line from spindle {' '.join(self.arguments)}")
-                chunk = os.read(self.process.stdout.fileno(), 65536)
-                if not chunk:
-                    raise AssertionError(
-                        f"spindle {' '.join(self.arguments)} ended: {self.process.stderr.read()!r}"
-                    )
-                self._unread += chunk
+        end = paced() + deadline
+        while b"\n" not in self._unread:
+            if not is_readable(self.process.stdout, end - paced()):
+                raise AssertionError(f"no line from spindle {' '.join(self.arguments)}")
+            chunk = os.read(self.process.stdout.fileno(), 65536)
+            if not chunk:
+                raise AssertionError(f"spindle {' '.join(self.arguments)} ended: {self.process.stderr.read()!r}")
+            self._unread += chunk
         line, self._unread = self._unread.split(b"\n", 1)
         return line.decode()
 
     def send_signal(self, number):
-        self._began = time.monotonic()
+        self._mark()
         self.process.send_signal(number)
 
     def finish(self, timeout=DEADLINE):
         """Waits for the end; the seconds count from the start or from the last signal."""
-        timer = threading.Timer(timeout, self.process.kill)
-        timer.start()
+        over = threading.Event()
+        killer = threading.Thread(target=self._kill_after, args=(paced() + timeout, over), daemon=True)
+        killer.start()
         try:
             os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)
-            seconds = time.monotonic() - self._began
+            seconds, own_seconds = time.monotonic() - self._began, paced() - self._began_paced
             stdout, stderr = self.process.communicate()
         finally:
-            timer.cancel()
+            over.set()
+            killer.join()
         return Finished(
             self.arguments,
             self.process.returncode,
             (self._unread + (stdout or b"")).decode(),
             stderr.decode(),
             seconds,
+            own_seconds,
         )
+
+    def _kill_after(self, end, over):
+        while not over.wait(max(POLL, end - paced())):
+            if paced() >= end:
+                self.process.kill()
+                return
 
 
 def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None):
     """Runs spindle to its end. Output is taken through files, so that nothing can block."""
     arguments = [str(argument) for argument in arguments]
     with tempfile.TemporaryFile() as stdout, tempfile.TemporaryFile() as stderr:
-        began = time.monotonic()
+        began, began_paced = time.monotonic(), paced()
         process = subprocess.Popen(
             [binary(), *arguments],
             stdin=stdin,
@@ -231,17 +342,17 @@ def run(*arguments, stdin=subprocess.DEVNULL, timeout=DEADLINE, environment=None
             env=home().environment(**(environment or {})),
         )
         try:
-            status = process.wait(timeout)
+            status = wait_for_end(process, timeout)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
             status = None
-        seconds = time.monotonic() - began
+        seconds, own_seconds = time.monotonic() - began, paced() - began_paced
         texts = []
         for stream in (stdout, stderr):
             stream.seek(0)
             texts.append(stream.read().decode("utf-8", "backslashreplace"))
-    return Finished(arguments, status, *texts, seconds)
+    return Finished(arguments, status, *texts, seconds, own_seconds)
 
 
 def talk_on_terminal(arguments, hear, columns, environment):
@@ -255,7 +366,7 @@ def talk_on_terminal(arguments, hear, columns, environment):
         os.execve(program, [program, *arguments], environment)
     shown = b""
     with contextlib.suppress(OSError):  # the end of the terminal
-        while select.select([terminal], [], [], DEADLINE)[0]:
+        while is_readable(terminal):
             shown += os.read(terminal, 65536)
             if typed := hear(shown):
                 os.write(terminal, typed)
@@ -268,9 +379,9 @@ def talk_on_terminal(arguments, hear, columns, environment):
 def run_on_terminal(*arguments, columns=120, environment=None):
     """Runs spindle on a terminal of its own to its end; standard output is all that the terminal got."""
     arguments = [str(argument) for argument in arguments]
-    began = time.monotonic()
+    began, began_paced = time.monotonic(), paced()
     shown, status = talk_on_terminal(arguments, lambda _: b"", columns, {"TERM": "xterm", **(environment or {})})
-    return Finished(arguments, status, shown, "", time.monotonic() - began)
+    return Finished(arguments, status, shown, "", time.monotonic() - began, paced() - began_paced)
 
 
 def ask_on_terminal(arguments, question, answer, meanwhile=lambda: None):

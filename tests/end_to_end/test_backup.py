@@ -33,7 +33,7 @@ def limited(limit, value, *arguments):
             env=support.home().environment(),
             preexec_fn=lambda: resource.setrlimit(limit, (value, value)),
         )
-        status = process.wait(support.DEADLINE)
+        status = support.wait_for_end(process)
         stderr.seek(0)
         return status, stderr.read().decode()
 
@@ -71,10 +71,10 @@ class RoundTripTest(BackupTest):
         if mbpoll is None:
             self.skipTest("mbpoll is not installed")
         for register, value in values.items():
-            subprocess.run(
+            support.completed(
                 [mbpoll, "-m", "tcp", "-p", str(port), "-0", "-1", "-q", "-t", "4",
                  "-r", str(register), host, str(value)],
-                check=True, stdout=subprocess.DEVNULL, timeout=support.DEADLINE,
+                check=True, stdout=subprocess.DEVNULL,
             )
 
     def test_forty_changes(self):
@@ -258,11 +258,11 @@ class HostileFileTest(BackupTest):
             with self.subTest(name):
                 path = self.path("hostile.yaml")
                 pathlib.Path(path).write_bytes(text)
-                finished = support.run("restore", self.server.url, path, *PROFILE, "--yes", timeout=10)
+                finished = support.run("restore", self.server.url, path, *PROFILE, "--yes")
                 self.assertEqual(finished.status, 3, (name, finished))
                 self.assertEqual(finished.stdout, "", name)
                 self.assertRegex(finished.stderr, r"\Aspindle: [^\n]*hostile\.yaml:\d+:\d+: [^\n]+\n\Z", name)
-                self.assertLess(finished.seconds, 5, name)
+                self.assertLess(finished.paced, 5, name)
                 if "asan" in support.binary():
                     continue  # the sanitizer maps terabytes
                 status, stderr = limited(resource.RLIMIT_AS, MEMORY, "diff", path, path)

@@ -132,13 +132,12 @@ class CompletionTest(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def run_shell(self, *arguments):
-        return subprocess.run(
+        return support.completed(
             arguments,
             cwd=self.folder,
             env=self.environment,
             capture_output=True,
             text=True,
-            timeout=support.DEADLINE,
             check=True,
         ).stdout.splitlines()
 

@@ -33,8 +33,8 @@ class SignalTest(unittest.TestCase):
 
     def assert_ended(self, finished, status):
         self.assertEqual(finished.status, status, finished)
-        self.assertLess(finished.seconds, support.SOON, finished)
-        self.ends[self._testMethodName].append(finished.seconds)
+        self.assertLess(finished.paced, support.SOON, finished)
+        self.ends[self._testMethodName].append(finished.paced)
 
     def interrupt(self, number, status, waits_until, *arguments):
         with support.Running(*arguments, "--json") as running:
@@ -236,10 +236,10 @@ class StreamTest(unittest.TestCase):
     def closed(self, descriptors, *arguments):
         """Runs with descriptors closed, as a daemon's parent may leave them."""
         script = 'exec "$0" "$@" ' + " ".join(f"{number}>&-" for number in descriptors)
-        return subprocess.run(
+        return support.completed(
             ["/bin/sh", "-c", script, support.binary(), *arguments],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=support.DEADLINE,
-            env=support.home().environment(), cwd=support.home().path, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=support.home().environment(), cwd=support.home().path,
         )
 
     def test_closed_standard_input(self):

@@ -97,7 +97,7 @@ class Judge:
         allowed = row.get("waits", 2) * row.get("timeout_ms", TIMEOUT_MS) / 1000 + support.SOON
         if row.get("accept") == "full":
             allowed = CONNECT_TIMEOUT + support.SOON
-        self.demand(finished.seconds <= allowed, f"{finished.seconds:.2f} s, allowed {allowed:.2f} s")
+        self.demand(finished.paced <= allowed, f"{finished.paced:.2f} s, allowed {allowed:.2f} s")
         said = [line for line in finished.stderr.split("\n") if line.startswith("spindle: ")]
         if finished.status == 0:
             self.demand(not said, f"success with an error sentence {said}")

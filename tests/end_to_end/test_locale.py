@@ -55,7 +55,7 @@ class LocaleTest(unittest.TestCase):
             return
         for name in ("de_DE", "fr_FR", "de_CH"):
             command = ["localedef", "-i", name, "-f", "UTF-8", cls.folder / f"{name}.UTF-8"]
-            subprocess.run(command, check=False, capture_output=True, timeout=support.DEADLINE)
+            support.completed(command, capture_output=True)
 
     @classmethod
     def tearDownClass(cls):
@@ -65,9 +65,9 @@ class LocaleTest(unittest.TestCase):
         """Environment and decimal sign of every locale that the C library really knows here."""
         for name in ("de_DE.UTF-8", "fr_FR.UTF-8", "de_CH.UTF-8"):
             environment = {"LC_ALL": name, "LANG": name, "LOCPATH": str(self.folder)}
-            asked = subprocess.run(
-                ["locale", "-k", "decimal_point", "thousands_sep"], capture_output=True, text=True, check=False,
-                env={"PATH": "/usr/bin:/bin", **environment}, timeout=support.DEADLINE,
+            asked = support.completed(
+                ["locale", "-k", "decimal_point", "thousands_sep"], capture_output=True, text=True,
+                env={"PATH": "/usr/bin:/bin", **environment},
             )  # fmt: skip
             if (self.folder / name).is_dir() and "Cannot set" not in asked.stderr:
                 yield environment, asked.stdout

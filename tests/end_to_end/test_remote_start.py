@@ -200,10 +200,10 @@ class ClosedStreamTest(RemoteStartTest):
             for command in (["remote-start", *GO[2:], "--for", "200ms"], ["remote-stop"]):
                 with self.subTest(closed, command=command[0]), Station(**SLOW) as station:
                     words = [support.binary(), *command, station.url, *GO[:2], "--verbose"]
-                    subprocess.run(
+                    support.completed(
                         ["sh", "-c", f'exec "$@" {closed}', "sh", *words],
-                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
-                        env=support.home().environment(), cwd=support.home().path, timeout=support.DEADLINE,
+                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                        env=support.home().environment(), cwd=support.home().path,
                     )
                     expected = [1, 0] if command[0] == "remote-start" else [0]
                     support.wait_until(lambda s=station: s.writes(), "it is commanded")
@@ -231,8 +231,8 @@ class EndingTest(RemoteStartTest):
                         run.send_signal(number)
                         finished = run.finish()
                     self.assertEqual(finished.status, status, finished)
-                    self.assertLess(finished.seconds, support.SOON, finished)
-                    seconds.append(finished.seconds)
+                    self.assertLess(finished.paced, support.SOON, finished)
+                    seconds.append(finished.paced)
                     self.assert_stopped(station, finished)
         self.assertLess(min(seconds), PROMPT + 0.5, seconds)
 
@@ -268,7 +268,7 @@ class EndingTest(RemoteStartTest):
             stack.callback(process.wait)
             stack.callback(process.kill)
             os.close(writing)
-            support.wait_until(lambda: 0 in station.writes(), "the tool is stopped after the time allowed", 8)
+            support.wait_until(lambda: 0 in station.writes(), "the tool is stopped after the time allowed")
             support.wait_until(lambda: not station.tool.running, "the tool stands still")
 
     def test_a_second_signal_ends_at_once(self):
@@ -282,7 +282,7 @@ class EndingTest(RemoteStartTest):
                 run.send_signal(signal.SIGINT)
                 finished = run.finish()
             self.assertEqual(finished.status, 130, finished)
-            self.assertLess(finished.seconds, support.SOON, finished)
+            self.assertLess(finished.paced, support.SOON, finished)
             self.assertEqual(station.writes().count(1), 1)
 
     def test_a_reader_that_was_never_there(self):
@@ -359,7 +359,7 @@ class EndingTest(RemoteStartTest):
             self.assertRegex(one.stderr, r"THE TOOL MAY STILL RUN: the stop was tried for \d+ s \(\d+ times\)")
             self.assertIn("stop it at the tool", one.stderr)
             self.assertGreater(one.seconds, PATIENCE - 1)
-            self.assertLess(one.seconds, PATIENCE + support.SOON)
+            self.assertLess(one.paced, PATIENCE + support.SOON)
         self.assertIn("still says that it runs", finished[1].stderr)
         errors = finished[0].records("error")
         self.assertIn("THE TOOL MAY STILL RUN", errors[-1]["message"])
@@ -502,7 +502,7 @@ class RemoteStopTest(RemoteStartTest):
             )
             support.wait_until(somebody_waits, "a connection is tried")
             for station in stations:
-                support.wait_until(lambda s=station: s.writes() == [0], "the others are stopped", 5)
+                support.wait_until(lambda s=station: s.writes() == [0], "the others are stopped")
             self.assertIsNone(run.process.poll())
             finished = run.finish()
         self.assertEqual(finished.status, 9, finished)

@@ -51,12 +51,12 @@ class Bus:
 
     def kill(self):
         self.process.kill()
-        self.process.wait(support.DEADLINE)
+        support.wait_for_end(self.process)
 
     def finish(self):
         if self.process.poll() is None:
             self.process.terminate()
-            self.process.wait(support.DEADLINE)
+            support.wait_for_end(self.process)
         self.process.stdout.close()
 
     def heard(self):
@@ -160,7 +160,7 @@ class PortTest(unittest.TestCase):
                 self.assertEqual(second.status, 4, second)
                 self.assertRegex(second.stderr, rf"in use by spindle \(process {holder.process.pid}\)")
                 holder.process.send_signal(signal.SIGINT)
-                self.assertEqual(holder.process.wait(support.DEADLINE), 130)
+                self.assertEqual(support.wait_for_end(holder.process), 130)
             free = run("ping", f"{bus.url}?unit=1", "-c", "1")
             self.assertEqual(free.status, 0, free)
 
@@ -183,7 +183,7 @@ class PortTest(unittest.TestCase):
                 finished = waiting.finish()
             self.assertEqual(finished.status, 5, finished)
             self.assertIn("the serial port is gone", finished.stderr)
-            self.assertLess(finished.seconds, support.SOON)
+            self.assertLess(finished.paced, support.SOON)
 
     def test_ctrl_c_ends_a_wait_at_once(self):
         with Bus("--fault", "lost") as bus:
@@ -191,10 +191,10 @@ class PortTest(unittest.TestCase):
                                  "20s") as waiting:
                 support.wait_until(lambda: bus.is_open_in(waiting.pid), "the port is open")
                 time.sleep(0.3)
-                began = time.monotonic()
+                began = support.paced()
                 waiting.process.send_signal(signal.SIGINT)
-                self.assertEqual(waiting.process.wait(support.DEADLINE), 130)
-                self.assertLess(time.monotonic() - began, support.SOON)
+                self.assertEqual(support.wait_for_end(waiting.process), 130)
+                self.assertLess(support.paced() - began, support.SOON)
 
     def test_a_killed_client_leaves_a_line_that_the_next_can_open(self):
         with Bus() as bus:
@@ -203,7 +203,7 @@ class PortTest(unittest.TestCase):
                                      "--json") as killed:
                     support.wait_until(lambda: killed.line(), "the first record of watch")
                     killed.process.kill()
-                    killed.process.wait(support.DEADLINE)
+                    support.wait_for_end(killed.process)
                 finished = run("get", f"{bus.url}?unit=1", "@holding:7")
                 self.assertEqual(finished.status, 0, finished)
 
@@ -268,7 +268,7 @@ class PortTest(unittest.TestCase):
                 watched = watching.finish()
             self.assertEqual(watched.status, 130, watched)
             self.assertEqual(watched.records()[-1]["type"], "summary", watched)
-            self.assertLess(watched.seconds, support.SOON, watched)
+            self.assertLess(watched.paced, support.SOON, watched)
 
 
 class GapTest(unittest.TestCase):
@@ -278,9 +278,9 @@ class GapTest(unittest.TestCase):
 
     def judge(self, baud, gap):
         with Bus("--baud", baud, "--gap", round(gap * 1e6), "--delay", 1000) as bus:
-            mixed = subprocess.run(
+            mixed = support.completed(
                 [str(MIX), str(bus.path), str(baud), str(round(gap * 1e6)), str(self.COUNT)],
-                capture_output=True, text=True, timeout=200, check=False)
+                deadline=10 * support.DEADLINE, capture_output=True, text=True)
             bus.finish()
             self.assertEqual(mixed.stdout.strip(), f"{self.COUNT} answered", f"{baud} baud")
             self.assertEqual(bus.bad_frames(), 0)

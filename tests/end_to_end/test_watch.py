@@ -10,7 +10,6 @@ import itertools
 import math
 import os
 import pty
-import select
 import signal
 import threading
 import time
@@ -63,12 +62,12 @@ class Watching(support.Running):
         return [record["number"] for record in self.records("event")]
 
     def end(self, number=signal.SIGTERM):
-        """Sends the signal; returns status, seconds and what was said on stderr."""
-        began = time.monotonic()
+        """Sends the signal; returns status, paced seconds and what was said on stderr."""
+        began = support.paced()
         if number is not None:
             self.process.send_signal(number)
-        status = self.process.wait(support.DEADLINE)
-        seconds = time.monotonic() - began
+        status = support.wait_for_end(self.process)
+        seconds = support.paced() - began
         self._reader.join(support.DEADLINE)
         return status, seconds, self.process.stderr.read().decode()
 
@@ -267,7 +266,7 @@ class EndingTest(unittest.TestCase):
                     status, seconds, stderr = watching.end(None if too_late else signal.SIGINT)
             if too_late:
                 seconds = math.inf
-            return support.Finished(watching.arguments, status, "", stderr, seconds)
+            return support.Finished(watching.arguments, status, "", stderr, math.nan, seconds)
 
         self.assertEqual(support.quickest(end, 0.3, attempts=10).status, 130)
 
@@ -298,7 +297,7 @@ class EndingTest(unittest.TestCase):
         with EventServer() as server:
             finished = support.run("watch", server.url, *JSON, "--duration", "1s")
             self.assertEqual(finished.status, 0, finished)
-            self.assertLess(finished.seconds, 1 + support.SOON)
+            self.assertLess(finished.paced, 1 + support.SOON)
             assert_disarmed(server)
 
     def test_idle_timeout(self):
@@ -343,9 +342,9 @@ class TerminalTest(unittest.TestCase):
                     before = shown.count(b"of 1 tool connected")
                     server.event(kind)
                     while shown.count(b"of 1 tool connected") <= before:
-                        self.assertTrue(select.select([terminal], [], [], support.DEADLINE)[0])
+                        self.assertTrue(support.is_readable(terminal))
                         shown += os.read(terminal, 4096)
-                while select.select([terminal], [], [], support.DEADLINE)[0]:
+                while support.is_readable(terminal):
                     shown += os.read(terminal, 4096)
             _, status = os.waitpid(pid, 0)
             os.close(terminal)
@@ -448,10 +447,10 @@ class ReconnectingTest(unittest.TestCase):
                     support.wait_until(lambda: server.armed, "the other one is watched")
                     delays = []
                     for count in range(1, 21):
-                        sent = time.monotonic()
+                        sent = support.paced()
                         server.event()
                         support.wait_until(lambda: len(watching.numbers()) == count, "it is told")
-                        delays.append(time.monotonic() - sent)
+                        delays.append(support.paced() - sent)
                         self.assertLess(delays[-1], support.SOON)
                     self.assertLess(sorted(delays)[len(delays) // 2], NOT_DELAYED, delays)
                     status, seconds, _ = watching.end()

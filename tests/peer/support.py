@@ -21,7 +21,7 @@ PROGRAMS = pathlib.Path(os.environ["SPINDLE_PEER_PROGRAMS"])
 HERE = pathlib.Path(__file__).resolve().parent
 
 SKIPPED = 77  # SKIP_RETURN_CODE of ctest
-PATIENCE = 30  # seconds; only a test that has already failed ever waits so long
+PATIENCE = 300  # seconds; only a test that has already failed ever waits so long
 
 # The profile's firmware limit, models and layout (60427 §3.4): id 1, controller 1, model 3 (3204),
 # firmware 2103, serial 1021100042.
