@@ -173,6 +173,15 @@ std::optional<EventKind> parse_event_kind(std::string_view text) {
   return static_cast<EventKind>(known - event_kind_texts.begin());
 }
 
+Result<void> check_pair(Kind kind, const LinkFacts& link) {
+  if (!link.even_pairs || register_count(kind) <= link.max_write) return {};
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = "it cannot be written: by its profile a value of 32 bits is never split "
+                       "('pairs: even'), and a write takes one register ('max-write: 1')",
+            .hint = "a profile with 'pairs: any' writes the two words one after the other"});
+}
+
 modbus::RegisterTable table_of(const EventFacts& events) {
   constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
   return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;

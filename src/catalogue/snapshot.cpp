@@ -131,18 +131,54 @@ Result<std::vector<std::string>> understand(const std::vector<std::string>& patt
   return understood;
 }
 
-std::string unit_of(const SnapshotEntry* a, const SnapshotEntry* b) {
-  if (a != nullptr && !a->unit.empty()) return a->unit;
-  return b == nullptr ? std::string() : b->unit;
-}
-
 /// One of both is there.
-Difference difference_between(const SnapshotEntry* a, const SnapshotEntry* b) {
-  Difference difference{.parameter = (a != nullptr ? a : b)->parameter, .unit = unit_of(a, b)};
+Difference difference_between(const SnapshotEntry* a, const SnapshotEntry* b, Units units) {
+  Difference difference{.parameter = (a != nullptr ? a : b)->parameter, .units = units};
   if (a != nullptr) difference.a = a->value;
   if (b != nullptr) difference.b = b->value;
+  if (a != nullptr) difference.unit_a = a->unit;
+  if (b != nullptr) difference.unit_b = b->unit;
   return difference;
 }
+
+Sides sides_of(const Snapshot& a, const Snapshot& b) {
+  return destination_of(a, b) == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
+}
+
+std::string with_unit(const Value& value, const std::string& unit) {
+  return unit.empty() ? value.to_string() + " in a unit that is not known"
+                      : value.to_string() + " " + unit;
+}
+
+/// A number is written only where it means the same on both sides. What is true of one torque is
+/// true of all, so one finding stands for them.
+class UnitFindings {
+ public:
+  void add(const SnapshotEntry& wanted, const SnapshotEntry& present) {
+    if (count_++ == 0) first_ = other_unit(wanted, present);
+  }
+  void tell(std::vector<Error>& findings) {
+    if (count_ == 0) return;
+    if (count_ > 1) first_.message += fmt::format(" (and so on for {} more)", count_ - 1);
+    findings.insert(findings.begin(), std::move(first_));
+  }
+
+ private:
+  static Error other_unit(const SnapshotEntry& wanted, const SnapshotEntry& present) {
+    return {.code = Errc::mismatch,
+            .message = fmt::format("the backup has {}, and this tool holds {}",
+                                   with_unit(wanted.value, wanted.unit),
+                                   with_unit(present.value, present.unit)),
+            .hint =
+                "'torque-unit' in the tools file says the unit of a tool; --force writes the "
+                "number as it is",
+            .name = wanted.parameter.name,
+            .register_address = wanted.parameter.address.value};
+  }
+
+  Error first_ = {};
+  std::size_t count_ = 0;
+};
 
 /// Whether a side says nothing about a parameter, rather than that it does not exist.
 bool says_nothing(const Snapshot& side, const std::string& name, Lacking lacking) {
@@ -169,6 +205,7 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
   const Decimal& number = wanted.value.number;
   const auto registers = encode(parameter, number);
   if (!registers) return tl::unexpected(registers.error());
+  if (auto fits = check_pair(parameter.encoding.kind, profile.link); !fits) return fits;
   if (auto inside = check_range(parameter, number); !inside) return inside;
   const bool has_limits = profile.limit_registers(parameter).has_value();
   if (has_limits && (!present.minimum || !present.maximum)) {
@@ -183,9 +220,9 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
 }
 
 std::optional<Skip> skip_of(const SnapshotEntry& wanted, const SnapshotEntry* present,
-                            Destination destination) {
+                            Destination destination, bool comparable) {
   if (present == nullptr) return Skip::absent;
-  if (present->value == wanted.value) return Skip::equal;
+  if (present->value == wanted.value && comparable) return Skip::equal;
   if (wanted.parameter.access == Access::read_only) return Skip::read_only;
   const bool belongs_to_one = wanted.parameter.cloning == Cloning::never;
   if (belongs_to_one && destination == Destination::other_tool) return Skip::not_cloned;
@@ -232,8 +269,11 @@ Snapshot snapshot_of_defaults(const Profile& profile) {
     if (!raw) continue;  // the loader of profiles refuses such a default
     auto value = decode(parameter, *raw);
     if (!value) continue;
-    snapshot.entries.push_back(
-        {.parameter = std::move(parameter), .raw = std::move(*raw), .value = std::move(*value)});
+    std::string unit = parameter.unit == torque_unit ? std::string() : parameter.unit;
+    snapshot.entries.push_back({.parameter = std::move(parameter),
+                                .raw = std::move(*raw),
+                                .value = std::move(*value),
+                                .unit = std::move(unit)});
   }
   return snapshot;
 }
@@ -256,24 +296,36 @@ bool Selection::contains(const Parameter& parameter) const {
   return wanted && !matches_any(ignored_, parameter.name);
 }
 
+Units units_of(const Parameter& parameter, std::string_view a, std::string_view b, Sides sides) {
+  if (a.empty() && b.empty()) {
+    const bool settable = parameter.unit == torque_unit && sides == Sides::two_tools;
+    return settable ? Units::unknown : Units::same;
+  }
+  if (a.empty() || b.empty()) return Units::unknown;
+  return a == b ? Units::same : Units::different;
+}
+
 Comparison compare(const Snapshot& a, const Snapshot& b, const Selection& selection,
                    Lacking lacking) {
   Comparison comparison;
+  const Sides sides = sides_of(a, b);
   for (const SnapshotEntry& entry : a.entries) {
     if (!selection.contains(entry.parameter)) continue;
     const SnapshotEntry* other = b.find(entry.parameter.name);
     if (other == nullptr && says_nothing(b, entry.parameter.name, lacking)) continue;
-    if (other != nullptr && other->value == entry.value) {
+    const Units units =
+        other == nullptr ? Units::same : units_of(entry.parameter, entry.unit, other->unit, sides);
+    if (other != nullptr && other->value == entry.value && units == Units::same) {
       ++comparison.same;
       continue;
     }
-    comparison.differences.push_back(difference_between(&entry, other));
+    comparison.differences.push_back(difference_between(&entry, other, units));
   }
   for (const SnapshotEntry& entry : b.entries) {
     const std::string& name = entry.parameter.name;
     if (!selection.contains(entry.parameter) || a.find(name) != nullptr) continue;
     if (says_nothing(a, name, lacking)) continue;
-    comparison.differences.push_back(difference_between(nullptr, &entry));
+    comparison.differences.push_back(difference_between(nullptr, &entry, Units::same));
   }
   return comparison;
 }
@@ -291,17 +343,26 @@ std::size_t RestorePlan::count(Skip why) const {
 }
 
 RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const Profile& profile,
-                         const Selection& selection, Destination destination) {
+                         const Selection& selection, Destination destination, UnitRule units) {
   RestorePlan plan;
+  const Sides sides = destination == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
+  UnitFindings unit_findings;
   for (const Parameter& parameter : stored_parameters(profile)) {
     const SnapshotEntry* wanted = backup.find(parameter.name);
     if (wanted == nullptr || !selection.contains(parameter)) continue;
     const SnapshotEntry* now = present.find(parameter.name);
-    if (const auto skip = skip_of(*wanted, now, destination)) {
+    const bool comparable = units == UnitRule::ignored || now == nullptr ||
+                            units_of(parameter, wanted->unit, now->unit, sides) == Units::same;
+    if (const auto skip = skip_of(*wanted, now, destination, comparable)) {
       plan.skipped.push_back({parameter, *skip});
       continue;
     }
-    if (auto allowed = check_write(*wanted, *now, profile); !allowed) {
+    if (!comparable) {
+      unit_findings.add(*wanted, *now);
+      continue;
+    }
+    auto allowed = check_write(*wanted, *now, profile);
+    if (!allowed) {
       Error finding = std::move(allowed.error());
       finding.name = parameter.name;
       finding.register_address = parameter.address.value;
@@ -309,6 +370,7 @@ RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const 
     }
     plan.writes.push_back({parameter, now->value, wanted->value, now->unit});
   }
+  unit_findings.tell(plan.findings);
   return plan;
 }
 

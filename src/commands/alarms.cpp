@@ -172,8 +172,8 @@ Result<void> reset(const Deed& deed, Asked asked, OpenTool& tool, Findings& find
     return tl::unexpected(not_resettable(findings, tool.target));
   }
   if (asked == Asked::no) tell_notes(deed, tool.target, context);
-  const auto result = perform_deed(deed, tool, context);
-  ChangeLog("alarms", tool, context).add(logged(deed, result));
+  work::ChangeLog log = change_log("alarms", tool, context);
+  const auto result = perform_recorded(deed, tool, log, context);
   if (!result) return tl::unexpected(result.error());
   Listing listing(context, deed_columns());
   listing.add(deed_record(deed, *result, tool.target, context.clock));

@@ -1,62 +1,42 @@
 #include "change_log.hpp"
 
-#include <fmt/format.h>
+#include <string>
 
 namespace spindle::commands {
 
-LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
-                    const catalogue::Value& after, std::string_view result) {
-  LoggedChange change{.name = parameter.name,
-                      .register_address = parameter.address.value,
-                      .result = std::string(result)};
-  if (parameter.secrecy == catalogue::Secrecy::secret) return change;
-  change.old_value = before.number;
-  change.new_value = after.number;
-  return change;
+work::ChangeLog change_log(std::string_view command, const OpenTool& tool, const Context& context) {
+  const auto& identity = tool.device.identity();
+  return {{.command = std::string(command),
+           .target = tool.target.shown,
+           .serial = identity ? identity->serial : std::string(),
+           .folder = context.state_folder},
+          context.disk,
+          context.clock,
+          [&context](const std::string& sentence) { context.renderer.note(sentence); }};
 }
 
 std::string_view result_of_failure(const Error& error) {
-  return error.code == Errc::exception_response ? "refused" : "unknown";
+  return device::is_refusal(error) ? "refused" : "unknown";
 }
 
-LoggedChange logged(const Deed& deed, const Result<device::ActionResult>& result) {
-  LoggedChange change{.name = deed.action.name,
-                      .register_address = deed.action.address.value,
-                      .new_value = Decimal(deed.value)};
+work::LoggedChange logged(const Deed& deed) {
+  return {.name = deed.action.name,
+          .register_address = deed.action.address.value,
+          .new_value = Decimal(deed.value)};
+}
+
+work::LoggedChange logged(const Deed& deed, const Result<device::ActionResult>& result) {
+  work::LoggedChange change = logged(deed);
   change.result = result ? to_text(*result) : result_of_failure(result.error());
   return change;
 }
 
-void ChangeLog::add(const LoggedChange& change) {
-  const auto& identity = tool_->device.identity();
-  const auto written =
-      append(files::render_change({.time = report::to_text(context_->clock.wall()),
-                                   .user = context_->disk.user(),
-                                   .command = command_,
-                                   .target = tool_->target.shown,
-                                   .serial = identity ? identity->serial : std::string(),
-                                   .name = change.name,
-                                   .register_address = change.register_address,
-                                   .old_value = change.old_value,
-                                   .new_value = change.new_value,
-                                   .result = change.result}));
-  if (written || warned_) return;
-  warned_ = true;
-  context_->renderer.note(
-      fmt::format("warning: changes are not recorded: {}", describe(written.error())));
-}
-
-Result<void> ChangeLog::append(const std::string& line) {
-  const std::string& folder = context_->state_folder;
-  if (folder.empty()) {
-    return tl::unexpected(
-        Error{.code = Errc::bad_file, .message = "neither XDG_STATE_HOME nor HOME is set"});
-  }
-  if (!folder_made_) {
-    if (auto made = context_->disk.make_folders(folder, Privacy::own); !made) return made;
-    folder_made_ = true;
-  }
-  return context_->disk.append(folder + "/changes.jsonl", line);
+Result<device::ActionResult> perform_recorded(const Deed& deed, OpenTool& tool,
+                                              work::ChangeLog& log, const Context& context) {
+  const std::string id = log.begin(logged(deed));
+  auto result = perform_deed(deed, tool, context);
+  log.end(id, logged(deed, result));
+  return result;
 }
 
 }  // namespace spindle::commands

@@ -131,6 +131,14 @@ Result<Contents> read_sides(const Side& a, const Side& b, const Context& context
   return Contents(std::move(*read), std::move(*other));
 }
 
+/// The unit of both sides, or one beside the other: "N.m / kgf.cm", "N.m / ?".
+std::string units_in_words(const Difference& difference) {
+  const std::string& common = difference.a ? difference.unit_a : difference.unit_b;
+  if (difference.units == catalogue::Units::same) return common;
+  const auto shown = [](const std::string& unit) { return unit.empty() ? std::string("?") : unit; };
+  return fmt::format("{} / {}", shown(difference.unit_a), shown(difference.unit_b));
+}
+
 report::Record difference_record(const Difference& difference, const std::string& target,
                                  const Clock& clock) {
   const auto side = [](std::string key, const std::optional<catalogue::Value>& value) {
@@ -144,7 +152,9 @@ report::Record difference_record(const Difference& difference, const std::string
                      {"register", number(difference.parameter.address.value)},
                      side("a", difference.a),
                      side("b", difference.b),
-                     {"unit", text_or_null(difference.unit)}}};
+                     {"unit", text_or_null(units_in_words(difference))},
+                     {"unit_a", text_or_null(difference.unit_a)},
+                     {"unit_b", text_or_null(difference.unit_b)}}};
 }
 
 Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& contents,

@@ -98,15 +98,14 @@ Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Notes 
                           Context& context) {
   Outcome outcome;
   Listing listing(context, deed_columns());
-  ChangeLog log("do", tool, context);
+  work::ChangeLog log = change_log("do", tool, context);
   for (const Deed& deed : deeds) {
     std::optional<Error> error;
     if (context.interrupt.signalled()) {
       error = tool.target.blamed(context.interrupt.error());
     } else {
       if (notes == Notes::to_tell) tell_notes(deed, tool.target, context);
-      const auto result = perform_deed(deed, tool, context);
-      log.add(logged(deed, result));
+      const auto result = perform_recorded(deed, tool, log, context);
       if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
       error = failure_of(deed, result, tool.target);
     }

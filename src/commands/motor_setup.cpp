@@ -90,34 +90,21 @@ Result<void> MotorSetup::clear_word() {
   return plan_->motor.command(tool_->device, facts().decelerate_always);
 }
 
-Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& value) {
+Result<void> MotorSetup::write_one(work::Changer& changer, const Parameter& parameter,
+                                   const Value& value) {
   const auto before = tool_->device.read_each({parameter}, device::Limits::skip);
   if (!before) return tl::unexpected(before.error());
   const device::Reading& reading = before->front();
   if (!reading.value) return tl::unexpected(reading.value.error());
   if (*reading.value == value) return {};
-  const auto written = tool_->device.write(parameter, *reading.value, value);
-  if (!written) {
-    const Error& error = written.error();
-    const bool refused = error.code == Errc::exception_response;
-    log_->add(logged(parameter, *reading.value, refused ? *reading.value : value,
-                     result_of_failure(error)));
-    return tl::unexpected(error);
-  }
-  const bool done = written->result == device::WriteResult::written;
-  log_->add(logged(parameter, *reading.value, written->now, done ? "written" : "coerced"));
-  if (done) return {};
-  return tl::unexpected(
-      tool_->target.blamed({.code = Errc::mismatch,
-                            .message = fmt::format("the driver acknowledged {} but holds {}",
-                                                   value.to_string(), written->now.to_string()),
-                            .name = parameter.name,
-                            .register_address = parameter.address.value}));
+  auto written = changer.make(parameter, *reading.value, value);
+  if (written.done()) return {};
+  return tl::unexpected(std::move(*written.error));
 }
 
 Result<void> MotorSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
-    if (auto written = write_one(parameter, value); !written) {
+    if (auto written = write_one(settings_, parameter, value); !written) {
       return tl::unexpected(of_write(parameter.name, std::move(written.error())));
     }
     const bool is_stop =
@@ -133,11 +120,7 @@ Result<void> MotorSetup::write_settings() {
 Result<void> MotorSetup::set_watchdog() {
   const bool is_off = !found_.watchdog || found_.watchdog->number == Decimal(0);
   if (plan_->watchdog) {
-    const Parameter& parameter = *plan_->watchdog_parameter;
-    if (found_.watchdog && !(*plan_->watchdog == *found_.watchdog)) {
-      watchdog_write_ = {parameter, *found_.watchdog, *plan_->watchdog};
-    }
-    return write_one(parameter, *plan_->watchdog);
+    return write_one(watchdog_change_, *plan_->watchdog_parameter, *plan_->watchdog);
   }
   if (is_off && plan_->watchdog_parameter) {
     context_->renderer.note(
@@ -149,21 +132,20 @@ Result<void> MotorSetup::set_watchdog() {
 }
 
 void MotorSetup::restore_watchdog() {
-  if (!watchdog_write_) return;
+  if (watchdog_change_.sent().empty()) return;
   if (context_->calm.stay_awake) context_->calm.stay_awake();
-  const device::TriedWrite write = *std::exchange(watchdog_write_, std::nullopt);
   device::Rollback rollback(
       tool_->device, [this](Duration patience) { return calm_line_.connect(patience); },
       context_->calm.clock);
-  const auto report = rollback.run({&write, 1}).front();
-  if (report.result == device::PutBack::kept) return;
-  const bool done = report.result == device::PutBack::done;
-  log_->add(logged(write.parameter, report.found.value_or(write.tried), write.before,
-                   done ? "written" : "unknown"));
-  if (done) return;
-  context_->renderer.note(fmt::format(
-      "{}: {} could not be set back to {}: {}; the driver stops with an alarm when nobody asks it",
-      tool_->target.shown, write.parameter.name, write.before.to_string(), report.trouble));
+  const auto report = watchdog_change_.put_back(rollback).front();
+  const bool as_before =
+      report.result == device::PutBack::done || report.result == device::PutBack::kept;
+  if (as_before) return;
+  context_->renderer.note(
+      fmt::format("{}: {} could not be set back to {}: {}; the driver stops with an alarm when "
+                  "nobody asks it",
+                  tool_->target.shown, report.write.parameter.name, report.write.before.to_string(),
+                  report.trouble));
 }
 
 }  // namespace spindle::commands

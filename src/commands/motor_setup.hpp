@@ -14,8 +14,13 @@ namespace spindle::commands {
 class MotorSetup {
  public:
   /// All must outlive it.
-  MotorSetup(const MotorPlan& plan, OpenTool& tool, Context& context, ChangeLog& log)
-      : plan_(&plan), tool_(&tool), context_(&context), log_(&log), calm_line_(tool, context) {}
+  MotorSetup(const MotorPlan& plan, OpenTool& tool, Context& context, work::ChangeLog& log)
+      : plan_(&plan),
+        tool_(&tool),
+        context_(&context),
+        settings_(tool.device, log),
+        watchdog_change_(tool.device, log),
+        calm_line_(tool, context) {}
 
   /// Reads what the run depends on, and checks that the motor may be started; then writes the
   /// operation data and the watchdog. The motor does not turn.
@@ -49,17 +54,18 @@ class MotorSetup {
   Result<void> check_ready();
   Result<void> check_analog() const;
   Result<void> clear_word();
-  Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);
+  Result<void> write_one(work::Changer& changer, const catalogue::Parameter& parameter,
+                         const catalogue::Value& value);
   Result<void> write_settings();
   Result<void> set_watchdog();
 
   const MotorPlan* plan_;
   OpenTool* tool_;
   Context* context_;
-  ChangeLog* log_;
+  work::Changer settings_;
+  work::Changer watchdog_change_;  ///< to be taken back
   CalmLine calm_line_;
   Found found_ = {};
-  std::optional<device::TriedWrite> watchdog_write_ = std::nullopt;  ///< to be taken back
 };
 
 }  // namespace spindle::commands

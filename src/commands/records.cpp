@@ -83,7 +83,7 @@ std::string type_of(const catalogue::Encoding& encoding) {
 }  // namespace
 
 std::string unit_of(const Parameter& parameter, const Target& target) {
-  return parameter.unit == "torque" ? target.torque_unit : parameter.unit;
+  return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit;
 }
 
 Cell milliseconds(Duration duration) {

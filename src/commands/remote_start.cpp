@@ -104,7 +104,7 @@ class RemoteRun {
         tool_(&tool),
         context_(&context),
         guarded_(tool, context),
-        log_("remote-start", tool, context) {}
+        log_(change_log("remote-start", tool, context)) {}
 
   Result<Outcome> run() {
     auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
@@ -113,6 +113,7 @@ class RemoteRun {
     if (auto prepared = follower.prepare(); !prepared) {
       return tl::unexpected(std::move(prepared.error()));
     }
+    started_ = log_.begin(start_record({}));
     auto [followed, stop] = guarded_.run(
         device::motion_of(plan_->start), [this] { return limit_run(); },
         [&](const device::FollowOptions& limits) { return follower.follow(limits); });
@@ -124,8 +125,7 @@ class RemoteRun {
  private:
   Result<void> select() {
     for (const Deed& deed : plan_->selections) {
-      const auto result = tool_->device.perform(deed.action, deed.value);
-      log_.add(logged(deed, result));
+      const auto result = perform_recorded(deed, *tool_, log_, *context_);
       if (!result) return tl::unexpected(result.error());
       if (result == device::ActionResult::not_confirmed) {
         return tl::unexpected(not_confirmed(deed, tool_->target));
@@ -182,12 +182,16 @@ class RemoteRun {
 
   void log_run(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind,
                const device::StopReport& stop) {
-    const bool refused = !followed && followed.error().code == Errc::exception_response;
+    const bool refused = !followed && device::is_refusal(followed.error());
     const std::string result = !kind && refused ? "refused" : to_text(kind);
-    log_.add({.name = plan_->start.name,
-              .register_address = plan_->start.address.value,
-              .new_value = Decimal(*plan_->start.value),
-              .result = log_word(result, stop)});
+    log_.end(started_, start_record(log_word(result, stop)));
+  }
+
+  [[nodiscard]] work::LoggedChange start_record(std::string result) const {
+    return {.name = plan_->start.name,
+            .register_address = plan_->start.address.value,
+            .new_value = Decimal(*plan_->start.value),
+            .result = std::move(result)};
   }
 
   void judge(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind) {
@@ -219,7 +223,8 @@ class RemoteRun {
   OpenTool* tool_;
   Context* context_;
   GuardedRun guarded_;
-  ChangeLog log_;
+  work::ChangeLog log_;
+  std::string started_ = {};  ///< the record that the start was begun
 };
 
 /// What only motors have is a mistake on a tool that runs by itself.

@@ -48,7 +48,11 @@ std::string shown_firmware(const Snapshot& snapshot) {
 const catalogue::PlannedWrite* find_other_unit(const RestoreTask& task) {
   for (const catalogue::PlannedWrite& write : task.plan.writes) {
     const auto* entry = task.backup.find(write.parameter.name);
-    if (!entry->unit.empty() && !write.unit.empty() && entry->unit != write.unit) return &write;
+    const auto sides = task.destination == catalogue::Destination::same_tool
+                           ? catalogue::Sides::one_tool
+                           : catalogue::Sides::two_tools;
+    const auto units = catalogue::units_of(write.parameter, entry->unit, write.unit, sides);
+    if (units != catalogue::Units::same) return &write;
   }
   return nullptr;
 }
@@ -79,10 +83,13 @@ void warn_of_origin(const Snapshot& backup, const Snapshot& present,
 
 /// What the writes themselves bring with them, and what is not written.
 void warn_of_plan(const RestoreTask& task, std::vector<std::string>& warnings) {
-  if (const auto* other = find_other_unit(task)) {
-    warnings.push_back(fmt::format("{} is in {} in the backup, and in {} on this tool",
-                                   other->parameter.name,
-                                   task.backup.find(other->parameter.name)->unit, other->unit));
+  if (const auto* other = find_other_unit(task); other != nullptr && task.plan.findings.empty()) {
+    const auto named = [](const std::string& unit) {
+      return unit.empty() ? std::string("a unit that is not known") : unit;
+    };
+    warnings.push_back(
+        fmt::format("{} is in {} in the backup, and in {} on this tool", other->parameter.name,
+                    named(task.backup.find(other->parameter.name)->unit), named(other->unit)));
   }
   for (const auto& write : task.plan.writes) {
     if (write.parameter.risk.empty()) continue;
@@ -198,8 +205,10 @@ Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& op
   auto same = check_model(task.backup, task.present, tool.target, options);
   if (!same) return tl::unexpected(std::move(same.error()));
   task.destination = catalogue::destination_of(task.backup, task.present);
-  task.plan = catalogue::plan_restore(task.backup, task.present, tool.device.profile(),
-                                      task.selection, task.destination);
+  task.plan = catalogue::plan_restore(
+      task.backup, task.present, tool.device.profile(), task.selection, task.destination,
+      options.model == ModelCheck::off ? catalogue::UnitRule::ignored
+                                       : catalogue::UnitRule::strict);
   return task;
 }
 

@@ -23,19 +23,6 @@ using device::PutBack;
 using report::Align;
 using report::Column;
 
-report::Record write_record(const Parameter& parameter, const Value& before, const Value& now,
-                            std::string_view result, const Target& target, const Clock& clock) {
-  return {.type = result == "planned" ? "plan" : "write",
-          .target = target.shown,
-          .time = clock.wall(),
-          .fields = {{"name", parameter.name},
-                     {"register", number(parameter.address.value)},
-                     {"old", before.number, before.to_string()},
-                     {"new", now.number, now.to_string()},
-                     {"unit", text_or_null(unit_of(parameter, target))},
-                     {"result", std::string(result)}}};
-}
-
 Error about(const Parameter& parameter, std::string message) {
   return {.code = Errc::mismatch,
           .message = std::move(message),
@@ -91,7 +78,7 @@ std::span<const Column> restore_columns() {
 }
 
 report::Record plan_record(const PlannedWrite& write, const Target& target, const Clock& clock) {
-  return write_record(write.parameter, write.before, write.after, "planned", target, clock);
+  return change_record(write.parameter, write.before, Ending::planned, write.after, target, clock);
 }
 
 RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
@@ -101,7 +88,8 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       tool_(&tool),
       context_(&context),
       calm_line_(tool, context),
-      log_("restore", tool, context),
+      log_(change_log("restore", tool, context)),
+      changer_(tool.device, log_),
       progress_(context) {}
 
 Result<Outcome> RestoreRun::run() {
@@ -151,30 +139,10 @@ void RestoreRun::write_all() {
 }
 
 Result<void> RestoreRun::write_one(const PlannedWrite& write) {
-  tried_.push_back({write.parameter, write.before, write.after});
-  const auto written = tool_->device.write(write.parameter, write.before, write.after);
-  if (!written) {
-    const bool is_refused = written.error().code == Errc::exception_response;
-    if (is_refused) {
-      tried_.pop_back();  // the tool says that it did nothing
-      note(write.parameter, write.before, write.before, "refused");
-    } else {
-      log_.add(logged(write.parameter, write.before, write.after, "unknown"));
-    }
-    return tl::unexpected(written.error());
-  }
-  if (written->result == device::WriteResult::written) {
-    note(write.parameter, write.before, written->now, "written");
-    return {};
-  }
-  const bool kept = written->result == device::WriteResult::mismatch;
-  note(write.parameter, write.before, written->now, kept ? "mismatch" : "coerced");
-  Error error = tool_->target.blamed(
-      about(write.parameter,
-            fmt::format("the tool acknowledged {} but {} holds {}", write.after.to_string(),
-                        kept ? "still" : "now", written->now.to_string())));
-  error.hint = "is the tool running, locked, or set to refuse changes?";
-  return tl::unexpected(std::move(error));
+  const device::Written written = changer_.make(write.parameter, write.before, write.after);
+  note(write.parameter, write.before, ending_of(written.result), written.now.value_or(write.after));
+  if (written.done()) return {};
+  return tl::unexpected(*written.error);
 }
 
 void RestoreRun::verify() {
@@ -231,10 +199,10 @@ Result<void> RestoreRun::same_tool(const device::Device& opened) const {
 }
 
 void RestoreRun::roll_back() {
-  if (tried_.empty() || options_->on_failure == OnFailure::leave) return;
+  if (changer_.sent().empty() || options_->on_failure == OnFailure::leave) return;
   progress_.show(fmt::format("{}: putting it back", tool_->target.shown));
   device::Rollback rollback(tool_->device, reopener(), context_->calm.clock);
-  const auto reports = rollback.run(tried_);
+  const auto reports = changer_.put_back(rollback);
   const bool complete = std::all_of(reports.begin(), reports.end(), [](const auto& report) {
     return report.result == PutBack::done || report.result == PutBack::kept;
   });
@@ -244,11 +212,11 @@ void RestoreRun::roll_back() {
 }
 
 void RestoreRun::report_put_back(const device::PutBackReport& report) {
-  const auto& [parameter, before, tried] = report.write;
+  const auto& [parameter, before, tried, doubt] = report.write;
   if (report.result == PutBack::kept) return;
   if (report.result == PutBack::done) {
     ++rolled_back_;
-    note(parameter, report.found.value_or(tried), before, "rolled-back");
+    note(parameter, report.found.value_or(tried), Ending::rolled_back, before);
     return;
   }
   const std::string holds = report.now ? fmt::format("holds {}", report.now->to_string())
@@ -259,7 +227,6 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
   if (report.result == PutBack::unknown) error.code = Errc::no_answer;
   error.hint = fmt::format("'{}' puts everything back, '{}' finishes the restore",
                            command_for(tool_->target, saved_), command_to_finish());
-  log_.add(logged(parameter, before, report.now.value_or(tried), "not-rolled-back"));
   fail(tool_->target.blamed(error));
 }
 
@@ -288,10 +255,9 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
   }
 }
 
-void RestoreRun::note(const Parameter& parameter, const Value& before, const Value& now,
-                      std::string_view result) {
-  listing_->add(write_record(parameter, before, now, result, tool_->target, context_->clock));
-  log_.add(logged(parameter, before, now, result));
+void RestoreRun::note(const Parameter& parameter, const Value& before, Ending ending,
+                      const Value& now) {
+  listing_->add(change_record(parameter, before, ending, now, tool_->target, context_->clock));
 }
 
 void RestoreRun::fail(const Error& error) {

@@ -8,9 +8,9 @@
 #include "change_log.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
+#include "set_records.hpp"
 #include "snapshots.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/device/rollback.hpp"
 
 namespace spindle::commands {
 
@@ -35,6 +35,8 @@ class RestoreRun {
   /// All must outlive it.
   RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
              Context& context);
+  RestoreRun(const RestoreRun&) = delete;
+  RestoreRun& operator=(const RestoreRun&) = delete;
 
   Result<Outcome> run();
 
@@ -50,8 +52,8 @@ class RestoreRun {
   device::Rollback::Reopen reopener();
   Result<void> same_tool(const device::Device& opened) const;
 
-  void note(const catalogue::Parameter& parameter, const catalogue::Value& before,
-            const catalogue::Value& now, std::string_view result);
+  void note(const catalogue::Parameter& parameter, const catalogue::Value& before, Ending ending,
+            const catalogue::Value& now);
   void fail(const Error& error);
   [[nodiscard]] std::string command_to_finish() const;
   void tell_what_stays();
@@ -63,12 +65,12 @@ class RestoreRun {
   OpenTool* tool_;
   Context* context_;
   CalmLine calm_line_;
-  ChangeLog log_;
+  work::ChangeLog log_;
+  work::Changer changer_;
   ProgressLine progress_;
   std::optional<Listing> listing_ = std::nullopt;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};  ///< told last, where nobody overlooks them
-  std::vector<device::TriedWrite> tried_ = {};
   std::string saved_ = {};
   std::size_t written_ = 0;
   std::size_t rolled_back_ = 0;

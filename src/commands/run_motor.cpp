@@ -39,7 +39,7 @@ class MotorRun {
         tool_(&tool),
         context_(&context),
         guarded_(tool, context),
-        log_("remote-start", tool, context),
+        log_(change_log("remote-start", tool, context)),
         setup_(plan, tool, context, log_),
         stopper_(plan.motor, options.stop.value_or(catalogue::StopMode::decelerate)) {}
 
@@ -50,6 +50,7 @@ class MotorRun {
     }
     const std::uint16_t word = start_word();
     stopper_.started(word, setup_.input_mode(), setup_.stopping());
+    started_ = log_.begin({.name = "start", .new_value = Decimal(word)});
     const auto [followed, stop] = guarded_.run(
         motion(word), [this] { return limit_run(); },
         [this](const device::MotorFollowOptions& limits) {
@@ -124,9 +125,9 @@ class MotorRun {
   }
 
   void log_run(const Result<MotorEnding>& followed, const device::StopReport& stop) {
-    log_.add({.name = "start",
-              .new_value = Decimal(start_word()),
-              .result = log_word(result_of(followed), stop)});
+    log_.end(started_, {.name = "start",
+                        .new_value = Decimal(start_word()),
+                        .result = log_word(result_of(followed), stop)});
   }
 
   void judge(const Result<MotorEnding>& followed, const catalogue::CodeTables& tables) {
@@ -198,7 +199,8 @@ class MotorRun {
   OpenTool* tool_;
   Context* context_;
   GuardedRun guarded_;
-  ChangeLog log_;
+  work::ChangeLog log_;
+  std::string started_ = {};  ///< the record that the start was begun
   MotorSetup setup_;
   device::MotorStopper stopper_;
   std::vector<device::MotorNews> news_ = {};

@@ -42,6 +42,11 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
   if (parameter->access == catalogue::Access::read_only) {
     return tl::unexpected(not_writable(*parameter, profile));
   }
+  if (auto fits = catalogue::check_pair(parameter->encoding.kind, profile.link); !fits) {
+    fits.error().name = parameter->name;
+    fits.error().register_address = parameter->address.value;
+    return tl::unexpected(std::move(fits.error()));
+  }
   auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
   if (!value) {
     value.error().name = parameter->name;

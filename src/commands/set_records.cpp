@@ -63,47 +63,61 @@ std::string_view to_text(Ending ending) {
       return "mismatch";
     case Ending::refused:
       return "refused";
+    case Ending::unknown:
+      return "unknown";
+    case Ending::rolled_back:
+      return "rolled-back";
     case Ending::sent:
       return "sent";
   }
   return "";
 }
 
+Ending ending_of(device::WriteResult result) {
+  switch (result) {
+    case device::WriteResult::written:
+      return Ending::written;
+    case device::WriteResult::coerced:
+      return Ending::coerced;
+    case device::WriteResult::mismatch:
+      return Ending::mismatch;
+    case device::WriteResult::refused:
+      return Ending::refused;
+    case device::WriteResult::unknown:
+      break;
+  }
+  return Ending::unknown;
+}
+
 std::span<const Column> set_plan_columns() { return plan_columns; }
 
 std::span<const Column> set_columns() { return write_columns; }
 
-report::Record step_record(const SetStep& step, Ending ending, const Value& now,
-                           const Target& target, const Clock& clock) {
-  const Parameter& parameter = step.assignment.parameter;
-  report::Record record{.type = ending == Ending::planned ? "plan" : "write",
+report::Record change_record(const Parameter& parameter, const std::optional<Value>& before,
+                             Ending ending, const Value& now, const Target& target,
+                             const Clock& clock) {
+  const bool planned = ending == Ending::planned;
+  report::Record record{.type = planned ? "plan" : "write",
                         .target = target.shown,
                         .time = clock.wall(),
                         .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"register", number(parameter.address.value)},
-                   {"old", step.before ? report::Cell(step.before->number) : report::Cell(),
-                    step.before ? step.before->to_string() : std::string()},
+                   {"old", before ? report::Cell(before->number) : report::Cell(),
+                    before ? before->to_string() : std::string()},
                    {"new", now.number, now.to_string()},
                    {"unit", text_or_null(unit_of(parameter, target))}};
-  if (ending == Ending::planned) {
-    record.fields.push_back({"changes", step.changes(), step.changes() ? "yes" : "no"});
-  } else {
-    record.fields.push_back({"result", std::string(to_text(ending))});
+  if (planned) {
+    const bool changes = before != now;
+    record.fields.push_back({"changes", changes, changes ? "yes" : "no"});
   }
+  record.fields.push_back({"result", std::string(to_text(ending))});
   return record;
 }
 
-Error not_stored(const SetStep& step, const device::Written& written, const Target& target) {
-  const std::string asked = step.assignment.value.to_string();
-  const std::string holds = written.now.to_string();
-  const std::string_view how = written.result == device::WriteResult::mismatch ? "still" : "now";
-  return target.blamed(
-      {.code = Errc::mismatch,
-       .message = fmt::format("the tool acknowledged {} but {} holds {}", asked, how, holds),
-       .hint = "is the tool running, locked, or set to refuse changes?",
-       .name = step.assignment.parameter.name,
-       .register_address = step.assignment.parameter.address.value});
+report::Record step_record(const SetStep& step, Ending ending, const Value& now,
+                           const Target& target, const Clock& clock) {
+  return change_record(step.assignment.parameter, step.before, ending, now, target, clock);
 }
 
 void SetCounts::add(const SetCounts& other) {

@@ -13,19 +13,32 @@
 namespace spindle::commands {
 
 /// How one assignment ended, as in the contract's record `write`.
-enum class Ending : std::uint8_t { planned, written, unchanged, coerced, mismatch, refused, sent };
+enum class Ending : std::uint8_t {
+  planned,
+  written,
+  unchanged,
+  coerced,
+  mismatch,
+  refused,
+  unknown,
+  rolled_back,
+  sent
+};
 
 std::string_view to_text(Ending ending);
+Ending ending_of(device::WriteResult result);
 
 std::span<const report::Column> set_plan_columns();
 std::span<const report::Column> set_columns();
 
-/// The `plan` or `write` record of a step; `now` is what the tool holds or is to hold.
+/// The `plan` or `write` record of one value, whatever the command; `now` is what the tool holds or
+/// is to hold.
+report::Record change_record(const catalogue::Parameter& parameter,
+                             const std::optional<catalogue::Value>& before, Ending ending,
+                             const catalogue::Value& now, const Target& target, const Clock& clock);
+/// The same of a step.
 report::Record step_record(const SetStep& step, Ending ending, const catalogue::Value& now,
                            const Target& target, const Clock& clock);
-
-/// The tool acknowledged a step, and holds something else.
-Error not_stored(const SetStep& step, const device::Written& written, const Target& target);
 
 /// What was written, or would be, of one tool or of several.
 struct SetCounts {

@@ -14,14 +14,8 @@ using catalogue::Value;
 
 Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
   for (const SetStep& step : steps) {
-    const Assignment& assignment = step.assignment;
-    const auto sent = tool_->device.broadcast(assignment.parameter, assignment.value);
-    if (!sent) {
-      fail(sent.error());
-      ++result_.counts.failed;
-      break;
-    }
-    succeed(step, Ending::sent, assignment.value);
+    if (result_.outcome.failed() > 0) break;
+    send_one(step);
   }
   tell_effects(steps, tool_->target, *context_);
   const SetCounts& counts = result_.counts;
@@ -51,15 +45,8 @@ void SetWriter::note(const SetStep& step, Ending ending, const Value& now) {
   listing_.add(step_record(step, ending, now, tool_->target, context_->clock));
 }
 
-void SetWriter::log(const SetStep& step, std::string_view result, const Value& now) {
-  LoggedChange change = logged(step.assignment.parameter, step.before.value_or(now), now, result);
-  if (!step.before) change.old_value.reset();
-  log_.add(change);
-}
-
 void SetWriter::succeed(const SetStep& step, Ending ending, const Value& now) {
   note(step, ending, now);
-  if (ending != Ending::unchanged) log(step, to_text(ending), now);
   ++(ending == Ending::unchanged ? result_.counts.unchanged : result_.counts.changed);
   result_.outcome.succeed();
 }
@@ -69,25 +56,29 @@ void SetWriter::fail(const Error& error) {
   listing_.add(error);
 }
 
+void SetWriter::send_one(const SetStep& step) {
+  const auto& [parameter, value, text] = step.assignment;
+  work::LoggedChange change = work::logged(parameter, value, value, to_text(Ending::sent));
+  change.old_value.reset();
+  const std::string id = log_.begin(change);
+  const auto sent = tool_->device.broadcast(parameter, value);
+  if (!sent) {
+    change.result = "unknown";
+    fail(sent.error());
+    ++result_.counts.failed;
+  } else {
+    succeed(step, Ending::sent, value);
+  }
+  log_.end(id, change);
+}
+
 void SetWriter::write_one(const SetStep& step) {
-  const Value& wanted = step.assignment.value;
-  auto written = tool_->device.write(step.assignment.parameter, *step.before, wanted);
-  if (written && written->result == device::WriteResult::written) {
-    return succeed(step, Ending::written, written->now);
-  }
+  const auto& [parameter, value, text] = step.assignment;
+  const device::Written written = changer_.make(parameter, *step.before, value);
+  if (written.done()) return succeed(step, Ending::written, *written.now);
   ++result_.counts.failed;
-  if (!written) {
-    const Error& error = written.error();
-    const bool refused = error.code == Errc::exception_response;
-    if (refused) note(step, Ending::refused, *step.before);
-    log(step, result_of_failure(error), refused ? *step.before : wanted);
-    return fail(of_write(step.assignment.parameter.name, error));
-  }
-  const bool same = written->result == device::WriteResult::mismatch;
-  const Ending ending = same ? Ending::mismatch : Ending::coerced;
-  note(step, ending, written->now);
-  log(step, to_text(ending), written->now);
-  fail(not_stored(step, *written, tool_->target));
+  note(step, ending_of(written.result), written.now.value_or(value));
+  fail(of_write(parameter.name, *written.error));
 }
 
 Result<SetResult> SetWriter::end(Summary summary) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string_view>
 #include <vector>
 
 #include "change_log.hpp"
@@ -25,7 +24,10 @@ class SetWriter {
         storing_(storing),
         context_(&context),
         listing_(context, set_columns()),
-        log_("set", tool, context) {}
+        log_(change_log("set", tool, context)),
+        changer_(tool.device, log_) {}
+  SetWriter(const SetWriter&) = delete;
+  SetWriter& operator=(const SetWriter&) = delete;
 
   /// Writes what differs, reads each back, and ends with a summary.
   Result<SetResult> write(const std::vector<SetStep>& steps);
@@ -35,9 +37,9 @@ class SetWriter {
 
  private:
   void note(const SetStep& step, Ending ending, const catalogue::Value& now);
-  void log(const SetStep& step, std::string_view result, const catalogue::Value& now);
   void succeed(const SetStep& step, Ending ending, const catalogue::Value& now);
   void fail(const Error& error);
+  void send_one(const SetStep& step);
   void write_one(const SetStep& step);
   Result<SetResult> end(Summary summary);
 
@@ -45,7 +47,8 @@ class SetWriter {
   Storing storing_;
   Context* context_;
   Listing listing_;
-  ChangeLog log_;
+  work::ChangeLog log_;
+  work::Changer changer_;
   SetResult result_ = {};
 };
 

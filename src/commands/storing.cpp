@@ -13,12 +13,11 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile) {
                               .name = "--save"});
 }
 
-Result<void> store(OpenTool& tool, ChangeLog& log, Outcome& outcome, Context& context) {
+Result<void> store(OpenTool& tool, work::ChangeLog& log, Outcome& outcome, Context& context) {
   auto deed = parse_deed(std::string(store_action), *tool.profile);
   if (!deed) return tl::unexpected(std::move(deed.error()));
   tell_notes(*deed, tool.target, context);
-  const auto result = perform_deed(*deed, tool, context);
-  log.add(logged(*deed, result));
+  const auto result = perform_recorded(*deed, tool, log, context);
   Listing listing(context, deed_columns());
   if (result) listing.add(deed_record(*deed, *result, tool.target, context.clock));
   std::optional<Error> error;

@@ -14,6 +14,6 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile);
 
 /// The last deed of --save, told as a list of its own and recorded. A failure is noted in the
 /// outcome; the result is that of the stream.
-Result<void> store(OpenTool& tool, ChangeLog& log, Outcome& outcome, Context& context);
+Result<void> store(OpenTool& tool, work::ChangeLog& log, Outcome& outcome, Context& context);
 
 }  // namespace spindle::commands

@@ -139,11 +139,33 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   return session;
 }
 
-/// After a write: a refusal or a lost line is final, a missing or broken answer leaves open what
-/// the tool did.
-bool leaves_open(const Error& error) {
-  return error.code == Errc::no_answer || error.code == Errc::malformed_answer ||
-         error.code == Errc::bad_checksum;
+/// The first pause between two readings of a value that does not read right yet; it doubles.
+constexpr Duration first_settling_pause = std::chrono::milliseconds(10);
+
+/// The first pause before a write is sent again to a tool that answered "busy"; it doubles.
+constexpr Duration first_busy_pause = std::chrono::milliseconds(50);
+
+bool is_exception(const Error& error, modbus::ExceptionCode code) {
+  return error.exception == static_cast<std::uint8_t>(code);
+}
+
+/// After a write: a missing or broken answer leaves open what the tool did, and so does a gateway
+/// that waited for it in vain.
+bool is_lost(const Error& error) {
+  return error.code == Errc::no_answer || error.code == Errc::incomplete_answer ||
+         error.code == Errc::malformed_answer || error.code == Errc::bad_checksum ||
+         is_exception(error, modbus::ExceptionCode::gateway_target_failed_to_respond);
+}
+
+/// Whether the tool can be asked what became of a write that failed so.
+bool can_be_read_back(const Error& error) {
+  return is_lost(error) || error.code == Errc::exception_response;
+}
+
+/// The tool says of a write or a reading that it will come to it later.
+bool is_postponed(const Error& error) {
+  return is_exception(error, modbus::ExceptionCode::acknowledge) ||
+         is_exception(error, modbus::ExceptionCode::server_device_busy);
 }
 
 bool is_interruption(const Error& error) {
@@ -160,9 +182,11 @@ Error without_proof(Error reading) {
   return reading;
 }
 
-/// Nobody knows what became of a write without an answer that can not be read back either.
-Error without_knowledge(Error write) {
-  if (!is_interruption(write)) write.hint = "whether it was written is not known: read it again";
+/// It is not known what became of a write without an answer that can not be read back either.
+Error without_knowledge(Error write, const Value& before, const Value& value) {
+  if (is_interruption(write)) return write;
+  write.hint = fmt::format("whether it was written is not known: it holds {} or {}; read it again",
+                           before.to_string(), value.to_string());
   return write;
 }
 
@@ -188,6 +212,28 @@ std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& o
 }
 
 }  // namespace
+
+std::string_view to_text(WriteResult result) {
+  switch (result) {
+    case WriteResult::written:
+      return "written";
+    case WriteResult::coerced:
+      return "coerced";
+    case WriteResult::mismatch:
+      return "mismatch";
+    case WriteResult::refused:
+      return "refused";
+    case WriteResult::unknown:
+      break;
+  }
+  return "unknown";
+}
+
+bool is_refusal(const Error& error) {
+  return error.code == Errc::exception_response && !is_postponed(error) &&
+         !is_exception(error, modbus::ExceptionCode::gateway_path_unavailable) &&
+         !is_exception(error, modbus::ExceptionCode::gateway_target_failed_to_respond);
+}
 
 modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
   switch (endpoint.medium) {
@@ -437,24 +483,32 @@ Error Device::about(Error error, const std::string& name, modbus::RegisterAddres
   return error;
 }
 
+/// A product that takes one register a request gets the words of a pair one after the other, in the
+/// order of their registers.
 Result<void> Device::write_registers(modbus::RegisterAddress first, const Registers& registers) {
-  return registers.size() == 1 ? client_.write(first, registers.front())
-                               : client_.write(first, RegisterView(registers));
+  if (registers.size() > 1 && registers.size() <= profile_->link.max_write) {
+    return client_.write(first, RegisterView(registers));
+  }
+  modbus::RegisterAddress at = first;
+  for (const std::uint16_t word : registers) {
+    if (auto written = client_.write(at, word); !written) return written;
+    ++at.value;
+  }
+  return {};
 }
 
 /// A tool that refuses because it is busy has done nothing, so it is asked again for a while.
 Result<void> Device::while_busy(const std::function<Result<void>()>& write) {
   const auto& refusals = profile_->refusals;
-  Clock& clock = session_->clock();
-  const TimePoint limit = clock.now() + (refusals ? refusals->give_up_after : Duration::zero());
+  const TimePoint limit = clock().now() + (refusals ? refusals->give_up_after : Duration::zero());
   while (true) {
     Result<void> written = write();
     const bool busy = !written && refusals && written.error().device_code &&
                       refusals->is_busy(*written.error().device_code);
     if (!busy) return written;
-    const TimePoint next = clock.now() + refusals->retry_every;
+    const TimePoint next = clock().now() + refusals->retry_every;
     if (next > limit) return written;
-    if (auto slept = clock.sleep_until(next); !slept) return slept;
+    if (auto slept = clock().sleep_until(next); !slept) return slept;
   }
 }
 
@@ -464,43 +518,132 @@ Result<void> Device::send_write(const Parameter& parameter, const Registers& reg
           [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
 }
 
-/// A refused FC 10h may have written its first register all the same.
-Error Device::with_remains(Error error, const Parameter& parameter, const Value& before) {
-  const bool pair = catalogue::register_count(parameter.encoding.kind) > 1;
-  if (!pair || error.code != Errc::exception_response) return error;
-  const auto now = read_value(parameter);
-  if (!now) error.message += "; what it holds now could not be read";
-  if (now && !(*now == before)) {
-    error.message += fmt::format("; it was written in part and holds {}", now->to_string());
+/// By the standard a busy tool (06) is to be asked again later, and has done nothing yet.
+Result<void> Device::send_while_busy(const Parameter& parameter, const Registers& registers) {
+  const TimePoint limit = clock().now() + session_->options().answer_timeout;
+  Duration pause = first_busy_pause;
+  while (true) {
+    auto sent = send_write(parameter, registers);
+    const bool busy =
+        !sent && is_exception(sent.error(), modbus::ExceptionCode::server_device_busy);
+    const TimePoint next = clock().now() + pause;
+    if (!busy || next > limit) return sent;
+    if (auto slept = clock().sleep_until(next); !slept) return slept;
+    pause *= 2;
   }
-  return error;
 }
 
-Result<Written> Device::write(const Parameter& parameter, const Value& before, const Value& value) {
-  const auto registers = catalogue::encode(parameter, value.number);
-  if (!registers) return tl::unexpected(registers.error());
-  auto sent = send_write(parameter, *registers);
-  if (!sent && !leaves_open(sent.error())) {
-    return tl::unexpected(with_remains(std::move(sent.error()), parameter, before));
+/// As soon as it reads as expected, or whatever it is when the time is over. A tool that answers
+/// the reading with "busy" is asked again.
+Result<Value> Device::settled(const Parameter& parameter, const Value& expected, Duration limit,
+                              Proof proof) {
+  const TimePoint deadline = clock().now() + limit;
+  if (proof == Proof::after_settling) {
+    if (auto slept = clock().sleep_until(deadline); !slept) return tl::unexpected(slept.error());
   }
-  auto now = read_value(parameter);
-  const bool did_not_take = !sent && now && *now == before && !(*now == value);
-  if (did_not_take) {
-    sent = send_write(parameter, *registers);
-    now = read_value(parameter);
+  Duration pause = first_settling_pause;
+  while (true) {
+    auto now = read_value(parameter);
+    const bool final = now ? *now == expected : !is_postponed(now.error());
+    const TimePoint at = clock().now();
+    if (final || at >= deadline) return now;
+    if (auto slept = clock().sleep_until(std::min(at + pause, deadline)); !slept) {
+      return tl::unexpected(slept.error());
+    }
+    pause *= 2;
   }
+}
+
+/// The tool says that it did nothing. Half of a pair may have been written all the same, and a tool
+/// that failed at it (04) may have failed in the middle.
+Written Device::refused(Error error, const Parameter& parameter, const Value& before,
+                        const Value& value) {
+  const bool pair = catalogue::register_count(parameter.encoding.kind) > 1;
+  const bool failed =
+      is_exception(error, modbus::ExceptionCode::server_device_failure) && !error.device_code;
+  if (!pair && !failed) return {WriteResult::refused, before, std::move(error)};
+  const auto now = read_value(parameter);
   if (!now) {
-    return tl::unexpected(sent ? without_proof(std::move(now.error()))
-                               : without_knowledge(std::move(sent.error())));
+    error.message += "; what it holds now could not be read";
+    return {WriteResult::unknown, std::nullopt, std::move(error), Doubt::may_act_late};
   }
-  if (*now == value) return Written{WriteResult::written, *now};
-  if (!sent) return tl::unexpected(std::move(sent.error()));
-  return Written{*now == before ? WriteResult::mismatch : WriteResult::coerced, *now};
+  if (*now == before) return {WriteResult::refused, *now, std::move(error)};
+  if (*now == value) return {WriteResult::written, *now};
+  error.message += fmt::format("; it was written in part and holds {}", now->to_string());
+  return {WriteResult::coerced, *now, std::move(error)};
+}
+
+Written Device::judged(const Parameter& parameter, const Value& before, const Value& value,
+                       const Result<void>& sent, const Result<Value>& now) const {
+  if (!now) {
+    const bool by_reading = sent || is_interruption(now.error());
+    return {
+        WriteResult::unknown, std::nullopt,
+        by_reading ? without_proof(now.error()) : without_knowledge(sent.error(), before, value),
+        Doubt::may_act_late};
+  }
+  if (*now == value) return {WriteResult::written, *now};
+  const bool same = *now == before;
+  const std::string holds = fmt::format("{} holds {}", same ? "still" : "now", now->to_string());
+  Error error;
+  if (sent) {
+    error =
+        about({.code = Errc::mismatch,
+               .message = fmt::format("the tool acknowledged {} but {}", value.to_string(), holds),
+               .hint = "is the tool running, locked, or set to refuse changes?"},
+              parameter.name, parameter.address);
+  } else {
+    error = sent.error();
+    error.message = fmt::format("{}; it {}", message_of(error), holds);
+  }
+  const bool rejected =
+      !sent && (is_exception(error, modbus::ExceptionCode::server_device_busy) ||
+                is_exception(error, modbus::ExceptionCode::gateway_path_unavailable));
+  const WriteResult kept = rejected ? WriteResult::refused : WriteResult::mismatch;
+  return {same ? kept : WriteResult::coerced, *now, std::move(error), Doubt::may_act_late};
+}
+
+Written Device::write(const Parameter& parameter, const Value& before, const Value& value,
+                      Proof proof) {
+  auto registers = catalogue::encode(parameter, value.number).and_then([&](Registers words) {
+    return catalogue::check_pair(parameter.encoding.kind, profile_->link).map([&] {
+      return words;
+    });
+  });
+  if (!registers) {
+    return {WriteResult::refused, before,
+            about(std::move(registers.error()), parameter.name, parameter.address)};
+  }
+  const Duration settling = parameter.settle.value_or(profile_->link.settle);
+  auto sent = send_while_busy(parameter, *registers);
+  if (!sent && is_refusal(sent.error())) {
+    return refused(std::move(sent.error()), parameter, before, value);
+  }
+  if (!sent && !can_be_read_back(sent.error())) {
+    return judged(parameter, before, value, sent, tl::unexpected(sent.error()));
+  }
+  const bool works_on_it = !sent && is_exception(sent.error(), modbus::ExceptionCode::acknowledge);
+  auto now = settled(
+      parameter, value,
+      works_on_it ? std::max(settling, session_->options().answer_timeout) : settling, proof);
+  const bool did_not_take =
+      !sent && is_lost(sent.error()) && now && *now == before && !(*now == value);
+  if (did_not_take) {
+    sent = send_while_busy(parameter, *registers);
+    if (sent || can_be_read_back(sent.error())) now = settled(parameter, value, settling, proof);
+  }
+  return judged(parameter, before, value, sent, now);
+}
+
+void Device::shield(Clock& calm) {
+  session_->shield();
+  calm_ = &calm;
 }
 
 Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
   const auto registers = catalogue::encode(as_parameter(action), Decimal(value));
   if (!registers) return tl::unexpected(registers.error());
+  if (auto fits = catalogue::check_pair(action.kind, profile_->link); !fits) return fits;
   return while_busy([&] { return write_registers(action.address, *registers); })
       .map_error([&](Error error) { return about(std::move(error), action.name, action.address); });
 }
@@ -529,8 +672,24 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::int64
     if (*now == expected) return ActionResult::confirmed;
   }
   auto done = carry_out(action, value);
+  if (!done && can_be_read_back(done.error()) && !is_refusal(done.error())) {
+    return found_done(action, *confirming, expected, std::move(done.error()));
+  }
   if (!done || *done == ActionResult::not_confirmed) return done;
   return confirm(action, *confirming, expected);
+}
+
+/// The answer does not say what became of it, and it is never sent again: its effect does.
+Result<ActionResult> Device::found_done(const catalogue::Action& action,
+                                        const Parameter& confirming, const Value& expected,
+                                        Error error) {
+  const auto found = confirm(action, confirming, expected);
+  if (found == ActionResult::confirmed) return found;
+  if (!found && is_interruption(found.error())) return found;
+  error.hint = found ? fmt::format("{} does not show the effect", confirming.name)
+                     : fmt::format("whether it was done is not known: {} could not be read",
+                                   confirming.name);
+  return tl::unexpected(std::move(error));
 }
 
 /// What there is to do: nothing is known of the effect but that the tool is ready again.
@@ -556,8 +715,7 @@ Result<ActionResult> Device::carry_out(const catalogue::Action& action, std::int
 
 Result<ActionResult> Device::confirm(const catalogue::Action& action, const Parameter& confirming,
                                      const Value& expected) {
-  Clock& clock = session_->clock();
-  const TimePoint deadline = clock.now() + session_->options().answer_timeout;
+  const TimePoint deadline = clock().now() + session_->options().answer_timeout;
   while (true) {
     auto now = read_value(confirming);
     if (!now) {
@@ -565,9 +723,9 @@ Result<ActionResult> Device::confirm(const catalogue::Action& action, const Para
       return tl::unexpected(without_proof(std::move(now.error())));
     }
     if (*now == expected) return ActionResult::confirmed;
-    const TimePoint next = clock.now() + confirm_interval;
+    const TimePoint next = clock().now() + confirm_interval;
     if (next > deadline) return ActionResult::not_confirmed;
-    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+    if (auto slept = clock().sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
 }
 
@@ -585,16 +743,15 @@ Result<Shown> Device::await_ready(Duration limit) {
   if (limit == Duration::zero() || !profile_->run) return Shown::yes;
   const auto status = profile_->find(profile_->run->status);
   if (!status) return tl::unexpected(status.error());
-  Clock& clock = session_->clock();
-  const TimePoint deadline = clock.now() + limit;
+  const TimePoint deadline = clock().now() + limit;
   while (true) {
     const auto word = read_value(*status);
     if (!word) return tl::unexpected(word.error());
     const auto bits = static_cast<std::uint64_t>(word->number.mantissa());
     if (((bits >> profile_->run->busy) & 1U) == 0) return Shown::yes;
-    const TimePoint next = clock.now() + busy_interval;
+    const TimePoint next = clock().now() + busy_interval;
     if (next > deadline) return Shown::no;
-    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+    if (auto slept = clock().sleep_until(next); !slept) return tl::unexpected(slept.error());
   }
 }
 
@@ -609,10 +766,20 @@ Result<void> Device::broadcast_word(modbus::RegisterAddress address, std::uint16
 Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
   const auto registers = catalogue::encode(parameter, value.number);
   if (!registers) return tl::unexpected(registers.error());
-  if (registers->size() == 1) return broadcast_word(parameter.address, registers->front());
-  return session_->broadcast(modbus::write_request(parameter.address, RegisterView(*registers)))
-      .map_error(
-          [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
+  if (auto fits = catalogue::check_pair(parameter.encoding.kind, profile_->link); !fits)
+    return fits;
+  if (registers->size() > 1 && registers->size() <= profile_->link.max_write) {
+    return session_->broadcast(modbus::write_request(parameter.address, RegisterView(*registers)))
+        .map_error([&](Error error) {
+          return about(std::move(error), parameter.name, parameter.address);
+        });
+  }
+  modbus::RegisterAddress at = parameter.address;
+  for (const std::uint16_t word : *registers) {
+    if (auto sent = broadcast_word(at, word); !sent) return sent;
+    ++at.value;
+  }
+  return {};
 }
 
 /// Nobody says when it is done, so the longest time that it may take is waited for.
@@ -623,7 +790,7 @@ Result<void> Device::broadcast(const catalogue::Action& action, std::int64_t val
   if (sent) sent = broadcast(as_parameter(action), Value{Decimal(value), {}});
   if (!sent || !action.rest) return sent;
   if (action.busy > Duration::zero()) {
-    sent = session_->clock().sleep_until(session_->clock().now() + action.busy);
+    sent = clock().sleep_until(clock().now() + action.busy);
   }
   return sent ? broadcast_word(action.address, *action.rest) : sent;
 }

@@ -17,21 +17,22 @@ constexpr unsigned silences_allowed = 2;
 
 }  // namespace
 
-std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes) {
+std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes,
+                                         const RollbackObserver& observer) {
   std::vector<PutBackReport> reports;
   reports.reserve(writes.size());
   TimePoint deadline = calm_->now() + patience;
   for (auto write = writes.rbegin(); write != writes.rend(); ++write) {
-    reports.push_back(put_back(*write, deadline));
+    reports.push_back(put_back({.write = &*write, .observer = &observer}, deadline));
+    if (observer.end) observer.end(reports.back());
   }
   return reports;
 }
 
 /// Every sign of life gives the tool its time anew; what comes after the time is up is tried once.
-PutBackReport Rollback::put_back(const TriedWrite& write, TimePoint& deadline) {
-  std::optional<catalogue::Value> found;
+PutBackReport Rollback::put_back(Attempt attempt, TimePoint& deadline) {
   while (true) {
-    auto tried = connect(deadline).and_then([&] { return try_once(write, found); });
+    auto tried = connect(deadline).and_then([&] { return try_once(attempt); });
     if (tried) {
       silences_ = 0;
       deadline = calm_->now() + patience;
@@ -41,15 +42,16 @@ PutBackReport Rollback::put_back(const TriedWrite& write, TimePoint& deadline) {
     lost_ = lost_ || error.code != Errc::no_answer || ++silences_ >= silences_allowed;
     const TimePoint next = calm_->now() + pause;
     if (next > deadline || !calm_->sleep_until(next)) {
-      return {.write = write, .found = found, .trouble = message_of(error)};
+      return {.write = *attempt.write, .found = attempt.found, .trouble = message_of(error)};
     }
   }
 }
 
-/// A refusal is an answer; errors are those of the line. `found` is what was there at first: a try
-/// whose answer was lost may have worked.
-Result<PutBackReport> Rollback::try_once(const TriedWrite& write,
-                                         std::optional<catalogue::Value>& found) {
+/// A refusal is an answer; errors are those of the line. A try whose answer was lost may have
+/// worked, so what was there at first is kept. Before a write is over that may act late, the
+/// reading proves nothing: the old value is written behind it.
+Result<PutBackReport> Rollback::try_once(Attempt& attempt) {
+  const TriedWrite& write = *attempt.write;
   PutBackReport report{.write = write};
   const auto readings = device_->read_each({write.parameter}, Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
@@ -59,32 +61,39 @@ Result<PutBackReport> Rollback::try_once(const TriedWrite& write,
     report.trouble = message_of(value.error());
     return report;
   }
-  if (!found) found = *value;
-  report.found = found;
+  if (!attempt.found) attempt.found = *value;
+  report.found = attempt.found;
   report.now = *value;
-  if (*value == write.before) {
-    report.result = *found == write.before ? PutBack::kept : PutBack::done;
+  if (*value == write.before && write.doubt == Doubt::none) {
+    report.result = attempt.begun ? PutBack::done : PutBack::kept;
     return report;
   }
+  if (!attempt.begun && attempt.observer->begin) attempt.observer->begin(write);
+  attempt.begun = true;
+  auto put_back = write_back(report);
+  const bool overtaken = write.doubt == Doubt::may_act_late && put_back &&
+                         put_back->result == PutBack::refused && put_back->now == write.tried;
+  if (!overtaken) return put_back;
+  report.now = write.tried;  // it acted behind the old value, so it is over
   return write_back(std::move(report));
 }
 
 Result<PutBackReport> Rollback::write_back(PutBackReport report) {
   const TriedWrite& write = report.write;
-  const auto written = device_->write(write.parameter, *report.now, write.before);
-  if (!written && written.error().code != Errc::exception_response) {
-    return tl::unexpected(written.error());
+  const Proof proof =
+      write.doubt == Doubt::may_act_late ? Proof::after_settling : Proof::first_right;
+  const Written written = device_->write(write.parameter, *report.now, write.before, proof);
+  const bool answered = written.done() || written.error->code == Errc::exception_response ||
+                        written.error->code == Errc::mismatch;
+  if (!answered || written.result == WriteResult::unknown) {
+    return tl::unexpected(*written.error);
   }
-  report.result = PutBack::refused;
-  if (!written) {
-    report.trouble = message_of(written.error());
-    return report;
-  }
-  report.now = written->now;
-  if (written->result == WriteResult::written) {
-    report.result = PutBack::done;
-  } else {
-    report.trouble = "the tool acknowledged its old value, but does not hold it";
+  report.now = written.now;
+  report.result = written.done() ? PutBack::done : PutBack::refused;
+  if (!written.done()) {
+    report.trouble = written.error->code == Errc::mismatch
+                         ? "the tool acknowledged its old value, but does not hold it"
+                         : message_of(*written.error);
   }
   return report;
 }
@@ -98,8 +107,8 @@ Result<void> Rollback::connect(TimePoint deadline) {
     lost_ = false;
     silences_ = 0;
   }
+  device_->shield(*calm_);
   link::Session& session = device_->session();
-  session.shield();
   session.set_answer_timeout(std::min(session.options().answer_timeout, longest_answer));
   return {};
 }

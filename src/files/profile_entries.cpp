@@ -226,6 +226,7 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   assign(parameter.notation, map.word<catalogue::Notation>("notation", "notation", notation_words));
   assign(parameter.effect, map.word<catalogue::Effect>("effect", "effect", effect_words));
   assign(parameter.risk, map.text("risk"));
+  parameter.settle = map.duration("settle");
   assign(parameter.access,
          map.word<catalogue::Access>("access", "access", access_words, Need::required));
   assign(parameter.evidence,
@@ -313,9 +314,10 @@ void read_entry(const YamlNode& node, const YamlNode* group, std::size_t layer,
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
                 Findings& findings) {
   YamlMap group(node, findings);
-  for (const std::string_view key : {"name", "n", "stride", "table", "encoding", "scale", "unit",
-                                     "access", "evidence", "repeats", "source", "note", "overlaps",
-                                     "effect", "notation", "range", "clone", "secret", "fields"}) {
+  for (const std::string_view key :
+       {"name",     "n",        "stride",  "table",  "encoding", "scale",    "unit",
+        "access",   "evidence", "repeats", "source", "note",     "overlaps", "effect",
+        "notation", "range",    "clone",   "secret", "settle",   "fields"}) {
     group.allow(key);
   }
   group.finish();

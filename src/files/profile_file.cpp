@@ -112,6 +112,7 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   assign(link.answer, map.duration("answer"));
   assign(link.connect, map.duration("connect"));
   assign(link.retries, map.number<unsigned>("retries"));
+  assign(link.settle, map.duration("settle"));
   assign(link.loopback, map.flag("loopback"));
   assign(link.even_pairs, map.word<bool>("pairs", "pairs", pair_words));
   if (const YamlNode* serial = map.get("serial")) read_serial(*serial, link.serial, findings);
@@ -331,12 +332,6 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
   YamlMap map(node, findings);
   if (const YamlNode* bytes = map.get("bytes", Need::required)) {
     facts.identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
-  }
-  // Behind function code and byte count.
-  constexpr std::size_t most = modbus::max_pdu_size - 2;
-  if (facts.identity.size() > most) {
-    findings.add(node.at, fmt::format("an answer holds at most {} bytes", most));
-    facts.identity.resize(most);
   }
   facts.identity_bytes =
       map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "files/profile_drive.hpp"
+#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/value.hpp"
 
@@ -200,6 +201,26 @@ void read_only_has_no_default(const ProfileDraft& draft, Findings& findings) {
     if (!parameter.default_value || parameter.access == Access::read_write) return;
     findings.add_once(origin.of("default"),
                       fmt::format("{}: what is read-only has no default", parameter.name));
+  });
+}
+
+void settling_ends(const ProfileDraft& draft, Findings& findings) {
+  constexpr Duration longest = std::chrono::seconds(30);
+  const auto too_long = [&](const Duration& settle, const std::string& what) {
+    return fmt::format("{}'settle' is {}, longer than {}", what, to_text(settle), to_text(longest));
+  };
+  const Duration common = draft.profile.link.settle;
+  if (common > longest) findings.add_once(draft.link.of("settle"), too_long(common, {}));
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (!parameter.settle) return;
+    if (parameter.access == Access::read_only) {
+      findings.add_once(origin.of("settle"),
+                        fmt::format("{}: what is read-only is never written, so 'settle' says "
+                                    "nothing",
+                                    parameter.name));
+    } else if (*parameter.settle > longest) {
+      findings.add_once(origin.of("settle"), too_long(*parameter.settle, parameter.name + ": "));
+    }
   });
 }
 
@@ -444,7 +465,7 @@ void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 24> rules = {
+constexpr std::array<Rule, 25> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -455,6 +476,7 @@ constexpr std::array<Rule, 24> rules = {
     ranges_fit,
     read_only_has_no_default,
     read_only_is_never_cloned,
+    settling_ends,
     secrets_are_stored,
     defaults_fit,
     labels_are_unique,

@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <pwd.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -197,10 +199,45 @@ Result<void> write_file(const std::string& named, std::string_view text, Overwri
   return {};
 }
 
-Result<void> append_line(const std::string& path, std::string_view line) {
+/// Waits until no other program adds a line, but never long: one that is suspended keeps its lock.
+void lock_for_a_while(const Descriptor& file) {
+  constexpr int most_tries = 50;
+  constexpr int pause_ms = 2;
+  for (int tried = 0; tried < most_tries; ++tried) {
+    if (::flock(file.number(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+    ::poll(nullptr, 0, pause_ms);
+  }
+}
+
+/// Whether the last line of a file that is open for writing has no end.
+bool ends_within_a_line(const Descriptor& file, const std::string& path) {
+  struct stat about = {};
+  const bool has_text =
+      ::fstat(file.number(), &about) == 0 && S_ISREG(about.st_mode) && about.st_size > 0;
+  if (!has_text) return false;
+  const Descriptor readable(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  char last = '\n';
+  const bool known =
+      readable.valid() && ::pread(readable.number(), &last, 1, about.st_size - 1) == 1;
+  return known && last != '\n';
+}
+
+/// Whether a crash or a full disk cut the last line off; one that is just being written gets its
+/// end in a moment.
+bool is_cut_off(const Descriptor& file, const std::string& path) {
+  constexpr int moment_ms = 5;
+  if (!ends_within_a_line(file, path)) return false;
+  ::poll(nullptr, 0, moment_ms);
+  return ends_within_a_line(file, path);
+}
+
+Result<void> append_line(const std::string& path, std::string_view text) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, usual_file));
   if (!file.valid()) return tl::unexpected(failed(path, "cannot be written", errno));
+  lock_for_a_while(file);
+  std::string line(text);
+  if (is_cut_off(file, path)) line.insert(line.begin(), '\n');
   const ssize_t written = ::write(file.number(), line.data(), line.size());
   if (written == static_cast<ssize_t>(line.size())) return {};
   return tl::unexpected(failed(path, "cannot be written", written < 0 ? errno : ENOSPC));
@@ -243,7 +280,8 @@ Disk local_disk() {
           .write = write_file,
           .append = append_line,
           .make_folders = make_folders,
-          .user = user_name};
+          .user = user_name,
+          .process = [] { return static_cast<std::uint64_t>(::getpid()); }};
 }
 
 }  // namespace spindle::posix

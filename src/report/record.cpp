@@ -6,6 +6,8 @@
 #include <chrono>
 #include <utility>
 
+#include "spindle/base/duration.hpp"
+
 namespace spindle::report {
 namespace {
 
@@ -46,15 +48,7 @@ const Field* Record::find(std::string_view key) const {
   return found == fields.end() ? nullptr : &*found;
 }
 
-std::string to_text(WallTime time) {
-  const auto day = std::chrono::floor<std::chrono::days>(time);
-  const std::chrono::year_month_day date(day);
-  const std::chrono::hh_mm_ss clock(time - day);
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03}Z", static_cast<int>(date.year()),
-                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                     clock.hours().count(), clock.minutes().count(), clock.seconds().count(),
-                     clock.subseconds().count());
-}
+std::string to_text(WallTime time) { return spindle::to_text(time); }
 
 std::string to_text(const Cell& cell) { return std::visit(CellText{}, cell); }
 

@@ -27,7 +27,8 @@ class MemoryDisk {
               if (full_) return tl::unexpected(no_room(folder));
               return {};
             },
-            .user = [] { return std::string("anna"); }};
+            .user = [] { return std::string("anna"); },
+            .process = [] { return std::uint64_t{4242}; }};
   }
 
   void put(const std::string& path, std::string text) { files_[plain(path)] = std::move(text); }

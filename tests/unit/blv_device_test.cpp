@@ -18,8 +18,7 @@ catalogue::Action action(const BlvBench& bench, std::string_view name) {
   return bench.profile.find_action(name).value();
 }
 
-Result<device::Written> set(BlvBench& bench, device::Device& device, const char* name,
-                            const char* text) {
+device::Written set(BlvBench& bench, device::Device& device, const char* name, const char* text) {
   const auto parameter = bench.profile.find(name).value();
   const auto before = device.read_each({parameter}, device::Limits::skip).value().front();
   return device.write(before.parameter, before.value.value(),
@@ -31,7 +30,7 @@ Result<device::Written> set(BlvBench& bench, device::Device& device, const char*
 TEST_CASE("blv device: a pair is written whole and read back") {
   BlvBench bench;
   auto device = bench.open().value();
-  CHECK(set(bench, device, "operation.2.speed", "1234")->result == WriteResult::written);
+  CHECK(set(bench, device, "operation.2.speed", "1234").result == WriteResult::written);
   CHECK(bench.read(0x0484) == 0);
   CHECK(bench.read(0x0485) == 1234);
 }
@@ -40,23 +39,25 @@ TEST_CASE("blv device: a refusal says what the driver says of it") {
   BlvBench bench;
   auto device = bench.open().value();
   const auto refused = set(bench, device, "operation.2.speed", "50");
-  REQUIRE_FALSE(refused);
-  CHECK(refused.error().exception == 4);
-  CHECK(refused.error().device_code == 0x8C);
-  CHECK(refused.error().message.find("value outside the setting range") != std::string::npos);
-  CHECK(refused.error().hint == "'spindle list' shows ranges");
+  REQUIRE(refused.result == WriteResult::refused);
+  CHECK_FALSE(refused.may_have_changed());
+  CHECK(refused.error->exception == 4);
+  CHECK(refused.error->device_code == 0x8C);
+  CHECK(refused.error->message.find("value outside the setting range") != std::string::npos);
+  CHECK(refused.error->hint == "'spindle list' shows ranges");
 }
 
 TEST_CASE("blv device: a busy driver is waited for, with a limit") {
   BlvBench bench;
   auto device = bench.open().value();
   bench.bus->use_setter(1, bench.clock.now() + 2s);
-  CHECK(set(bench, device, "operation.2.speed", "900")->result == WriteResult::written);
+  CHECK(set(bench, device, "operation.2.speed", "900").result == WriteResult::written);
   bench.bus->use_setter(1, bench.clock.now() + 60s);
   const TimePoint began = bench.clock.now();
   const auto refused = set(bench, device, "operation.2.speed", "800");
-  REQUIRE_FALSE(refused);
-  CHECK(refused.error().device_code == 0x89);
+  REQUIRE(refused.result == WriteResult::refused);
+  CHECK_FALSE(refused.may_have_changed());
+  CHECK(refused.error->device_code == 0x89);
   CHECK(bench.clock.now() - began > 4s);
   CHECK(bench.clock.now() - began < 6s);
   CHECK(bench.read(0x0485) == 900);

@@ -152,6 +152,17 @@ TEST_CASE("lines of several threads never mix") {
   CHECK(lines == 200);
 }
 
+TEST_CASE("behind a line that a crash cut off the next one stands on its own") {
+  const Folder folder;
+  const std::string path = folder / "log";
+  const Disk disk = posix::local_disk();
+  REQUIRE(disk.append(path, "one\n"));
+  std::ofstream(path, std::ios::app) << "tw";
+  REQUIRE(disk.append(path, "three\n"));
+  REQUIRE(disk.append(path, "four\n"));
+  CHECK(text_of(path) == "one\ntw\nthree\nfour\n");
+}
+
 TEST_CASE("a full disk is an error of the append") {
   const auto appended = posix::local_disk().append("/dev/full", "line\n");
   REQUIRE_FALSE(appended);

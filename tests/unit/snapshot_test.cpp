@@ -44,6 +44,7 @@ SnapshotEntry entry(const Profile& profile, const std::string& name, std::uint16
   return {.parameter = found,
           .raw = {raw},
           .value = decode(found, Registers{raw}).value(),
+          .unit = found.unit == torque_unit ? "N.m" : found.unit,
           .minimum = decode(found, Registers{0}).value().number,
           .maximum = decode(found, Registers{1000}).value().number};
 }
@@ -273,4 +274,77 @@ TEST_CASE("without the tool's own limits nothing is written where it should have
                                  Destination::same_tool);
   REQUIRE(plan.findings.size() == 1);
   CHECK(plan.findings[0].name == "p1");
+}
+
+TEST_CASE("different and unknown units are never equal, whatever the numbers") {
+  const Profile profile = small_profile();
+  struct Row {
+    std::string a;
+    std::string b;
+    const char* serial_of_b;
+    Units units;
+  };
+  const Row rows[] = {
+      {"N.m", "N.m", "8", Units::same}, {"N.m", "kgf.cm", "7", Units::different},
+      {"N.m", "", "7", Units::unknown}, {"", "N.m", "8", Units::unknown},
+      {"", "", "8", Units::unknown},    {"", "", "7", Units::same},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.a);
+    CAPTURE(row.b);
+    Snapshot a = of_serial(snapshot(profile, {{"torque", 271}, {"p1", 1}}), "7");
+    Snapshot b = of_serial(snapshot(profile, {{"torque", 271}, {"p1", 1}}), row.serial_of_b);
+    a.entries[0].unit = row.a;
+    b.entries[0].unit = row.b;
+    const bool same = row.units == Units::same;
+    const Comparison comparison = compare(a, b, {});
+    CHECK(comparison.same == (same ? 2U : 1U));
+    REQUIRE(comparison.differences.size() == (same ? 0U : 1U));
+    if (!same) {
+      CHECK(comparison.differences[0].units == row.units);
+      CHECK(comparison.differences[0].unit_a == row.a);
+      CHECK(comparison.differences[0].unit_b == row.b);
+    }
+    const RestorePlan plan = plan_restore(a, b, profile, {}, destination_of(a, b));
+    REQUIRE(plan.findings.size() == (same ? 0U : 1U));
+    if (!same) CHECK(plan.findings[0].status() == ExitStatus::mismatch);
+    CHECK(plan.count(Skip::equal) == (same ? 2U : 1U));
+  }
+}
+
+TEST_CASE("with another unit a number is written only when that is asked for") {
+  const Profile profile = small_profile();
+  Snapshot backup = snapshot(profile, {{"torque", 271}});
+  Snapshot present = snapshot(profile, {{"torque", 310}});
+  present.entries[0].unit = "kgf.cm";
+  const auto strict = plan_restore(backup, present, profile, {}, Destination::same_tool);
+  REQUIRE(strict.findings.size() == 1);
+  CHECK(message_of(strict.findings[0]) ==
+        "the backup has 2.71 N.m, and this tool holds 3.10 kgf.cm");
+  const auto forced =
+      plan_restore(backup, present, profile, {}, Destination::same_tool, UnitRule::ignored);
+  CHECK(forced.findings.empty());
+  CHECK(shown(forced) == Lines{"torque: 3.10 -> 2.71"});
+}
+
+TEST_CASE("a pair that cannot be written is told before anything is") {
+  Profile profile = small_profile();
+  profile.numbered.reset();
+  profile.limits.reset();
+  Parameter wide = parameter("wide", 10);
+  wide.encoding.kind = Kind::u32;
+  profile.parameters.push_back(wide);
+  profile.link.max_write = 1;
+  Snapshot backup;
+  backup.entries.push_back(
+      {.parameter = wide, .raw = {1, 0}, .value = decode(wide, Registers{1, 0}).value()});
+  Snapshot present = backup;
+  present.entries[0].value = decode(wide, Registers{0, 1}).value();
+  const auto plan = [&] {
+    return plan_restore(backup, present, profile, {}, Destination::same_tool);
+  };
+  CHECK(plan().findings.empty());
+  profile.link.even_pairs = true;
+  REQUIRE(plan().findings.size() == 1);
+  CHECK(plan().findings[0].status() == ExitStatus::usage);
 }

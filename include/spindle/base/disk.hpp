@@ -25,13 +25,15 @@ struct Disk {
   /// and nothing is left beside it when that fails.
   std::function<Result<void>(const std::string& path, std::string_view text, Overwrite overwrite)>
       write;
-  /// Adds a line (with its end) in one piece, so that lines of several programs never mix. Creates
-  /// the file.
+  /// Adds a line (with its end) in one piece, so that lines of several programs never mix, and
+  /// behind a line that a crash cut off on a line of its own. Creates the file.
   std::function<Result<void>(const std::string& path, std::string_view line)> append;
   /// Makes a folder and those above it. Existing ones are left as they are.
   std::function<Result<void>(const std::string& folder, Privacy privacy)> make_folders;
   /// Who writes: the name of the program's user.
   std::function<std::string()> user;
+  /// The number by which the system tells this program from all others that run.
+  std::function<std::uint64_t()> process;
 };
 
 }  // namespace spindle

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
 #include "spindle/modbus/types.hpp"
 
@@ -47,6 +48,9 @@ struct Range {
   std::optional<Decimal> minimum;
   std::optional<Decimal> maximum;
 };
+
+/// Stands in `Parameter::unit` for the torque unit that is set on the tool.
+inline constexpr std::string_view torque_unit = "torque";
 
 /// When a written value begins to act.
 enum class Effect : std::uint8_t {
@@ -93,6 +97,8 @@ struct Parameter {
   std::string note;  ///< what a user should know, such as when a change takes effect; may be empty
   std::optional<Effect> effect = std::nullopt;  ///< empty: the profile does not speak of it
   std::string risk = {};  ///< what a change may cost, told before it is written; may be empty
+  /// How long a written value may take until it reads back; empty: as `LinkFacts::settle` says.
+  std::optional<Duration> settle = std::nullopt;
 };
 
 /// The bit field with only the names that count while `bits_by` has this value; empty: not known,

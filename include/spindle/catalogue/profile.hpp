@@ -61,13 +61,19 @@ struct LinkFacts {
   Duration keep_alive = {};     ///< zero: none needed
   Duration answer = std::chrono::seconds(1);
   Duration connect = std::chrono::seconds(5);
-  unsigned retries = 1;     ///< repetitions of a read that got no answer
+  unsigned retries = 1;  ///< repetitions of a read that got no answer
+  /// How long a written value may take until it reads back, unless its parameter says otherwise.
+  Duration settle = std::chrono::milliseconds(500);
   bool loopback = false;    ///< FC 08 00 is answered
   bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
   SerialFacts serial = {};
   std::vector<Area> contiguous = {};  ///< registers may be read along here
   std::vector<Area> absent = {};      ///< registers said not to exist
 };
+
+/// Whether a value of this kind can be written. Error `usage`: values of 32 bits are never split
+/// (`even_pairs`), and a request takes only one register (`max_write`).
+Result<void> check_pair(Kind kind, const LinkFacts& link);
 
 /// What an event says, as the contract names it.
 enum class EventKind : std::uint8_t {

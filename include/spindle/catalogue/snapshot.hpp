@@ -87,16 +87,27 @@ class Selection {
   std::vector<std::string> ignored_ = {};
 };
 
-/// A parameter whose values differ; an empty side does not have it.
+/// How the units of two sides of a parameter go together. Nothing is converted.
+enum class Units : std::uint8_t { same, different, unknown };
+
+/// The units of a value of this parameter on two sides, as they are shown. A torque of which no
+/// side says the unit is in the same one only within one tool.
+enum class Sides : std::uint8_t { one_tool, two_tools };
+Units units_of(const Parameter& parameter, std::string_view a, std::string_view b, Sides sides);
+
+/// A parameter whose values differ, or whose units do; an empty side does not have it.
 struct Difference {
   Parameter parameter;
   std::optional<Value> a = std::nullopt;
   std::optional<Value> b = std::nullopt;
-  std::string unit = {};
+  std::string unit_a = {};  ///< empty: none, or not known
+  std::string unit_b = {};
+  Units units = Units::same;
 };
 
-/// How many parameters both sides have and agree on, and those that differ, in the order of `a`;
-/// what only `b` has follows. What one side left out or could not read is not compared.
+/// How many parameters both sides have and agree on, with their units, and those that differ, in
+/// the order of `a`; what only `b` has follows. What one side left out or could not read is not
+/// compared.
 struct Comparison {
   std::vector<Difference> differences = {};
   std::size_t same = 0;
@@ -122,6 +133,9 @@ enum class Skip : std::uint8_t {
   absent,      ///< the tool has no such register
 };
 
+/// Whether a value may be written over one of another or an unknown unit.
+enum class UnitRule : std::uint8_t { strict, ignored };
+
 struct PlannedWrite {
   Parameter parameter;
   Value before;
@@ -138,7 +152,8 @@ struct SkippedEntry {
 struct RestorePlan {
   std::vector<PlannedWrite> writes = {};  ///< in the order of the catalogue
   std::vector<SkippedEntry> skipped = {};
-  std::vector<Error> findings = {};  ///< values outside limits, and limits that are not known
+  /// Values outside limits, limits that are not known, and units that do not go together.
+  std::vector<Error> findings = {};
 
   [[nodiscard]] std::size_t count(Skip why) const;
 };
@@ -146,7 +161,8 @@ struct RestorePlan {
 /// Compares a backup with what the tool holds, and checks every value that has to be written
 /// against encoding, profile and the tool's own limits. Both come from `profile`.
 RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const Profile& profile,
-                         const Selection& selection, Destination destination);
+                         const Selection& selection, Destination destination,
+                         UnitRule units = UnitRule::strict);
 
 /// `out_of_range` when a value is outside the limits that the tool itself reports; the message
 /// names the limit and its register. An absent limit allows everything.

@@ -47,14 +47,40 @@ enum class Limits : std::uint8_t { skip, read };
 
 /// How a write ended, as proven by reading back.
 enum class WriteResult : std::uint8_t {
-  written,   ///< the tool holds the new value
+  written,   ///< the tool holds the new value, whatever it answered
   coerced,   ///< the tool holds a third value
-  mismatch,  ///< the tool answered, but still holds the old value
+  mismatch,  ///< the tool did not refuse, but still holds the old value
+  refused,   ///< the tool refused, and holds the old value
+  unknown,   ///< it could not be read back: the tool holds the old value, the new one or a third
 };
+
+std::string_view to_text(WriteResult result);  ///< "written", as in records
+
+/// Whether the tool says by its exception that it did nothing. Acknowledge (05), busy (06) and what
+/// a gateway says (0A, 0B) leave open what became of a request.
+bool is_refusal(const Error& error);
+
+/// Whether the write may still act after its last reading: it was sent, and neither was it seen to
+/// act nor was it refused.
+enum class Doubt : std::uint8_t { none, may_act_late };
 
 struct Written {
   WriteResult result;
-  catalogue::Value now;  ///< as read back
+  std::optional<catalogue::Value> now;        ///< as last read; empty: not known
+  std::optional<Error> error = std::nullopt;  ///< why it is not `written`
+  Doubt doubt = Doubt::none;
+
+  [[nodiscard]] bool done() const { return result == WriteResult::written; }
+  /// Whether the tool may hold something else than before, now or in a moment.
+  [[nodiscard]] bool may_have_changed() const {
+    return result != WriteResult::refused || doubt == Doubt::may_act_late;
+  }
+};
+
+/// When a reading proves a write.
+enum class Proof : std::uint8_t {
+  first_right,     ///< as soon as the value reads right: nothing else was sent before
+  after_settling,  ///< not before the settling time is over: an earlier write may still act
 };
 
 /// What a reading says of an expectation.
@@ -127,10 +153,16 @@ class Device {
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
                                          Limits limits, const link::Progress& progress = {});
 
-  /// Writes and reads back. A write without an answer is repeated once, and only after reading back
-  /// has shown that it did not take. Does not check ranges. `before` is the value read before.
-  Result<Written> write(const catalogue::Parameter& parameter, const catalogue::Value& before,
-                        const catalogue::Value& value);
+  /// Writes and reads back, again and again with growing pauses until the value reads right or its
+  /// settling time is over. A busy tool (exception 06) is asked again for one answer time; a write
+  /// that was acknowledged (05) is never repeated; one without an answer is repeated once, and only
+  /// after reading back has shown that it did not take. Does not check ranges. `before` is the
+  /// value read before.
+  Written write(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                const catalogue::Value& value, Proof proof = Proof::first_right);
+
+  /// Goes on with a clock and a line that interrupts do not end. The clock must outlive the device.
+  void shield(Clock& calm);
 
   /// Sends an action's value once, never again; acknowledged is all that it means.
   Result<void> send(const catalogue::Action& action, std::int64_t value);
@@ -197,12 +229,22 @@ class Device {
                                                 const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
   Result<void> write_registers(modbus::RegisterAddress first, const Registers& registers);
-  Error with_remains(Error error, const catalogue::Parameter& parameter,
-                     const catalogue::Value& before);
+  Result<void> send_while_busy(const catalogue::Parameter& parameter, const Registers& registers);
+  Written refused(Error error, const catalogue::Parameter& parameter,
+                  const catalogue::Value& before, const catalogue::Value& value);
+  Written judged(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                 const catalogue::Value& value, const Result<void>& sent,
+                 const Result<catalogue::Value>& now) const;
+  Result<catalogue::Value> settled(const catalogue::Parameter& parameter,
+                                   const catalogue::Value& expected, Duration limit, Proof proof);
+  [[nodiscard]] Clock& clock() const { return calm_ != nullptr ? *calm_ : session_->clock(); }
   Result<void> while_busy(const std::function<Result<void>()>& write);
   Result<void> prepare(const catalogue::Preparation& preparation);
   Result<Shown> await_ready(Duration limit);
   Result<ActionResult> carry_out(const catalogue::Action& action, std::int64_t value);
+  Result<ActionResult> found_done(const catalogue::Action& action,
+                                  const catalogue::Parameter& confirming,
+                                  const catalogue::Value& expected, Error error);
   Result<ActionResult> confirm(const catalogue::Action& action,
                                const catalogue::Parameter& confirming,
                                const catalogue::Value& expected);
@@ -217,6 +259,7 @@ class Device {
   std::unique_ptr<link::Session> session_;
   unsigned retries_;
   link::Client client_;
+  Clock* calm_ = nullptr;  ///< empty: the session's
   bool registers_known_ = false;
   std::string identity_text_ = {};
   std::optional<catalogue::Identity> identity_ = std::nullopt;

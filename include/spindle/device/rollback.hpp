@@ -15,6 +15,8 @@ struct TriedWrite {
   catalogue::Parameter parameter;
   catalogue::Value before;
   catalogue::Value tried;
+  /// A write that may act late is put back even where the tool reads as before.
+  Doubt doubt = Doubt::none;
 };
 
 /// Whether a register holds what it held before.
@@ -33,6 +35,12 @@ struct PutBackReport {
   std::string trouble = {};                              ///< why it is not done
 };
 
+/// Is told of every write that a put-back needs, so that it can be recorded.
+struct RollbackObserver {
+  std::function<void(const TriedWrite& write)> begin = {};    ///< before the first one is sent
+  std::function<void(const PutBackReport& report)> end = {};  ///< of every write, also without one
+};
+
 /// Puts a tool back to what it was after writing to it failed, the last write first. Not ended by
 /// an interrupt, and reopens a lost link; gives up when the tool could not be reached for about
 /// ten seconds.
@@ -47,15 +55,24 @@ class Rollback {
       : device_(&device), reopen_(std::move(reopen)), calm_(&calm) {}
 
   /// One report a write, in the order in which they were put back.
-  std::vector<PutBackReport> run(std::span<const TriedWrite> writes);
+  std::vector<PutBackReport> run(std::span<const TriedWrite> writes,
+                                 const RollbackObserver& observer = {});
 
   /// What differs from before, once everything was put back: a tool may have changed more than it
   /// was told to.
   Result<std::vector<Reading>> read_again(const std::vector<catalogue::Parameter>& parameters);
 
  private:
-  PutBackReport put_back(const TriedWrite& write, TimePoint& deadline);
-  Result<PutBackReport> try_once(const TriedWrite& write, std::optional<catalogue::Value>& found);
+  /// One write while it is put back.
+  struct Attempt {
+    const TriedWrite* write;
+    const RollbackObserver* observer;
+    std::optional<catalogue::Value> found = std::nullopt;  ///< before anything was put back
+    bool begun = false;                                    ///< something was sent
+  };
+
+  PutBackReport put_back(Attempt attempt, TimePoint& deadline);
+  Result<PutBackReport> try_once(Attempt& attempt);
   Result<PutBackReport> write_back(PutBackReport report);
   Result<void> connect(TimePoint deadline);
 

@@ -20,8 +20,7 @@ struct LineModel {
 struct Burst {
   Bytes bytes;
   enum class Timing : std::uint8_t { in_time, too_early } timing = Timing::in_time;
-  Duration silence = {};  ///< before a burst that came too early
-  TimePoint end = {};     ///< when the silence behind the last byte was complete
+  TimePoint end = {};  ///< when the silence behind the last byte was complete
 };
 
 /// A server's ear on a half-duplex line: silence ends a frame, and a frame that begins before the

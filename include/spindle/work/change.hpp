@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "spindle/device/device.hpp"
+#include "spindle/device/rollback.hpp"
+#include "spindle/work/change_log.hpp"
+
+namespace spindle::work {
+
+/// Changes values of one tool, by the same rule whatever the command: the intent is recorded, the
+/// value is written, what became of it is read back and recorded, and all of it can be put back.
+class Changer {
+ public:
+  /// Both must outlive it.
+  Changer(device::Device& device, ChangeLog& log) : device_(&device), log_(&log) {}
+
+  /// Writes one value; see Device::write. `before` is the value read before.
+  device::Written make(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                       const catalogue::Value& value);
+
+  /// Everything that was written since the last put_back() and that the tool may hold, now or in a
+  /// moment, in the order in which it was sent.
+  [[nodiscard]] const std::vector<device::TriedWrite>& sent() const { return sent_; }
+
+  /// Puts all of sent() back, the last first, and records each as `rolled-back` or
+  /// `not-rolled-back`; what was found as before is not written. One report a write, in that order.
+  std::vector<device::PutBackReport> put_back(device::Rollback& rollback);
+
+ private:
+  device::Device* device_;
+  ChangeLog* log_;
+  std::vector<device::TriedWrite> sent_ = {};
+};
+
+}  // namespace spindle::work

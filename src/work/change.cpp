@@ -1,0 +1,46 @@
+#include "spindle/work/change.hpp"
+
+#include <string>
+#include <utility>
+
+namespace spindle::work {
+
+using catalogue::Parameter;
+using catalogue::Value;
+using device::PutBack;
+using device::PutBackReport;
+using device::TriedWrite;
+using device::Written;
+
+/// Where it is not known what the tool holds, the record names both candidates.
+Written Changer::make(const Parameter& parameter, const Value& before, const Value& value) {
+  const std::string id = log_->begin(logged(parameter, before, value, {}));
+  Written written = device_->write(parameter, before, value);
+  log_->end(id, logged(parameter, before, written.now.value_or(value), to_text(written.result)));
+  if (written.may_have_changed()) sent_.push_back({parameter, before, value, written.doubt});
+  return written;
+}
+
+std::vector<PutBackReport> Changer::put_back(device::Rollback& rollback) {
+  std::string id;
+  device::RollbackObserver observer;
+  observer.begin = [&](const TriedWrite& write) {
+    id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
+  };
+  observer.end = [&](const PutBackReport& report) {
+    const auto& write = report.write;
+    if (report.result == PutBack::kept) return;
+    if (id.empty()) id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
+    const bool done = report.result == PutBack::done;
+    log_->end(std::exchange(id, {}),
+              done ? logged(write.parameter, report.found.value_or(write.tried), write.before,
+                            "rolled-back")
+                   : logged(write.parameter, write.before, report.now.value_or(write.tried),
+                            "not-rolled-back"));
+  };
+  auto reports = rollback.run(sent_, observer);
+  sent_.clear();
+  return reports;
+}
+
+}  // namespace spindle::work

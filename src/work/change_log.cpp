@@ -1,0 +1,63 @@
+#include "spindle/work/change_log.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "spindle/base/duration.hpp"
+
+namespace spindle::work {
+
+LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                    const catalogue::Value& after, std::string_view result) {
+  LoggedChange change{.name = parameter.name,
+                      .register_address = parameter.address.value,
+                      .result = std::string(result)};
+  if (parameter.secrecy == catalogue::Secrecy::secret) return change;
+  change.old_value = before.number;
+  change.new_value = after.number;
+  return change;
+}
+
+/// Two programs never make the same id, and one program never for the same tool.
+std::string ChangeLog::begin(LoggedChange change) {
+  const std::string id = fmt::format("{:x}-{:x}-{}", disk_->process(),
+                                     clock_->wall().time_since_epoch().count(), ++begun_);
+  change.result = files::begun;
+  add(change, id);
+  return id;
+}
+
+void ChangeLog::end(const std::string& id, const LoggedChange& change) { add(change, id); }
+
+void ChangeLog::add(const LoggedChange& change, const std::string& id) {
+  const auto written = append(files::render_change({.time = to_text(clock_->wall()),
+                                                    .user = disk_->user(),
+                                                    .command = options_.command,
+                                                    .target = options_.target,
+                                                    .serial = options_.serial,
+                                                    .name = change.name,
+                                                    .register_address = change.register_address,
+                                                    .old_value = change.old_value,
+                                                    .new_value = change.new_value,
+                                                    .result = change.result,
+                                                    .id = id}));
+  if (written || warned_) return;
+  warned_ = true;
+  warn_(fmt::format("warning: changes are not recorded: {}", describe(written.error())));
+}
+
+Result<void> ChangeLog::append(const std::string& line) {
+  const std::string& folder = options_.folder;
+  if (folder.empty()) {
+    return tl::unexpected(
+        Error{.code = Errc::bad_file, .message = "neither XDG_STATE_HOME nor HOME is set"});
+  }
+  if (!folder_made_) {
+    if (auto made = disk_->make_folders(folder, Privacy::own); !made) return made;
+    folder_made_ = true;
+  }
+  return disk_->append(folder + "/changes.jsonl", line);
+}
+
+}  // namespace spindle::work
