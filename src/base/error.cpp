@@ -31,6 +31,8 @@ constexpr std::array statuses = {
                "expected"},
     StatusInfo{ExitStatus::partial, "partial", "several targets or parameters, and some failed"},
     StatusInfo{ExitStatus::internal, "internal", "a bug in spindle"},
+    StatusInfo{ExitStatus::storage, "storage",
+               "a file, the store, the disk or standard output cannot be written"},
     StatusInfo{ExitStatus::interrupted, "interrupted", "SIGINT, after the tool was left safe"},
     StatusInfo{ExitStatus::terminated, "interrupted", "SIGTERM, after the tool was left safe"},
 };
@@ -101,6 +103,8 @@ constexpr std::array errors = {
     ErrcInfo{Errc::partial, ExitStatus::partial, "some of it failed", ""},
     ErrcInfo{Errc::internal, ExitStatus::internal, "internal error",
              "this is a bug in spindle: please report it with the output of --verbose"},
+    ErrcInfo{Errc::storage, ExitStatus::storage, "cannot be written",
+             "check the file, disk or program that it goes to"},
     ErrcInfo{Errc::interrupted, ExitStatus::interrupted, "interrupted", ""},
     ErrcInfo{Errc::terminated, ExitStatus::terminated, "terminated", ""},
     ErrcInfo{Errc::closed_pipe, ExitStatus::ok, "nobody reads the output any more", ""},

@@ -83,7 +83,16 @@ bool every_register_writable(const Profile& profile, const Parameter& raw) {
   return true;
 }
 
+bool overlap(const Parameter& one, const Parameter& other) {
+  const auto end = [](const Parameter& parameter) {
+    return parameter.address.value + register_count(parameter.encoding.kind);
+  };
+  return one.table == other.table && one.address.value < end(other) &&
+         other.address.value < end(one);
+}
+
 Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
+  if (raw) raw = profile.with_secrecy(*std::move(raw));
   if (raw && raw->table == RegisterTable::holding && every_register_writable(profile, *raw)) {
     raw->access = Access::read_write;
   }
@@ -93,16 +102,18 @@ Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
 std::vector<Parameter> match_named(const Profile& profile, std::string_view pattern) {
   std::vector<Parameter> found;
   for (const Parameter& parameter : profile.parameters) {
-    if (glob_match(pattern, parameter.name)) found.push_back(parameter);
+    if (glob_match(pattern, parameter.name)) found.push_back(profile.with_secrecy(parameter));
   }
   return found;
 }
 
-std::vector<Parameter> match_numbered(const NumberedFacts& facts, std::string_view pattern) {
+std::vector<Parameter> match_numbered(const Profile& profile, std::string_view pattern) {
+  const NumberedFacts& facts = *profile.numbered;
   std::vector<Parameter> found;
   for (unsigned number = facts.from; number <= facts.to; ++number) {
     Parameter parameter = make_numbered(facts, static_cast<std::uint16_t>(number));
-    if (glob_match(pattern, parameter.name)) found.push_back(std::move(parameter));
+    if (!glob_match(pattern, parameter.name)) continue;
+    found.push_back(profile.with_secrecy(std::move(parameter)));
   }
   return found;
 }
@@ -114,7 +125,7 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
     return std::vector<Parameter>{std::move(*one)};
   }
   auto found = match_named(profile, name);
-  if (found.empty() && profile.numbered) found = match_numbered(*profile.numbered, name);
+  if (found.empty() && profile.numbered) found = match_numbered(profile, name);
   if (found.empty()) {
     return tl::unexpected(
         unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {}));
@@ -194,10 +205,10 @@ bool RefusalFacts::is_busy(std::int64_t code) const {
 Result<Parameter> Profile::find(std::string_view name) const {
   if (auto raw = parse_raw_register(name)) return find_raw(*this, std::move(*raw));
   for (const Parameter& parameter : parameters) {
-    if (parameter.name == name) return parameter;
+    if (parameter.name == name) return with_secrecy(parameter);
   }
   if (numbered) {
-    if (auto found = find_numbered(*numbered, name)) return *std::move(found);
+    if (auto found = find_numbered(*numbered, name)) return with_secrecy(*std::move(found));
   }
   return tl::unexpected(
       unknown(name, fmt::format("no such parameter in profile {}", id), hint_for(*this, name)));
@@ -218,7 +229,16 @@ Result<std::vector<Parameter>> Profile::select(const std::vector<std::string>& n
 }
 
 Parameter Profile::numbered_parameter(std::uint16_t number) const {
-  return make_numbered(*numbered, number);
+  return with_secrecy(make_numbered(*numbered, number));
+}
+
+Parameter Profile::with_secrecy(Parameter parameter) const {
+  const bool holds_secret =
+      std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& named) {
+        return named.secrecy == Secrecy::secret && overlap(named, parameter);
+      });
+  if (holds_secret) parameter.secrecy = Secrecy::secret;
+  return parameter;
 }
 
 Result<Action> Profile::find_action(std::string_view name) const {

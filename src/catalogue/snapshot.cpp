@@ -53,7 +53,7 @@ std::vector<Parameter> numbered_space(const Profile& profile) {
   std::vector<Parameter> space;
   for (const Parameter& parameter : profile.parameters) {
     const bool stored = is_numbered(parameter, facts) || parameter.access == Access::read_write;
-    if (stored && claims.take(parameter)) space.push_back(parameter);
+    if (stored && claims.take(parameter)) space.push_back(profile.with_secrecy(parameter));
   }
   for (unsigned number = facts.from; number <= facts.to; ++number) {
     Parameter parameter = profile.numbered_parameter(static_cast<std::uint16_t>(number));

@@ -64,7 +64,7 @@ std::string find_tools_file(const World& world, const Invocation& invocation) {
   if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
   places.emplace_back("/etc/spindle/tools.yaml");
   for (std::string& place : places) {
-    if (world.disk.exists(place)) return std::move(place);
+    if (!world.disk.absent(place)) return std::move(place);
   }
   return {};
 }
@@ -99,7 +99,7 @@ report::Color color_of(const World& world, ColorChoice choice) {
 /// The head of the capture file; what follows is appended frame by frame.
 Result<void> begin_capture(const std::string& path, const Disk& disk) {
   if (path.empty()) return {};
-  auto begun = disk.write(path, files::capture_head(), Overwrite::refuse);
+  auto begun = disk.write(path, files::capture_head(), Overwrite::refuse, Privacy::usual);
   if (!begun && begun.error().status() == ExitStatus::usage) {
     begun.error().name = path;
     begun.error().hint = "choose another name for --trace";

@@ -19,6 +19,7 @@ using catalogue::Profile;
 using report::Column;
 
 constexpr std::string_view present_list = "present";
+constexpr std::string_view reset_action = "alarm-reset";
 /// Registers whose meaning is not known: their numbers are shown, not explained.
 constexpr std::string_view data_list = "alarm-data";
 
@@ -53,16 +54,23 @@ Result<AlarmPlan> plan_lists(const Profile& profile) {
   return plan;
 }
 
+Error no_alarms(const Profile& profile) {
+  return {.code = Errc::usage,
+          .message = fmt::format("profile {} names no alarms", profile.id),
+          .hint = "'alarm-lists' in the profile names what is shown, see spindle-profile(5)"};
+}
+
 /// The present alarm is what proves a reset; the last event's error and the raw alarm data stand
 /// beside it.
 Result<AlarmPlan> plan_alarms(const Profile& profile) {
   if (!profile.alarm_lists.empty()) return plan_lists(profile);
   AlarmPlan plan;
-  const auto reset = profile.find_action("alarm-reset");
-  if (!reset) return tl::unexpected(reset.error());
-  auto present = profile.find(reset->confirm);
-  if (!present) return tl::unexpected(std::move(present.error()));
-  plan.sources.push_back({std::string(present_list), std::move(*present)});
+  const auto reset = profile.find_action(reset_action);
+  if (reset && !reset->confirm.empty()) {
+    auto present = profile.find(reset->confirm);
+    if (!present) return tl::unexpected(std::move(present.error()));
+    plan.sources.push_back({std::string(present_list), std::move(*present)});
+  }
   if (auto error = profile.find("event.error")) {
     plan.sources.push_back({"last-event", std::move(*error)});
   }
@@ -70,6 +78,7 @@ Result<AlarmPlan> plan_alarms(const Profile& profile) {
     for (Parameter& parameter : *data)
       plan.sources.push_back({std::string(data_list), std::move(parameter)});
   }
+  if (plan.sources.empty()) return tl::unexpected(no_alarms(profile));
   return plan;
 }
 
@@ -92,10 +101,14 @@ report::Record alarm_record(const std::string& list, std::size_t index,
 /// What was found, and what became of the reset.
 struct Findings {
   Outcome outcome = {};
-  catalogue::Value present = {};  ///< the present alarm; 0: none
+  catalogue::Value present = {};  ///< the present alarm; 0: none was found
+  bool was_asked = false;         ///< something that tells the present alarm was asked for
+  bool was_told = true;           ///< and it answered
   catalogue::Resettable resettable = catalogue::Resettable::unknown;
   enum class Reset : std::uint8_t { none, done, failed } reset = Reset::none;
 
+  /// Whether it is known that there was an alarm, or that there was none.
+  [[nodiscard]] bool is_known() const { return was_present() || (was_asked && was_told); }
   [[nodiscard]] bool was_present() const { return present.number != Decimal(0); }
   /// Whether there is still an alarm now.
   [[nodiscard]] bool is_present() const { return was_present() && reset != Reset::done; }
@@ -116,7 +129,10 @@ const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table
 void tell(const Source& source, std::size_t index, const device::Reading& reading,
           const catalogue::CodeTables& tables, const OpenTool& tool, Findings& findings,
           Listing& listing, const Clock& clock) {
+  const bool tells_present = source.list == present_list;
+  findings.was_asked = findings.was_asked || tells_present;
   if (!reading.value) {
+    findings.was_told = findings.was_told && !tells_present;
     findings.outcome.fail(reading.value.error());
     listing.add(reading.value.error());
     return;
@@ -129,7 +145,7 @@ void tell(const Source& source, std::size_t index, const device::Reading& readin
   if (source.list != data_list) {
     text = text_of(reading.value->number.mantissa(), source.table, tables, tool);
   }
-  if (source.list == present_list) {
+  if (tells_present && !findings.was_present()) {
     findings.present = *reading.value;
     if (text != nullptr) findings.resettable = text->resettable;
   }
@@ -197,13 +213,14 @@ std::string sentence_of(const Findings& findings) {
     case Findings::Reset::none:
       break;
   }
+  if (!findings.is_known()) return "whether an alarm is present is not known";
   if (!findings.is_present()) return "no alarm present";
   return fmt::format("alarm {} is present", findings.present.to_string());
 }
 
-Summary summary_of(std::size_t present, const Outcome& outcome, std::string sentence,
+Summary summary_of(report::Cell present, const Outcome& outcome, std::string sentence,
                    const std::string& target) {
-  return {.counts = {{"present", count(present)}, {"failed", count(outcome.failed())}},
+  return {.counts = {{"present", std::move(present)}, {"failed", count(outcome.failed())}},
           .sentence = std::move(sentence),
           .target = target};
 }
@@ -211,7 +228,14 @@ Summary summary_of(std::size_t present, const Outcome& outcome, std::string sent
 Result<AlarmPlan> plan(const Profile& profile, const AlarmsOptions& options, const Target& target) {
   auto plan = plan_alarms(profile);
   if (!plan || options.reset == AlarmReset::no) return plan;
-  auto deed = parse_deed("alarm-reset", profile);
+  if (!profile.find_action(reset_action)) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = fmt::format("profile {} has no action that resets alarms", profile.id),
+              .hint = fmt::format("an action '{}' in the profile does it, see spindle-profile(5)",
+                                  reset_action)});
+  }
+  auto deed = parse_deed(std::string(reset_action), profile);
   if (!deed) return tl::unexpected(std::move(deed.error()));
   plan->reset = std::move(*deed);
   return check_evidence(plan->reset->action, target, options.acceptance).map([&] {
@@ -235,8 +259,9 @@ Result<Findings> examine(const Target& target, const AlarmsOptions& options, Ask
     done = reset(*opened->prepared.reset, asked, opened->tool, findings, context);
   }
   if (!done) return tl::unexpected(std::move(done.error()));
-  return tell(summary_of(findings.was_present() ? 1 : 0, findings.outcome, sentence_of(findings),
-                         target.shown),
+  const report::Cell present =
+      findings.is_known() ? count(findings.was_present() ? 1 : 0) : report::Cell();
+  return tell(summary_of(present, findings.outcome, sentence_of(findings), target.shown),
               findings.outcome, context)
       .map([&] { return findings; });
 }
@@ -258,24 +283,32 @@ Result<Readiness<std::vector<Deed>>> agree_to_reset(const std::vector<Target>& t
   });
 }
 
-std::string sentence_of(std::size_t present, std::size_t failed, std::size_t of) {
-  const std::string found = present == 0
-                                ? std::string("no alarm present")
-                                : fmt::format("alarms on {} of {}", present, counted(of, "tool"));
-  return found + failed_in_words(failed, of);
-}
-
-/// How many tools of a group had an alarm, have one still, and could not be examined or reset.
+/// How many tools of a group had an alarm, have one still, do not say, and could not be examined or
+/// reset.
 struct Tally {
   std::size_t present = 0;
   std::size_t remaining = 0;
+  std::size_t unknown = 0;
   std::size_t failed = 0;
 };
+
+std::string sentence_of(const Tally& tally, std::size_t failed, std::size_t of) {
+  std::string found = tally.remaining == 0
+                          ? std::string("no alarm present")
+                          : fmt::format("alarms on {} of {}", tally.remaining, counted(of, "tool"));
+  if (tally.unknown > 0) {
+    const std::string unknown =
+        fmt::format("not known of {} of {}", tally.unknown, counted(of, "tool"));
+    found = tally.remaining == 0 && tally.unknown == of ? unknown : found + ", " + unknown;
+  }
+  return found + failed_in_words(failed, of);
+}
 
 Tally tally_of(const std::vector<Performance<Findings>>& performances) {
   Tally tally;
   for (const auto& [tape, found] : performances) {
     if (found && found->was_present()) ++tally.present;
+    if (found && !found->is_known()) ++tally.unknown;
     if (found && found->is_present()) ++tally.remaining;
     if (!found || found->outcome.failed() > 0) ++tally.failed;
   }
@@ -291,8 +324,8 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
     auto ready = agree_to_reset(targets, options, context);
     if (!ready) return tl::unexpected(std::move(ready.error()));
     if (ready->refused.failed() > 0) {
-      return refuse_all(ready->refused, summary_of(0, ready->refused, {}, {}), targets.size(),
-                        context);
+      return refuse_all(ready->refused, summary_of(count(0), ready->refused, {}, {}),
+                        targets.size(), context);
     }
     reached = std::move(ready->targets);
     outcome = ready->lost;
@@ -306,8 +339,8 @@ Result<Outcome> examine_group(const std::vector<Target>& targets, const AlarmsOp
   const std::size_t failed = targets.size() - reached.size() + tally.failed;
   return play(performances, context)
       .and_then([&] {
-        return tell(summary_of(tally.present, outcome,
-                               sentence_of(tally.remaining, failed, targets.size()), {}),
+        return tell(summary_of(count(tally.present), outcome,
+                               sentence_of(tally, failed, targets.size()), {}),
                     outcome, context);
       })
       .map([&] { return outcome; });

@@ -123,8 +123,9 @@ class Saving {
 
  private:
   Result<void> write(const std::string& path, const std::string& text) {
-    if (path != standard_output) return context_->disk.write(path, text, options_->overwrite);
-    return context_->io.out(text);
+    if (path == standard_output) return context_->io.out(text);
+    const Privacy privacy = options_->secrets == Secrets::include ? Privacy::own : Privacy::usual;
+    return context_->disk.write(path, text, options_->overwrite, privacy);
   }
 
   /// Of several tools it is shown how many are done.

@@ -113,7 +113,8 @@ Result<void> RestoreRun::save_present() {
   const std::string path = fmt::format("{}/{}-{}.yaml", folder, file_name_of(task_->present.target),
                                        without_colons(task_->present.time));
   auto saved = context_->disk.make_folders(folder, Privacy::own).and_then([&] {
-    return context_->disk.write(path, files::render_backup(task_->present), Overwrite::allow);
+    return context_->disk.write(path, files::render_backup(task_->present), Overwrite::allow,
+                                Privacy::own);
   });
   if (!saved) {
     saved.error().hint = "the tool's present state must be saved first, so nothing was written";

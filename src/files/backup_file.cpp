@@ -13,6 +13,7 @@
 #include "files/yaml_map.hpp"
 #include "files/yaml_reader.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/base/utf8.hpp"
 
 namespace spindle::files {
 namespace {
@@ -54,17 +55,45 @@ bool is_plain(std::string_view text) {
          std::find(other_meaning.begin(), other_meaning.end(), text) == other_meaning.end();
 }
 
-/// Quoted where another reader of YAML might take it for something else.
+/// Characters that a reader of YAML would fold or refuse, or that nobody would see: controls, marks
+/// of width and direction, separators of lines, and those that are none.
+constexpr std::array<std::pair<char32_t, char32_t>, 7> escaped_ranges = {{{0x00, 0x1F},
+                                                                          {0x7F, 0x9F},
+                                                                          {0x200B, 0x200F},
+                                                                          {0x2028, 0x202E},
+                                                                          {0x2060, 0x206F},
+                                                                          {0xFEFF, 0xFEFF},
+                                                                          {0xFFF9, 0xFFFF}}};
+
+bool is_escaped(char32_t value) {
+  return std::any_of(escaped_ranges.begin(), escaped_ranges.end(), [value](const auto& range) {
+    return value >= range.first && value <= range.second;
+  });
+}
+
+void append_escaped(std::string& out, char32_t value) {
+  constexpr char32_t last_of_two_digits = 0xFF;
+  const auto number = static_cast<std::uint32_t>(value);
+  if (value <= last_of_two_digits) {
+    fmt::format_to(std::back_inserter(out), "\\x{:02x}", number);
+  } else {
+    fmt::format_to(std::back_inserter(out), "\\u{:04x}", number);
+  }
+}
+
+/// In quotes, so that every reader of YAML takes it for the same text. What is no character at all
+/// has no place in YAML, and is replaced.
 std::string quoted(std::string_view text) {
   std::string out = "\"";
-  for (const char c : text) {
-    const bool is_control = static_cast<unsigned char>(c) < ' ' || c == '\x7f';
-    if (is_control) {
-      fmt::format_to(std::back_inserter(out), "\\x{:02x}", static_cast<unsigned char>(c));
-      continue;
+  while (!text.empty()) {
+    const CodePoint character = first_code_point(text);
+    if (is_escaped(character.value) || !character.well_formed) {
+      append_escaped(out, character.value);
+    } else {
+      if (text.front() == '"' || text.front() == '\\') out += '\\';
+      out += text.substr(0, character.length);
     }
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
+    text.remove_prefix(character.length);
   }
   return out + '"';
 }

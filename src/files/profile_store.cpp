@@ -28,9 +28,10 @@ std::string in_folder(const std::string& folder, std::string_view id) {
   return fmt::format("{}/{}{}", folder, id, extension);
 }
 
-bool is_file(const std::string& path) {
+/// Where one may not look there may be one: reading it says why not.
+bool may_be_file(const std::string& path) {
   std::error_code problem;
-  return std::filesystem::exists(path, problem);
+  return std::filesystem::exists(path, problem) || problem == std::errc::permission_denied;
 }
 
 /// One file of a chain of bases.
@@ -55,10 +56,10 @@ std::optional<std::string> locate_base(const Layer& layer,
   std::string folder = std::filesystem::path(layer.path).parent_path().string();
   if (folder.empty()) folder = ".";
   std::string beside = in_folder(folder, id);
-  if (is_file(beside)) return beside;
+  if (may_be_file(beside)) return beside;
   for (const std::string& other : folders) {
     std::string path = in_folder(other, id);
-    if (is_file(path)) return path;
+    if (may_be_file(path)) return path;
   }
   return std::nullopt;
 }
@@ -199,7 +200,7 @@ Result<std::string> locate(std::string_view name_or_file, const std::vector<std:
   if (is_catalogue_name(name_or_file)) {
     for (const std::string& folder : folders) {
       std::string path = in_folder(folder, name_or_file);
-      if (is_file(path)) return path;
+      if (may_be_file(path)) return path;
     }
   }
   std::vector<std::string> ids;

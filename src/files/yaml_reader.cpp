@@ -8,10 +8,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <system_error>
 #include <unordered_set>
 #include <utility>
 
@@ -226,6 +228,15 @@ Error unreadable(const std::string& path, std::string message) {
   return {.code = Errc::bad_file, .message = std::move(message), .name = path};
 }
 
+/// Why the system would not open it, in its own words but for what everybody knows.
+Error not_opened(const std::string& path, int code) {
+  if (code == ENOENT || code == ENOTDIR) return unreadable(path, "no such file");
+  Error error = unreadable(path, fmt::format("the file cannot be opened for reading: {}",
+                                             std::generic_category().message(code)));
+  if (code == EACCES) error.hint = "check who may read it, and who may look into its folder";
+  return error;
+}
+
 }  // namespace
 
 std::string Finding::to_string() const {
@@ -285,12 +296,9 @@ Result<std::string> read_text_file(const std::string& path) {
   if (std::filesystem::is_directory(path, problem)) {
     return tl::unexpected(unreadable(path, "is a folder, not a file"));
   }
+  errno = 0;
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) {
-    const bool exists = std::filesystem::exists(path, problem);
-    return tl::unexpected(
-        unreadable(path, exists ? "the file cannot be opened for reading" : "no such file"));
-  }
+  if (!stream) return tl::unexpected(not_opened(path, errno));
   std::string text;
   std::array<char, read_step> step{};
   while (stream && text.size() <= largest_file) {

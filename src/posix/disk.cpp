@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "posix/descriptor.hpp"
+#include "posix/write_whole.hpp"
 #include "spindle/posix/world.hpp"
 
 namespace spindle::posix {
@@ -27,6 +28,7 @@ constexpr std::size_t largest_file = std::size_t{1} << 20;
 constexpr std::size_t read_step = 16384;
 constexpr mode_t private_folder = 0700;
 constexpr mode_t usual_folder = 0777;
+constexpr mode_t private_file = 0600;
 constexpr mode_t usual_file = 0666;  // less what the user masks
 /// Names of temporary files that may be taken by what a killed program left.
 constexpr unsigned most_attempts = 100;
@@ -47,11 +49,19 @@ std::string hint_for(int code) {
   }
 }
 
-Error failed(const std::string& path, std::string_view what, int code) {
-  return {.code = Errc::bad_file,
+Error failed(Errc kind, const std::string& path, std::string_view what, int code) {
+  return {.code = kind,
           .message = fmt::format("{}: {}", what, std::generic_category().message(code)),
           .hint = hint_for(code),
           .name = path};
+}
+
+Error unreadable(const std::string& path, int code) {
+  return failed(Errc::bad_file, path, "cannot be read", code);
+}
+
+Error unwritable(const std::string& path, int code) {
+  return failed(Errc::storage, path, "cannot be written", code);
 }
 
 Error exists_already(const std::string& path) {
@@ -61,24 +71,11 @@ Error exists_already(const std::string& path) {
           .name = path};
 }
 
-Error not_a_file(const std::string& path) {
-  return {.code = Errc::bad_file,
+Error not_a_file(Errc kind, const std::string& path) {
+  return {.code = kind,
           .message = "this is no ordinary file",
           .hint = "choose another path",
           .name = path};
-}
-
-/// 0, or the errno of the write that failed.
-int write_all(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written >= 0) {
-      text.remove_prefix(static_cast<std::size_t>(written));
-    } else if (errno != EINTR) {
-      return errno;
-    }
-  }
-  return 0;
 }
 
 Result<std::string> read_file(const std::string& path) {
@@ -88,18 +85,18 @@ Result<std::string> read_file(const std::string& path) {
                                                   .message = "no such file",
                                                   .hint = "check the path",
                                                   .name = path}
-                                          : failed(path, "cannot be read", errno));
+                                          : unreadable(path, errno));
   }
   struct stat about = {};
   if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) {
-    return tl::unexpected(not_a_file(path));
+    return tl::unexpected(not_a_file(Errc::bad_file, path));
   }
   std::string text;
   std::array<char, read_step> step{};
   while (text.size() <= largest_file) {
     const ssize_t got = ::read(file.number(), step.data(), step.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return tl::unexpected(failed(path, "cannot be read", errno));
+    if (got < 0) return tl::unexpected(unreadable(path, errno));
     if (got == 0) return text;
     text.append(step.data(), static_cast<std::size_t>(got));
   }
@@ -112,13 +109,13 @@ Result<std::string> read_file(const std::string& path) {
 /// A file that is removed unless it gets its name.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const fs::path& beside) {
+  TemporaryFile(const fs::path& beside, Privacy privacy) {
+    const mode_t mode = privacy == Privacy::own ? private_file : usual_file;
     for (unsigned attempt = 0; attempt < most_attempts && !exists_; ++attempt) {
       const std::string name =
           fmt::format(".{}.{}-{}.tmp", beside.filename().string(), ::gettid(), attempt);
       path_ = (beside.parent_path() / name).string();
-      file_ =
-          Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, usual_file));
+      file_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
       exists_ = file_.valid();
       if (!exists_ && errno != EEXIST) return;
     }
@@ -133,7 +130,7 @@ class TemporaryFile {
 
   /// 0 when the text has reached the disk, else the errno.
   [[nodiscard]] int store(std::string_view text) const {
-    if (const int code = write_all(file_.number(), text); code != 0) return code;
+    if (const int code = write_whole(file_.number(), text, WhenFull::fail); code != 0) return code;
     return ::fsync(file_.number()) == 0 ? 0 : errno;
   }
 
@@ -176,11 +173,12 @@ void sync_folder(const fs::path& folder) {
   if (opened.valid()) ::fsync(opened.number());
 }
 
-Result<void> write_file(const std::string& named, std::string_view text, Overwrite overwrite) {
+Result<void> write_file(const std::string& named, std::string_view text, Overwrite overwrite,
+                        Privacy privacy) {
   std::error_code unknown;
   const fs::file_status status = fs::status(named, unknown);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
-    return tl::unexpected(not_a_file(named));
+    return tl::unexpected(not_a_file(Errc::storage, named));
   }
   if (fs::exists(status) && overwrite == Overwrite::refuse) {
     return tl::unexpected(exists_already(named));
@@ -188,13 +186,13 @@ Result<void> write_file(const std::string& named, std::string_view text, Overwri
   // A link stays a link; what it leads to is replaced.
   fs::path path = fs::exists(status) ? fs::canonical(named, unknown) : fs::absolute(named, unknown);
   if (path.empty()) path = named;
-  TemporaryFile temporary(path);
-  if (!temporary.exists()) return tl::unexpected(failed(named, "cannot be written", errno));
-  temporary.look_like(path);
+  TemporaryFile temporary(path, privacy);
+  if (!temporary.exists()) return tl::unexpected(unwritable(named, errno));
+  if (privacy == Privacy::usual) temporary.look_like(path);
   int code = temporary.store(text);
   if (code == 0) code = temporary.rename_to(path.string(), overwrite);
   if (code == EEXIST) return tl::unexpected(exists_already(named));
-  if (code != 0) return tl::unexpected(failed(named, "cannot be written", code));
+  if (code != 0) return tl::unexpected(unwritable(named, code));
   sync_folder(path.parent_path());
   return {};
 }
@@ -209,58 +207,52 @@ void lock_for_a_while(const Descriptor& file) {
   }
 }
 
-/// Whether the last line of a file that is open for writing has no end.
-bool ends_within_a_line(const Descriptor& file, const std::string& path) {
-  struct stat about = {};
-  const bool has_text =
-      ::fstat(file.number(), &about) == 0 && S_ISREG(about.st_mode) && about.st_size > 0;
-  if (!has_text) return false;
-  const Descriptor readable(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  char last = '\n';
-  const bool known =
-      readable.valid() && ::pread(readable.number(), &last, 1, about.st_size - 1) == 1;
-  return known && last != '\n';
-}
-
 /// Whether a crash or a full disk cut the last line off; one that is just being written gets its
 /// end in a moment.
-bool is_cut_off(const Descriptor& file, const std::string& path) {
+bool is_cut_off(const Descriptor& file) {
   constexpr int moment_ms = 5;
-  if (!ends_within_a_line(file, path)) return false;
+  if (!ends_within_line(file.number())) return false;
   ::poll(nullptr, 0, moment_ms);
-  return ends_within_a_line(file, path);
+  return ends_within_line(file.number());
 }
 
 Result<void> append_line(const std::string& path, std::string_view text) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, usual_file));
-  if (!file.valid()) return tl::unexpected(failed(path, "cannot be written", errno));
+  if (!file.valid()) return tl::unexpected(unwritable(path, errno));
   lock_for_a_while(file);
   std::string line(text);
-  if (is_cut_off(file, path)) line.insert(line.begin(), '\n');
-  const ssize_t written = ::write(file.number(), line.data(), line.size());
-  if (written == static_cast<ssize_t>(line.size())) return {};
-  return tl::unexpected(failed(path, "cannot be written", written < 0 ? errno : ENOSPC));
+  if (is_cut_off(file)) line.insert(line.begin(), '
+');
+  const int code = write_whole(file.number(), line, WhenFull::fail);
+  if (code != 0) return tl::unexpected(unwritable(path, code));
+  return {};
 }
 
 Result<void> make_folders(const std::string& folder, Privacy privacy) {
   const mode_t mode = privacy == Privacy::own ? private_folder : usual_folder;
   const fs::path path(folder);
+  std::error_code unknown;
   fs::path made;
   for (const fs::path& part : path) {
     made /= part;
     if (::mkdir(made.c_str(), mode) == 0 || errno == EEXIST) continue;
-    if (fs::is_directory(made)) continue;
-    return tl::unexpected(failed(folder, "the folder cannot be made", errno));
+    const int code = errno;
+    if (fs::is_directory(made, unknown)) continue;
+    return tl::unexpected(failed(Errc::storage, folder, "the folder cannot be made", code));
   }
-  std::error_code unknown;
   if (fs::is_directory(path, unknown)) return {};
-  return tl::unexpected(failed(folder, "the folder cannot be made", ENOTDIR));
+  return tl::unexpected(failed(Errc::storage, folder, "the folder cannot be made", ENOTDIR));
 }
 
 bool file_exists(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
+}
+
+bool file_is_absent(const std::string& path) {
+  struct stat about = {};
+  return ::stat(path.c_str(), &about) != 0 && (errno == ENOENT || errno == ENOTDIR);
 }
 
 std::string user_name() {
@@ -276,6 +268,7 @@ std::string user_name() {
 
 Disk local_disk() {
   return {.exists = file_exists,
+          .absent = file_is_absent,
           .read = read_file,
           .write = write_file,
           .append = append_line,

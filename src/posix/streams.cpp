@@ -9,28 +9,9 @@
 #include <system_error>
 
 #include "posix/wait.hpp"
+#include "posix/write_whole.hpp"
 
 namespace spindle::posix {
-namespace {
-
-// 0, or the errno of the write that failed.
-int write_all(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written >= 0) {
-      text.remove_prefix(static_cast<std::size_t>(written));
-    } else if (errno == EAGAIN) {
-      // A terminal or pipe shared with a program that made it non-blocking.
-      pollfd room = {descriptor, POLLOUT, 0};
-      ::poll(&room, 1, -1);
-    } else if (errno != EINTR) {
-      return errno;
-    }
-  }
-  return 0;
-}
-
-}  // namespace
 
 bool hold_standard_descriptors() {
   for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -43,17 +24,16 @@ bool hold_standard_descriptors() {
 }
 
 Result<void> write_out(std::string_view text) {
-  const int failure = write_all(STDOUT_FILENO, text);
+  const int failure = write_whole(STDOUT_FILENO, text, WhenFull::wait);
   if (failure == 0) return {};
   if (failure == EPIPE) return tl::unexpected(Error{.code = Errc::closed_pipe});
   return tl::unexpected(Error{
-      .code = Errc::internal,
+      .code = Errc::storage,
       .message = "standard output cannot be written: " + std::generic_category().message(failure),
-      .hint = "check the file, disk or program that it goes to",
   });
 }
 
-void write_err(std::string_view text) { write_all(STDERR_FILENO, text); }
+void write_err(std::string_view text) { write_whole(STDERR_FILENO, text, WhenFull::wait); }
 
 namespace {
 
@@ -65,6 +45,9 @@ std::optional<std::string> read_line(const Clock& clock, const Interrupt& interr
     // A user who presses Ctrl-C at a question wants out, also just before the wait begins.
     const Woken woken = wait_for({STDIN_FILENO, POLLIN}, TimePoint::max(), clock, interrupt);
     const ssize_t got = woken == Woken::ready ? ::read(STDIN_FILENO, &byte, 1) : -1;
+    // Another reader of a shared pipe was faster; where the wait itself ended, so does the
+    // question.
+    if (got < 0 && woken == Woken::ready && (errno == EAGAIN || errno == EINTR)) continue;
     if (got < 0) return std::nullopt;
     if (got == 0) break;
     if (byte == '\n') return line;
@@ -92,6 +75,8 @@ bool is_terminal(Std stream) {
   }
   return false;
 }
+
+bool out_ends_within_line() { return ends_within_line(STDOUT_FILENO); }
 
 bool err_is_ready() {
   pollfd room = {STDERR_FILENO, POLLOUT, 0};

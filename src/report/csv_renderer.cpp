@@ -6,6 +6,8 @@
 namespace spindle::report {
 namespace {
 
+constexpr std::string_view line_end = "\r\n";
+
 /// RFC 4180, section 2: rules 5 to 7.
 void append_csv_field(std::string& out, std::string_view text) {
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
@@ -49,12 +51,13 @@ class CsvRenderer final : public PlainRenderer {
       if (&key != &keys_.front()) line_ += ',';
       append_csv_field(line_, text_of(key));
     }
-    line_ += "\r\n";
-    return streams().out(line_);
+    line_ += line_end;
+    return lines_.write(line_);
   }
 
   std::vector<std::string> keys_;
   std::string line_;
+  LineWriter lines_{streams(), line_end};
 };
 
 }  // namespace

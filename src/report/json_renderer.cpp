@@ -14,7 +14,7 @@ class JsonRenderer final : public Renderer {
     line_.clear();
     append_json(line_, record);
     line_ += '\n';
-    return streams_.out(line_);
+    return lines_.write(line_);
   }
 
   Result<void> end() override { return {}; }
@@ -39,6 +39,7 @@ class JsonRenderer final : public Renderer {
   Streams& streams_;
   Talk talk_;
   std::string line_;
+  LineWriter lines_{streams_, "\n"};
 };
 
 }  // namespace

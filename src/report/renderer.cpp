@@ -38,6 +38,14 @@ Record error_record(const Error& error, WallTime time) {
   return record;
 }
 
+Result<void> LineWriter::write(std::string_view line) {
+  const bool cut_off =
+      !has_begun_ && streams_->out_ends_within_line && streams_->out_ends_within_line();
+  auto written = cut_off ? streams_->out(std::string(line_end_).append(line)) : streams_->out(line);
+  has_begun_ = has_begun_ || written.has_value();
+  return written;
+}
+
 void say_error(const Streams& streams, const Error& error) {
   streams.err("spindle: " + printable(describe(error), LineBreaks::fold) + "\n");
 }

@@ -11,6 +11,23 @@ std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Talk talk);
 std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Talk talk);
 std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Talk talk);
 
+/// Lines for programs. The first one begins on a line of its own, also in a file whose last line a
+/// crash or a full disk cut off.
+class LineWriter {
+ public:
+  /// `line_end` is what ends each line; `streams` must outlive it.
+  LineWriter(const Streams& streams, std::string_view line_end)
+      : streams_(&streams), line_end_(line_end) {}
+
+  /// A line with its end, whole or not at all.
+  Result<void> write(std::string_view line);
+
+ private:
+  const Streams* streams_;
+  std::string_view line_end_;
+  bool has_begun_ = false;
+};
+
 /// What tables and CSV have in common: everything beside the data goes to stderr as sentences.
 class PlainRenderer : public Renderer {
  public:

@@ -1,6 +1,7 @@
 """Backup, diff and restore: the round trip, and files that are not what they should be."""
 
 import contextlib
+import ctypes
 import os
 import pathlib
 import re
@@ -131,7 +132,7 @@ class RoundTripTest(BackupTest):
         status, stderr = limited(
             resource.RLIMIT_FSIZE, 8192, "backup", self.url, *PROFILE, "-f", path, "--force"
         )
-        self.assertEqual(status, 3, stderr)
+        self.assertEqual(status, 74, stderr)
         self.assertIn("cannot be written", stderr)
         self.assertEqual(pathlib.Path(path).read_bytes(), before)
         self.assert_no_litter("a.yaml")
@@ -143,7 +144,7 @@ class RoundTripTest(BackupTest):
             status, stderr = limited(
                 resource.RLIMIT_FSIZE, 8192, "restore", recorder.url, path, *PROFILE, "--yes"
             )
-        self.assertEqual(status, 3, stderr)
+        self.assertEqual(status, 74, stderr)
         self.assertIn("nothing was written", stderr)
         self.assertEqual(recorder.count(support.WRITE_SINGLE), 0)
 
@@ -151,8 +152,46 @@ class RoundTripTest(BackupTest):
         for path in ("/dev/full", "/dev/null", str(self.folder)):
             with self.subTest(path):
                 finished = support.run("backup", self.url, *PROFILE, "-f", path, "--force")
-                self.assertEqual(finished.status, 3, finished)
+                self.assertEqual(finished.status, 74, finished)
         self.assertTrue(os.path.exists("/dev/full"))
+
+    def secretive_profile(self):
+        path = self.path("secretive.yaml")
+        pathlib.Path(path).write_text(
+            "format: 1\nid: secretive\ntitle: A BM with a secret\nextends: doga-bm\nparameters:\n"
+            "  - {name: pin, register: 300, encoding: u32, access: rw, secret: true, evidence: manual, source: S, title: PIN}\n",
+            "utf-8",
+        )
+        return path
+
+    def test_secrets_are_for_nobody_else(self):
+        profile = ("--profile", self.secretive_profile())
+        path = self.path("secrets.yaml")
+        rights = lambda: os.stat(path).st_mode & 0o777  # noqa: E731
+        usual = support.run("backup", self.url, *profile, "-f", path)
+        self.assertEqual(usual.status, 0, usual)
+        self.assertIn("why: left-out", pathlib.Path(path).read_text())
+        os.chmod(path, 0o644)
+        told = support.run("backup", self.url, *profile, "-f", path, "--include-secrets", "--force")
+        self.assertEqual(told.status, 0, told)
+        self.assertEqual(rights(), 0o600)
+        os.unlink(path)
+        told = support.run("backup", self.url, *profile, "-f", path, "--include-secrets")
+        self.assertEqual((told.status, rights()), (0, 0o600), told)
+
+    def test_a_secret_is_not_recorded_by_whatever_name_it_is_set(self):
+        profile = ("--profile", self.secretive_profile())
+        log = support.home().path / ".local/state/spindle/changes.jsonl"
+        known = len(log.read_text().splitlines()) if log.exists() else 0
+        for name in ("p300", "p301", "@holding:300", "@holding:300/u32"):
+            finished = support.run("set", self.url, *profile, f"{name}=4711")
+            self.assertEqual(finished.status, 0, finished)
+            finished = support.run("set", self.url, *profile, f"{name}=0")
+            self.assertEqual(finished.status, 0, finished)
+        records = [support.parse_json(line) for line in log.read_text().splitlines()[known:]]
+        self.assertGreaterEqual(len(records), 8)
+        for record in records:
+            self.assertEqual((record["old"], record["new"]), (None, None), record)
 
     def test_a_link_stays_a_link(self):
         real = self.backup(self.url, "real.yaml")
@@ -277,6 +316,74 @@ class HostileFileTest(BackupTest):
             self.assertEqual(finished.status, 0, finished)
             name = finished.records("backup")[0]["file"]
             self.assertRegex(name, re.escape(self.path("out")) + r"/[a-z0-9._]+\.yaml\Z")
+
+class PermissionTest(BackupTest):
+    """Where a folder or file may not be looked into, that is said, and not that nothing is there."""
+
+    def refused(self, *arguments, **environment):
+        """Runs spindle without the right of root to look everywhere."""
+        with tempfile.TemporaryFile() as errors:
+            status = support.completed(
+                [support.binary(), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
+                cwd=support.home().path, env=support.home().environment(**environment), preexec_fn=obey_rights,
+            ).returncode  # fmt: skip
+            errors.seek(0)
+            return status, errors.read().decode()
+
+    def setUp(self):
+        super().setUp()
+        self.closed = self.folder / "closed"
+        (self.closed / "spindle").mkdir(parents=True)
+        self.addCleanup(os.chmod, self.closed, 0o700)
+        saved = support.run("backup", "sim:doga-bm", "-f", self.closed / "backup.yaml")
+        self.assertEqual(saved.status, 0, saved)
+        (self.closed / "mine.yaml").write_text("format: 1\nid: mine\ntitle: Mine\nextends: doga-bm\n", "utf-8")
+        (self.closed / "spindle/tools.yaml").write_text('tools: {station3: {url: "sim:doga-bm"}}\n', "utf-8")
+
+    def commands(self):
+        profiles = f"{self.closed}:{support.ROOT}/profiles"
+        return (
+            (3, ["diff", str(self.closed / "backup.yaml"), "sim:doga-bm"], {}),
+            (3, ["get", "sim:doga-bm", "p300", "--profile", str(self.closed / "mine.yaml")], {}),
+            (3, ["list", "--profile", "mine"], {"SPINDLE_PROFILE_PATH": profiles}),
+            (3, ["identify", "station3"], {"XDG_CONFIG_HOME": str(self.closed)}),
+            (3, ["identify", "station3", "--tools", str(self.closed / "spindle/tools.yaml")], {}),
+            (4, ["get", f"rtu://{self.closed}/line?unit=1", "--profile", "orientalmotor-blv", "alarm.present"], {}),
+            (74, ["backup", "sim:doga-bm", "-f", str(self.closed / "new.yaml")], {}),
+            (74, ["backup", "sim:doga-bm", "--dir", str(self.closed / "new")], {}),
+        )
+
+    def test_what_may_be_looked_into_is_found(self):
+        for status, command, environment in self.commands()[:5]:
+            with self.subTest(command):
+                finished = self.refused(*command, **environment)
+                self.assertEqual(finished[0], 0, finished)
+
+    def test_what_may_not_be_looked_into_is_not_called_absent(self):
+        os.chmod(self.closed, 0)
+        for status, command, environment in self.commands():
+            with self.subTest(command):
+                ended, told = self.refused(*command, **environment)
+                self.assertEqual(ended, status, told)
+                self.assertRegex(told, "[Pp]ermission")
+                self.assertNotIn("no such", told)
+
+    def test_a_file_that_may_not_be_read(self):
+        for name in ("backup.yaml", "mine.yaml", "spindle/tools.yaml"):
+            os.chmod(self.closed / name, 0)
+        for status, command, environment in self.commands()[:5]:
+            with self.subTest(command):
+                ended, told = self.refused(*command, **environment)
+                self.assertEqual(ended, status, told)
+                self.assertRegex(told, "[Pp]ermission")
+
+
+def obey_rights():
+    """Root may read every file; a program that it starts now may not."""
+    dropping, library = 24, ctypes.CDLL(None, use_errno=True)  # PR_CAPBSET_DROP
+    for right in (1, 2):  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+        library.prctl(dropping, right, 0, 0, 0)
+
 
 if __name__ == "__main__":
     unittest.main()

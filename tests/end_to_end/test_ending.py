@@ -1,9 +1,15 @@
 """How it ends: signals during every wait, closed pipes, closed streams."""
 
 import collections
+import fcntl
 import os
+import resource
 import signal
 import subprocess
+import sys
+import tempfile
+import termios
+import threading
 import unittest
 
 import hostile_server
@@ -18,6 +24,11 @@ TORQUE = "preset.1.target-torque"
 
 def tearDownModule():
     support.remove_home()
+
+
+def waiting_bytes(pipe):
+    """How much nobody has read yet."""
+    return int.from_bytes(fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
 class SignalTest(unittest.TestCase):
@@ -135,6 +146,8 @@ class SignalTest(unittest.TestCase):
 
 
 class StreamTest(unittest.TestCase):
+    pause = threading.Event()
+
     def head(self, *arguments):
         """Reads one line and closes the pipe, as head -1 does, while the program still writes."""
         reading, writing = support.small_pipe()
@@ -176,7 +189,7 @@ class StreamTest(unittest.TestCase):
         with open("/dev/full", "wb") as full:
             with support.Running(*arguments, stdout=full) as running:
                 finished = running.finish()
-        self.assertEqual(finished.status, 70, finished)
+        self.assertEqual(finished.status, 74, finished)
         sentences = [line for line in finished.stderr.splitlines() if line.startswith("spindle: ")]
         self.assertEqual(len(sentences), 1, finished)
         self.assertIn("standard output cannot be written: No space left on device; check", sentences[0])
@@ -232,6 +245,87 @@ class StreamTest(unittest.TestCase):
             starts = [change for change in self.changes()[known:] if change["name"] == "start"]
             self.assertEqual(len(starts), 2, starts)
             self.check_full("remote-stop", url, *profile)
+
+    def limited(self, limit, path, mode, *arguments):
+        """Runs spindle with standard output into a file that may only become so large, as on a full disk."""
+        with open(path, mode) as output, tempfile.TemporaryFile() as errors:
+            status = support.completed(
+                [support.binary(), *arguments], stdin=subprocess.DEVNULL, stdout=output, stderr=errors,
+                env=support.home().environment(), cwd=support.home().path,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+            ).returncode  # fmt: skip
+            errors.seek(0)
+            return status, errors.read().decode()
+
+    def test_a_record_is_written_whole_or_not_at_all(self):
+        names = [f"p{number}" for number in range(300, 340)]
+        for form in ("json", "csv"):
+            with self.subTest(form), support.simulator() as url:
+                command = ("get", url, "--profile", "doga-bm", *names, "-o", form)
+                whole = support.run(*command).stdout.encode()
+                path = support.home().path / f"out.{form}"
+                for mode, before in (("wb", b""), ("ab", b"what was there before\r\n")):
+                    path.write_bytes(before)
+                    # Somewhere within a line.
+                    status, told = self.limited(len(before) + len(whole) // 2 + 7, path, mode, *command)
+                    self.assertEqual(status, 74, told)
+                    self.assertIn("standard output cannot be written", told)
+                    text = path.read_bytes()
+                    self.assertTrue(text.startswith(before) and text.endswith(b"\n"), text)
+                    lines = text[len(before):].splitlines()
+                    self.assertGreater(len(lines), 10)
+                    if form == "json":
+                        self.assertTrue(all(support.parse_json(line)["name"] for line in lines))
+                    else:
+                        self.assertEqual(lines, whole.splitlines()[: len(lines)])
+
+    def test_a_line_that_was_cut_off_stays_alone(self):
+        with support.simulator() as url:
+            for form, cut in (("json", b'{"schema":"spindle/1","type":"va'), ("csv", b"p300,0,")):
+                with self.subTest(form):
+                    path = support.home().path / f"log.{form}"
+                    path.write_bytes(cut)
+                    for _ in range(2):
+                        status, told = self.limited(1 << 20, path, "ab", "get", url, "p300", "-o", form)
+                        self.assertEqual(status, 0, told)
+                    lines = path.read_bytes().splitlines()
+                    self.assertEqual(lines[0], cut)
+                    self.assertEqual(len(lines), 3 if form == "json" else 5)
+                    if form == "json":
+                        self.assertEqual([support.parse_json(line)["name"] for line in lines[1:]], ["p300"] * 2)
+                    else:
+                        self.assertEqual(lines[1:3], lines[3:5])
+
+    def test_a_slow_reader_is_waited_for(self):
+        """Also where another program made the pipe non-blocking."""
+        with support.simulator() as url:
+            commands = (
+                ("stdout", ["get", url, "--profile", "doga-bm", "p*", "--json"]),
+                ("stdout", ["backup", url, "--profile", "doga-bm", "-f", "-"]),
+                ("stderr", ["get", url, "--profile", "doga-bm", "p*", "--json", "--verbose"]),
+            )
+            for stream, arguments in commands:
+                with self.subTest(arguments, stream=stream):
+                    reading, writing = support.small_pipe()
+                    os.set_blocking(writing, False)
+                    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, stream: writing}
+                    with subprocess.Popen(
+                        [support.binary(), *arguments], stdin=subprocess.DEVNULL, **streams,
+                        env=support.home().environment(), cwd=support.home().path,
+                    ) as process:  # fmt: skip
+                        os.close(writing)
+                        # It fills the pipe, and then it waits.
+                        support.wait_until(lambda r=reading: waiting_bytes(r) > 1000, "the pipe is full")
+                        got = b""
+                        while chunk := os.read(reading, 1000):
+                            got += chunk
+                            self.pause.wait(support.POLL)
+                        os.close(reading)
+                        self.assertEqual(support.wait_for_end(process), 0, got[-300:])
+                    self.assertGreater(len(got), 20_000)
+                    self.assertTrue(got.endswith(b"\n"))
+                    if "--json" in arguments and stream == "stdout":
+                        self.assertEqual(len([support.parse_json(line) for line in got.splitlines()]), 225)
 
     def closed(self, descriptors, *arguments):
         """Runs with descriptors closed, as a daemon's parent may leave them."""

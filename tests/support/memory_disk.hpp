@@ -14,9 +14,10 @@ class MemoryDisk {
   /// What the program sees of it; the disk must outlive them.
   Disk functions() {
     return {.exists = [this](const std::string& path) { return files_.contains(plain(path)); },
+            .absent = [this](const std::string& path) { return !files_.contains(plain(path)); },
             .read = [this](const std::string& path) { return read(path); },
-            .write = [this](const std::string& path, std::string_view text,
-                            Overwrite overwrite) { return write(path, text, overwrite); },
+            .write = [this](const std::string& path, std::string_view text, Overwrite overwrite,
+                            Privacy) { return write(path, text, overwrite); },
             .append = [this](const std::string& path, std::string_view line) -> Result<void> {
               const std::lock_guard lock(mutex_);
               if (full_) return tl::unexpected(no_room(path));
@@ -45,7 +46,7 @@ class MemoryDisk {
     return path.starts_with("./") ? path.substr(2) : path;
   }
   static Error no_room(const std::string& path) {
-    return {.code = Errc::bad_file,
+    return {.code = Errc::storage,
             .message = "cannot be written: No space left on device",
             .name = path};
   }

@@ -2,6 +2,8 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -137,6 +139,94 @@ TEST_CASE("pairs, signs and names that YAML would take for something else come b
   const auto loaded = load(text, profile);
   REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
   CHECK(render_backup(*loaded) == text);
+}
+
+namespace {
+
+/// Characters that readers of YAML, terminals and editors treat each in its own way.
+const std::vector<std::string>& hostile_characters() {
+  static const std::vector<std::string> characters = [] {
+    std::vector<std::string> made = {
+        "a",      "7",      " ",          "  ",         ": ",     " #",     "#",      "'",
+        "\"",     "\\",     "\\N",        "\\x41",      "{",      "}",      "[",      "]",
+        ",",      "- ",     "? ",         "&x",         "*x",     "!x",     "|",      ">",
+        "%",      "@",      "`",          "~",          "---",    "...",    "null",   "true",
+        "0x1F",   "1e3",    "é",          "ト",         "°",      "Ω",      "\u0085", "\u00a0",
+        "\u00ad", "\u200b", "\u200e",     "\u2028",     "\u2029", "\u202e", "\u2066", "\ufeff",
+        "\ufffd", "\uffff", "\U0001f529", "\U0010ffff", "\u0300", "\u3000", "\ue000", "\ud7ff"};
+    for (char c = 0; c < ' '; ++c) made.emplace_back(1, c);
+    made.emplace_back(1, '\x7f');
+    return made;
+  }();
+  return characters;
+}
+
+std::string hostile_text(std::mt19937& random) {
+  const auto& characters = hostile_characters();
+  std::string text;
+  const auto pieces = std::uniform_int_distribution<int>(0, 12)(random);
+  for (int i = 0; i < pieces; ++i) {
+    text +=
+        characters[std::uniform_int_distribution<std::size_t>(0, characters.size() - 1)(random)];
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("whatever is in its texts, a backup is read back equal") {
+  std::mt19937 random(20261122);
+  for (int round = 0; round < 400; ++round) {
+    CAPTURE(round);
+    // The first rounds take each character alone, and between two others.
+    const auto& characters = hostile_characters();
+    const auto at = static_cast<std::size_t>(round) / 2;
+    const std::string label = at < characters.size()
+                                  ? (round % 2 == 0 ? characters[at] : "x" + characters[at] + "y")
+                                  : hostile_text(random) + "z";
+    Profile profile = odd_profile();
+    profile.parameters.at(1).labels = {{-2, label}, {-3, "other"}};
+    profile.parameters.at(2).unit = label;
+    profile.id = label;
+    Snapshot snapshot{.time = "t" + hostile_text(random),
+                      .version = "v" + hostile_text(random),
+                      .target = label,
+                      .profile = label,
+                      .fingerprint = "f" + hostile_text(random)};
+    snapshot.identity = catalogue::SnapshotIdentity{.model = label,
+                                                    .model_code = 3,
+                                                    .serial = hostile_text(random) + "s",
+                                                    .firmware = 1,
+                                                    .raw = {7}};
+    add(snapshot, profile, "offset", {0xFFFE});
+    add(snapshot, profile, "on", {4});
+    snapshot.entries.back().unit = label;
+    snapshot.missing = {{profile.find("speed").value(), Missing::absent}};
+    const std::string text = render_backup(snapshot);
+    CAPTURE(text);
+    const auto loaded = load(text, profile);
+    REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
+    CHECK(loaded->time == snapshot.time);
+    CHECK(loaded->version == snapshot.version);
+    CHECK(loaded->target == snapshot.target);
+    CHECK(loaded->profile == snapshot.profile);
+    CHECK(loaded->fingerprint == snapshot.fingerprint);
+    CHECK(loaded->identity->model == snapshot.identity->model);
+    CHECK(loaded->identity->serial == snapshot.identity->serial);
+    CHECK(loaded->entries.at(0).value.label == label);
+    CHECK(loaded->entries.at(1).unit == label);
+    CHECK(render_backup(*loaded) == text);
+    // Each line is one of the file: nothing in a text ends it early.
+    CHECK(std::count(text.begin(), text.end(), '\n') == 15);
+  }
+}
+
+TEST_CASE("a text that is none does not keep a backup from being read") {
+  Snapshot snapshot{
+      .time = "t", .version = "v", .target = "a\xff\x85z", .profile = "odd", .fingerprint = "f"};
+  const auto loaded = load(render_backup(snapshot), odd_profile());
+  REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
+  CHECK(loaded->target == "a\ufffd\ufffdz");
 }
 
 TEST_CASE("an empty backup is one too") {

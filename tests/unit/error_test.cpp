@@ -25,10 +25,19 @@ TEST_CASE("exit statuses and their names are those of the contract") {
     int status;
     std::string_view name;
   };
-  const Case contract[] = {{0, "ok"},           {1, "negative"},    {2, "usage"},
-                           {3, "bad_file"},     {4, "unreachable"}, {5, "no_answer"},
-                           {6, "refused"},      {7, "malformed"},   {8, "mismatch"},
-                           {9, "partial"},      {70, "internal"},   {130, "interrupted"},
+  const Case contract[] = {{0, "ok"},
+                           {1, "negative"},
+                           {2, "usage"},
+                           {3, "bad_file"},
+                           {4, "unreachable"},
+                           {5, "no_answer"},
+                           {6, "refused"},
+                           {7, "malformed"},
+                           {8, "mismatch"},
+                           {9, "partial"},
+                           {70, "internal"},
+                           {74, "storage"},
+                           {130, "interrupted"},
                            {143, "interrupted"}};
   REQUIRE(status_table().size() == std::size(contract));
   for (const auto& row : contract) {
@@ -78,6 +87,7 @@ TEST_CASE("each error belongs to one exit status") {
       {8, {Errc::mismatch, Errc::wrong_generation, Errc::wrong_model}},
       {9, {Errc::partial}},
       {70, {Errc::internal}},
+      {74, {Errc::storage}},
       {130, {Errc::interrupted}},
       {143, {Errc::terminated}},
   };

@@ -1,7 +1,11 @@
 #include <doctest/doctest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -51,7 +55,7 @@ TEST_CASE("a text is written whole, and read again") {
   const Disk disk = posix::local_disk();
   const std::string path = folder / "a.yaml";
   CHECK_FALSE(disk.exists(path));
-  REQUIRE(disk.write(path, "one\n", Overwrite::refuse));
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse, Privacy::usual));
   CHECK(disk.exists(path));
   CHECK(text_of(path) == "one\n");
   CHECK(folder.count() == 1);
@@ -61,16 +65,27 @@ TEST_CASE("a file is replaced only when that is allowed, and keeps its rights") 
   const Folder folder;
   const Disk disk = posix::local_disk();
   const std::string path = folder / "a.yaml";
-  REQUIRE(disk.write(path, "one\n", Overwrite::refuse));
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse, Privacy::usual));
   ::chmod(path.c_str(), 0640);
-  const auto refused = disk.write(path, "two\n", Overwrite::refuse);
+  const auto refused = disk.write(path, "two\n", Overwrite::refuse, Privacy::usual);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == Errc::usage);
   CHECK(text_of(path) == "one\n");
-  REQUIRE(disk.write(path, "two\n", Overwrite::allow));
+  REQUIRE(disk.write(path, "two\n", Overwrite::allow, Privacy::usual));
   CHECK(text_of(path) == "two\n");
   CHECK(rights_of(path) == 0640U);
   CHECK(folder.count() == 1);
+}
+
+TEST_CASE("what is for nobody else can not be read by others, also in place of what they could") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  const std::string path = folder / "a.yaml";
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse, Privacy::own));
+  CHECK(rights_of(path) == 0600U);
+  ::chmod(path.c_str(), 0644);
+  REQUIRE(disk.write(path, "two\n", Overwrite::allow, Privacy::own));
+  CHECK(rights_of(path) == 0600U);
 }
 
 TEST_CASE("of several writers of one name exactly one wins") {
@@ -81,7 +96,8 @@ TEST_CASE("of several writers of one name exactly one wins") {
     std::vector<std::jthread> writers;
     for (std::size_t i = 0; i < won.size(); ++i) {
       writers.emplace_back([&, i] {
-        const auto written = posix::local_disk().write(path, std::to_string(i), Overwrite::refuse);
+        const auto written =
+            posix::local_disk().write(path, std::to_string(i), Overwrite::refuse, Privacy::usual);
         won[i] = written ? 1 : 0;
       });
     }
@@ -101,21 +117,21 @@ TEST_CASE("what is no ordinary file is left alone") {
   const Disk disk = posix::local_disk();
   REQUIRE(disk.make_folders(folder / "sub", Privacy::usual));
   for (const std::string& path : {std::string("/dev/null"), folder / "sub"}) {
-    const auto written = disk.write(path, "text", Overwrite::allow);
+    const auto written = disk.write(path, "text", Overwrite::allow, Privacy::usual);
     REQUIRE_FALSE(written);
-    CHECK(written.error().code == Errc::bad_file);
+    CHECK(written.error().status() == ExitStatus::storage);
   }
   CHECK(fs::is_character_file("/dev/null"));
-  CHECK_FALSE(disk.write(folder / "none/a.yaml", "text", Overwrite::allow));
+  CHECK_FALSE(disk.write(folder / "none/a.yaml", "text", Overwrite::allow, Privacy::usual));
   CHECK(folder.count() == 1);
 }
 
 TEST_CASE("a link leads to the file that is replaced") {
   const Folder folder;
   const Disk disk = posix::local_disk();
-  REQUIRE(disk.write(folder / "real", "one", Overwrite::refuse));
+  REQUIRE(disk.write(folder / "real", "one", Overwrite::refuse, Privacy::usual));
   fs::create_symlink("real", folder / "link");
-  REQUIRE(disk.write(folder / "link", "two", Overwrite::allow));
+  REQUIRE(disk.write(folder / "link", "two", Overwrite::allow, Privacy::usual));
   CHECK(fs::is_symlink(folder / "link"));
   CHECK(text_of(folder / "real") == "two");
 }
@@ -167,6 +183,39 @@ TEST_CASE("a full disk is an error of the append") {
   const auto appended = posix::local_disk().append("/dev/full", "line\n");
   REQUIRE_FALSE(appended);
   CHECK(appended.error().message.find("No space left") != std::string::npos);
+  CHECK(appended.error().status() == ExitStatus::storage);
+}
+
+TEST_CASE("a line is added whole or not at all") {
+  const Folder folder;
+  const std::string path = folder / "log";
+  REQUIRE(posix::local_disk().append(path, "one\n"));
+  std::fflush(nullptr);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    // As on a full disk: only the beginning of the line fits.
+    const rlimit limit = {10, 10};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    ::signal(SIGXFSZ, SIG_IGN);
+    const bool added = posix::local_disk().append(path, "a longer line\n").has_value();
+    ::_exit(added ? 1 : 0);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  CHECK(status == 0);
+  CHECK(text_of(path) == "one\n");
+}
+
+TEST_CASE("what may not be looked at is not taken for absent") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  CHECK(disk.absent(folder / "none"));
+  CHECK(disk.absent(folder / "none/below"));
+  REQUIRE(disk.write(folder / "there", "text", Overwrite::refuse, Privacy::usual));
+  CHECK_FALSE(disk.absent(folder / "there"));
+  CHECK(disk.absent(folder / "there/below"));
+  // A name that the system refuses to look up; whoever runs the tests may look into every folder.
+  CHECK_FALSE(disk.absent(folder / std::string(300, 'x')));
 }
 
 TEST_CASE("folders are made with those above them, for whom it may concern") {
@@ -175,7 +224,7 @@ TEST_CASE("folders are made with those above them, for whom it may concern") {
   REQUIRE(disk.make_folders(folder / "a/b/c", Privacy::own));
   CHECK(rights_of(folder / "a/b/c") == 0700U);
   REQUIRE(disk.make_folders(folder / "a/b/c", Privacy::own));
-  REQUIRE(disk.write(folder / "file", "text", Overwrite::refuse));
+  REQUIRE(disk.write(folder / "file", "text", Overwrite::refuse, Privacy::usual));
   CHECK_FALSE(disk.make_folders(folder / "file", Privacy::own));
   CHECK_FALSE(disk.make_folders(folder / "file/below", Privacy::own));
 }

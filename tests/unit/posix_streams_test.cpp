@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -7,7 +8,10 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 
 #include "posix/descriptor.hpp"
@@ -32,6 +36,28 @@ struct Pipe {
   Descriptor writer;
 };
 
+/// A file that can only be written, as behind '>' and '>>' in a shell, and is gone at the end.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(int flags) {
+    const Descriptor made(::mkstemp(name_.data()));
+    writer = Descriptor(::open(name_.c_str(), O_WRONLY | O_CLOEXEC | flags));
+  }
+  ~TemporaryFile() { ::unlink(name_.c_str()); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  [[nodiscard]] std::string text() const {
+    std::ifstream file(name_);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  Descriptor writer;
+
+ private:
+  std::string name_ = (std::filesystem::temp_directory_path() / "spindle-out-XXXXXX").string();
+};
+
 void put(const Descriptor& descriptor, std::string_view text) {
   REQUIRE(::write(descriptor.number(), text.data(), text.size()) ==
           static_cast<ssize_t>(text.size()));
@@ -47,6 +73,9 @@ std::string read_all(const Descriptor& descriptor) {
   return all;
 }
 
+/// Seconds after which a child that hangs is ended; only a test that has failed waits so long.
+constexpr unsigned longest_wait = 120;
+
 // Runs `body` in a child in which `standard` is `descriptor`; the child's exit status is what
 // `body` returns. The test's own streams stay as they are.
 pid_t start(int standard, int descriptor, const std::function<int()>& body) {
@@ -54,7 +83,7 @@ pid_t start(int standard, int descriptor, const std::function<int()>& body) {
   std::fflush(nullptr);
   const pid_t child = ::fork();
   if (child != 0) return child;
-  ::alarm(5);
+  ::alarm(longest_wait);
   ::signal(SIGPIPE, SIG_IGN);
   ::dup2(descriptor, standard);
   ::_exit(body());
@@ -99,11 +128,71 @@ TEST_CASE("streams: a full disk is told in the system's words") {
   const pid_t child = start(STDOUT_FILENO, full.number(), [] {
     const Result<void> result = posix::write_out("x");
     const bool expected =
-        !result && result.error().code == Errc::internal &&
+        !result && result.error().status() == ExitStatus::storage &&
         result.error().message == "standard output cannot be written: No space left on device";
     return expected ? 0 : 1;
   });
   CHECK(finish(child) == 0);
+}
+
+TEST_CASE("streams: a file takes a text whole or not at all") {
+  struct Case {
+    int flags;
+    std::string before;
+  };
+  const Case cases[] = {{0, ""}, {O_APPEND, ""}, {0, "one line\n"}, {O_APPEND, "one line\n"}};
+  for (const Case& row : cases) {
+    CAPTURE(row.flags);
+    CAPTURE(row.before);
+    const TemporaryFile file(row.flags);
+    put(file.writer, row.before);
+    const pid_t child = start(STDOUT_FILENO, file.writer.number(), [] {
+      // As on a full disk: the beginning fits, the rest does not.
+      const rlimit limit = {30, 30};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      ::signal(SIGXFSZ, SIG_IGN);
+      const std::string line(40, 'x');
+      if (posix::write_out(line).has_value()) return 1;
+      // What fits goes where it belongs.
+      return posix::write_out("fits\n").has_value() ? 0 : 2;
+    });
+    CHECK(finish(child) == 0);
+    CHECK(file.text() == row.before + "fits\n");
+  }
+}
+
+TEST_CASE("streams: what another program wrote behind a cut line stays") {
+  const TemporaryFile file(O_APPEND);
+  const pid_t child = start(STDOUT_FILENO, file.writer.number(), [&file] {
+    const rlimit limit = {30, 30};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    ::signal(SIGXFSZ, SIG_IGN);
+    put(file.writer, "the other one\n");
+    return posix::write_out(std::string(40, 'x')).has_value() ? 1 : 0;
+  });
+  CHECK(finish(child) == 0);
+  CHECK(file.text() == "the other one\n");
+}
+
+TEST_CASE("streams: a file that ends within a line is known as such") {
+  struct Case {
+    std::string text;
+    bool within;
+  };
+  for (const Case& row : {Case{"", false}, Case{"a line\n", false}, Case{"a li", true}}) {
+    for (const int flags : {0, O_APPEND}) {
+      CAPTURE(row.text);
+      CAPTURE(flags);
+      const TemporaryFile file(flags);
+      put(file.writer, row.text);
+      const pid_t child = start(STDOUT_FILENO, file.writer.number(),
+                                [] { return posix::out_ends_within_line() ? 1 : 0; });
+      CHECK(finish(child) == (row.within ? 1 : 0));
+    }
+  }
+  Pipe pipe;
+  CHECK(finish(start(STDOUT_FILENO, pipe.writer.number(),
+                     [] { return posix::out_ends_within_line() ? 1 : 0; })) == 0);
 }
 
 TEST_CASE("streams: messages go to standard error, and a closed one is no harm") {

@@ -233,3 +233,25 @@ TEST_CASE("kinds: sizes, bounds and names") {
   }
   CHECK_FALSE(parse_evidence("rumour").has_value());
 }
+
+TEST_CASE("a secret is one by whatever name or number its registers are asked for") {
+  Profile profile = example();
+  Parameter pin = named("pin", RegisterTable::holding, 300, Kind::u32, Access::read_write);
+  pin.secrecy = Secrecy::secret;
+  profile.parameters.push_back(pin);
+  profile.parameters.push_back(
+      named("half", RegisterTable::holding, 301, Kind::u16, Access::read_write));
+  for (const std::string name : {"pin", "half", "p300", "p301", "@holding:300", "@holding:301/i16",
+                                 "@holding:299/u32", "@holding:301/u32"}) {
+    CAPTURE(name);
+    CHECK(profile.find(name).value().secrecy == Secrecy::secret);
+    CHECK(profile.select({name}).value().front().secrecy == Secrecy::secret);
+  }
+  for (const std::string name :
+       {"p299", "p302", "@holding:302", "@holding:298/u32", "@input:300", "preset.1.speed"}) {
+    CAPTURE(name);
+    CHECK(profile.find(name).value().secrecy == Secrecy::open);
+  }
+  CHECK(profile.numbered_parameter(301).secrecy == Secrecy::secret);
+  CHECK(profile.select({"p30?"}).value().at(1).secrecy == Secrecy::secret);
+}

@@ -101,6 +101,45 @@ TEST_CASE("JSON: a line begins as the contract says and keeps numbers exact") {
         "\n");
 }
 
+TEST_CASE("lines for programs begin on a line of their own behind one that was cut off") {
+  struct Case {
+    Format format;
+    std::string_view first;
+  };
+  for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\nf\r\n"}}) {
+    Caught caught;
+    caught.streams.out_ends_within_line = [] { return true; };
+    const auto renderer = make_renderer(row.format, caught.streams, Talk::normal);
+    REQUIRE(renderer->begin(std::vector<Column>{{"F", "f"}}));
+    REQUIRE(renderer->record(one_field(Decimal(1))));
+    REQUIRE(renderer->record(one_field(Decimal(2))));
+    CHECK(caught.out().starts_with(row.first));
+    // Only the first one, and in one piece with what it keeps apart.
+    CHECK(caught.writes.at(1).front() != '\n');
+    CHECK(caught.writes.front().size() > 2);
+  }
+}
+
+TEST_CASE("lines for programs: after a failure the next one is as careful as the first") {
+  std::vector<std::string> tried;
+  bool is_full = true;
+  Caught caught;
+  caught.streams.out_ends_within_line = [] { return true; };
+  caught.streams.out = [&](std::string_view text) -> Result<void> {
+    tried.emplace_back(text);
+    if (is_full) return tl::unexpected(Error{.code = Errc::storage});
+    return {};
+  };
+  const auto renderer = make_renderer(Format::json, caught.streams, Talk::normal);
+  CHECK_FALSE(renderer->record(one_field(Decimal(1))));
+  is_full = false;
+  CHECK(renderer->record(one_field(Decimal(2))));
+  CHECK(renderer->record(one_field(Decimal(3))));
+  CHECK(tried.at(0).front() == '\n');
+  CHECK(tried.at(1).front() == '\n');
+  CHECK(tried.at(2).front() == '{');
+}
+
 TEST_CASE("JSON: without a target it is null") {
   CHECK(json_line(one_field(Decimal(1))) ==
         R"({"schema":"spindle/1","type":"t","time":"2026-11-22T10:15:30.123Z","target":null,"f":1})"

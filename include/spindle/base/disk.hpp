@@ -12,21 +12,28 @@ namespace spindle {
 /// Whether a file that is there may be replaced.
 enum class Overwrite : std::uint8_t { refuse, allow };
 
-/// Who may look into a folder that is made: whoever the user usually allows it, or nobody else.
+/// Who may look into a folder or file that is made: whoever the user usually allows it, or nobody
+/// else.
 enum class Privacy : std::uint8_t { usual, own };
 
-/// The file system as functions, so that tests can bring one in memory. All errors are `bad_file`
-/// and name the path, but for a file that must not be replaced: that is `usage`.
+/// The file system as functions, so that tests can bring one in memory. All errors name the path:
+/// what can not be read is `bad_file`, what can not be written `storage`, but for a file that must
+/// not be replaced: that is `usage`.
 struct Disk {
   std::function<bool(const std::string& path)> exists;
+  /// Whether there is surely nothing of this name. Where one may not look there may be something,
+  /// and reading it says why not.
+  std::function<bool(const std::string& path)> absent;
   /// A whole text. Refuses folders, and what is larger than any file of ours.
   std::function<Result<std::string>(const std::string& path)> read;
   /// All of the text or nothing: what was there stays whole until the new text is safely stored,
-  /// and nothing is left beside it when that fails.
-  std::function<Result<void>(const std::string& path, std::string_view text, Overwrite overwrite)>
+  /// and nothing is left beside it when that fails. A file that is replaced keeps its rights,
+  /// unless the new text is for nobody else.
+  std::function<Result<void>(const std::string& path, std::string_view text, Overwrite overwrite,
+                             Privacy privacy)>
       write;
-  /// Adds a line (with its end) in one piece, so that lines of several programs never mix, and
-  /// behind a line that a crash cut off on a line of its own. Creates the file.
+  /// Adds a line (with its end), whole or not at all, in one piece, so that lines of several programs
+  /// never mix, and behind a line that a crash cut off on a line of its own. Creates the file.
   std::function<Result<void>(const std::string& path, std::string_view line)> append;
   /// Makes a folder and those above it. Existing ones are left as they are.
   std::function<Result<void>(const std::string& folder, Privacy privacy)> make_folders;

@@ -23,6 +23,7 @@ enum class ExitStatus : std::uint8_t {
   mismatch = 8,
   partial = 9,
   internal = 70,
+  storage = 74,
   interrupted = 130,
   terminated = 143,
 };
@@ -59,6 +60,7 @@ enum class Errc : std::uint8_t {
   wrong_model,
   partial,
   internal,
+  storage,
   interrupted,
   terminated,
   closed_pipe,

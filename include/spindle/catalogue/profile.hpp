@@ -289,6 +289,10 @@ class Profile {
     modbus::RegisterAddress maximum;
   };
   [[nodiscard]] std::optional<LimitRegisters> limit_registers(const Parameter& parameter) const;
+
+  /// This parameter, marked as a secret where one of its registers is part of one: a secret is one
+  /// by whatever name or number it is asked for.
+  [[nodiscard]] Parameter with_secrecy(Parameter parameter) const;
 };
 
 /// Parses "@holding:2", "@input:3204/i16" (default u16), without any profile. Empty when the text

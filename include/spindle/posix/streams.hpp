@@ -17,8 +17,9 @@ namespace spindle::posix {
 /// before anything is opened.
 bool hold_standard_descriptors();
 
-/// Writes everything to standard output; `closed_pipe` when its reader is gone, `internal` (with
-/// the system's words) on any other failure, such as a full disk. Restarts after signals.
+/// Writes everything to standard output; `closed_pipe` when its reader is gone, `storage` (with the
+/// system's words) on any other failure, such as a full disk: then a file has nothing of it. Waits
+/// for a slow reader, and restarts after signals.
 Result<void> write_out(std::string_view text);
 
 /// Writes everything to standard error; failures are ignored, there is nobody left to tell.
@@ -32,6 +33,9 @@ std::function<std::optional<std::string>()> line_reader(const Clock& clock,
 /// Whether the reader of standard output is still there. Only pipes and sockets can tell; others
 /// are always open.
 bool out_is_open();
+
+/// Whether standard output is a file that ends within a line, which a crash or a full disk cut off.
+bool out_ends_within_line();
 
 /// Whether standard error takes a line (of at most 4096 bytes) without waiting: not when its pipe
 /// is full or its terminal was halted with Ctrl-S.

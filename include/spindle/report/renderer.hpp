@@ -27,7 +27,7 @@ struct Column {
   std::size_t width = 0;
 };
 
-/// Draws records. Every function fails only with `closed_pipe` or `internal` (the stream cannot be
+/// Draws records. Every function fails only with `closed_pipe` or `storage` (the stream cannot be
 /// written). Not thread-safe: commands with several tools put a mutex around it.
 class Renderer {
  public:

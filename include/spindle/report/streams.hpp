@@ -30,6 +30,8 @@ struct Streams {
   std::function<bool()> err_is_ready = {};
   /// Cells of a row of the terminal behind err(); 0, or an empty function: nobody knows.
   std::function<std::size_t()> err_columns = {};
+  /// Whether out() writes to a file that ends within a line; may be empty, which means no.
+  std::function<bool()> out_ends_within_line = {};
   Color color = Color::off;
 };
 
