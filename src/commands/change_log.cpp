@@ -20,9 +20,10 @@ std::string_view result_of_failure(const Error& error) {
 }
 
 work::LoggedChange logged(const Deed& deed) {
-  return {.name = deed.action.name,
-          .register_address = deed.action.address.value,
-          .new_value = Decimal(deed.value)};
+  work::LoggedChange change{.name = deed.action.name,
+                            .register_address = deed.action.address.value};
+  if (deed.secrecy == catalogue::Secrecy::open) change.new_value = Decimal(deed.value);
+  return change;
 }
 
 work::LoggedChange logged(const Deed& deed, const Result<device::ActionResult>& result) {

@@ -71,6 +71,12 @@ device::ActionResult in_words_of_actions(device::StopResult result) {
 const std::array<Column, 3> columns = {
     {{"ACTION", "action"}, {"VALUE", "value", report::Align::right}, {"RESULT", "result"}}};
 
+catalogue::Secrecy secrecy_of(const Action& action, const Profile& profile) {
+  catalogue::Parameter written;
+  written.address = action.address;
+  return profile.with_secrecy(std::move(written)).secrecy;
+}
+
 }  // namespace
 
 Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
@@ -79,7 +85,7 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
   if (!action) return tl::unexpected(std::move(action.error()));
   const bool given = equals != std::string::npos;
   if (action->value || action->motion != catalogue::Motion::none) {
-    if (!given) return Deed{*action, action->value.value_or(0)};
+    if (!given) return Deed{*action, action->value.value_or(0), secrecy_of(*action, profile)};
     return tl::unexpected(bad_action_value(*action, "it takes no value",
                                            fmt::format("write '{}' alone", action->name)));
   }
@@ -89,7 +95,7 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
   }
   return parse_action_value(*action, std::string_view(text).substr(equals + 1))
       .map([&](std::int64_t value) {
-        return Deed{*action, value};
+        return Deed{*action, value, secrecy_of(*action, profile)};
       });
 }
 

@@ -17,6 +17,7 @@ namespace spindle::commands {
 struct Deed {
   catalogue::Action action;
   std::int64_t value;
+  catalogue::Secrecy secrecy = catalogue::Secrecy::open;  ///< of the register that it writes
 };
 
 /// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`.

@@ -19,6 +19,7 @@ TABLE = json.loads(pathlib.Path(__file__).with_name("hostile_table.json").read_t
 TIMEOUT_MS = 500
 CONNECT_TIMEOUT = 1.0
 SIDE_BY_SIDE = 8
+AGAIN = 3
 SUMMARISED = {"set", "do", "ping"}
 NEW_TORQUE = 280
 CODES = {
@@ -29,6 +30,8 @@ CODES = {
     7: "malformed",
     8: "mismatch",
 }
+
+CODES_OF = {name: status for status, name in CODES.items()}
 
 
 def expanded(argument, url):
@@ -75,6 +78,12 @@ class Judge:
         self.expected = expected
         self.faults = []
         self.records = []
+        self.too_long = False
+
+    def may_be_late(self):
+        """Whether an answer was missed where one was to come, or the end took too long."""
+        missed = '"code":"no_answer"' in self.ordeal.finished.stdout and CODES_OF["no_answer"] not in self.expected
+        return missed or self.too_long
 
     def judge(self):
         self.check_status_and_time()
@@ -97,7 +106,8 @@ class Judge:
         allowed = row.get("waits", 2) * row.get("timeout_ms", TIMEOUT_MS) / 1000 + support.SOON
         if row.get("accept") == "full":
             allowed = CONNECT_TIMEOUT + support.SOON
-        self.demand(finished.paced <= allowed, f"{finished.paced:.2f} s, allowed {allowed:.2f} s")
+        self.too_long = finished.paced > allowed
+        self.demand(not self.too_long, f"{finished.paced:.2f} s, allowed {allowed:.2f} s")
         said = [line for line in finished.stderr.split("\n") if line.startswith("spindle: ")]
         if finished.status == 0:
             self.demand(not said, f"success with an error sentence {said}")
@@ -304,15 +314,26 @@ class HostileTest(unittest.TestCase):
         cls.pool.shutdown(cancel_futures=True)
         support.remove_home()
 
+    def judged(self, row, command, statuses):
+        """An ordeal, and what is wrong with it. An answer that a busy machine holds up past its timeout is none
+        for the program: then it is put to it again, without others beside it. A wrong value is never tried away."""
+        ordeal = self.ordeals[row["name"], command].result()
+        for _ in range(AGAIN):
+            judge = Judge(ordeal, statuses)
+            faults = judge.judge()
+            if not faults or not judge.may_be_late() or any(fault.startswith("WRONG") for fault in faults):
+                break
+            ordeal = Ordeal(row, command).run()
+        return ordeal, Judge(ordeal, statuses).judge()
+
     def judge(self, row):
         for commands, statuses in row["expect"].items():
             for command in commands.split():
-                ordeal = self.ordeals[row["name"], command].result()
+                ordeal, faults = self.judged(row, command, statuses)
                 with self.subTest(command=command):
                     self.assertFalse(ordeal.server.own_faults, "\n".join(ordeal.server.own_faults))
                     if row.get("on"):
                         self.assertGreater(ordeal.server.misbehaved, 0, "the row was not reached")
-                    faults = Judge(ordeal, statuses).judge()
                     told = "\n  ".join(faults)
                     self.assertFalse(
                         faults, f"\n  {told}\n{ordeal.finished}\n  asked: {ordeal.requests[:12]}"

@@ -9,7 +9,7 @@ build_packages=(
 )
 # shellcheck disable=SC2034
 test_packages=(
-  doctest-dev
+  doctest-dev mold
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
   python3-jsonschema mandoc dpkg-dev lintian

@@ -311,7 +311,6 @@ TEST_CASE("open: a connection that nobody completes ends with the connect timeou
   CHECK(opened.error().waited == 60ms);
   CHECK(message_of(opened.error()) == "no connection within 60ms");
   CHECK(took >= 60ms);
-  CHECK(took < 2s);
 }
 
 TEST_CASE("open: an interrupt ends connecting at once") {
