@@ -126,7 +126,7 @@ class ChangesTest(unittest.TestCase):
 
     def killed_between_write_and_answer(self, server, *arguments):
         with support.Running(*arguments, "--profile", "./bank.yaml", "--timeout", "1min") as running:
-            self.assertTrue(server.heard_write.wait(support.DEADLINE))
+            support.wait_until(server.heard_write.is_set, "the write is heard")
             running.send_signal(signal.SIGKILL)
             running.finish()
 

@@ -32,8 +32,9 @@ struct Disk {
   std::function<Result<void>(const std::string& path, std::string_view text, Overwrite overwrite,
                              Privacy privacy)>
       write;
-  /// Adds a line (with its end), whole or not at all, in one piece, so that lines of several programs
-  /// never mix, and behind a line that a crash cut off on a line of its own. Creates the file.
+  /// Adds a line (with its end), whole or not at all, in one piece, so that lines of several
+  /// programs never mix, and behind a line that a crash cut off on a line of its own. Creates the
+  /// file.
   std::function<Result<void>(const std::string& path, std::string_view line)> append;
   /// Makes a folder and those above it. Existing ones are left as they are.
   std::function<Result<void>(const std::string& folder, Privacy privacy)> make_folders;
