@@ -16,10 +16,14 @@ RegisterRange span_of(const RegisterRange& front, std::uint32_t end) {
   return {front.table, front.first, static_cast<std::uint16_t>(end - front.first)};
 }
 
+constexpr std::uint32_t all_registers = 0x10000;
+
 bool is_forbidden(const RegisterRange& range, const ReadLimits& limits) {
-  return range.count > 1 && limits.forbidden_shape &&
-         limits.forbidden_shape->table == range.table &&
-         limits.forbidden_shape->count == range.count;
+  const auto& shapes = limits.forbidden_shapes;
+  return range.count > 1 &&
+         std::any_of(shapes.begin(), shapes.end(), [&](const RegisterRange& shape) {
+           return shape.table == range.table && shape.count == range.count;
+         });
 }
 
 /// Cuts what alone is too long for one request or has the forbidden shape.
@@ -107,6 +111,12 @@ Error exception_error(const modbus::Pdu& request, std::uint8_t code) {
           .exception = code};
 }
 
+/// Whether it is worth asking again: the answer was lost, or what came of it was damaged.
+bool is_lost(const Error& error) {
+  return error.code == Errc::no_answer || error.code == Errc::incomplete_answer ||
+         error.code == Errc::malformed_answer || error.code == Errc::bad_checksum;
+}
+
 bool is_missing_register(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
@@ -131,6 +141,28 @@ std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
   std::vector<PlannedRead> plan;
   for (PlannedRead& planned : merged) append_allowed(std::move(planned), limits, plan);
   return plan;
+}
+
+std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits& limits,
+                                   const std::set<std::uint32_t>& absent) {
+  constexpr std::uint16_t most_more = 3;
+  std::vector<OtherRead> others;
+  for (std::uint16_t more = 1; more <= most_more; ++more) {
+    if (range.count + more > limits.max_read) break;
+    for (const std::uint16_t before : {std::uint16_t{0}, more}) {
+      if (before > range.first || end_of(range) + more - before > all_registers) continue;
+      const RegisterRange other{range.table, static_cast<std::uint16_t>(range.first - before),
+                                static_cast<std::uint16_t>(range.count + more)};
+      if (is_forbidden(other, limits) ||
+          !may_bridge(range.table, other.first, end_of(other), limits, absent)) {
+        continue;
+      }
+      others.push_back(
+          {modbus::read_request(other.table, {other.first}, other.count), before});
+      break;
+    }
+  }
+  return others;
 }
 
 void RegisterImage::store(const RegisterRange& range, RegisterView values) {
@@ -167,12 +199,14 @@ Result<Registers> RegisterImage::get(const RegisterRange& range) const {
 Client::Client(Session& session, ReadLimits limits, unsigned retries)
     : session_(&session), limits_(std::move(limits)), retries_(retries) {}
 
-Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries) {
-  auto response = session_->transact(request);
-  for (unsigned retry = 0; retry < retries && !response && response.error().code == Errc::no_answer;
+Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries,
+                                const std::vector<OtherRead>& others) {
+  auto response = session_->transact(request, others);
+  for (unsigned retry = 0; retry < retries && !response && is_lost(response.error()) &&
+                           !session_->is_out_of_step();
        ++retry) {
     session_->tell_retry(request);
-    response = session_->transact(request);
+    response = session_->transact(request, others);
   }
   if (!response) return response;
   if (const auto code = modbus::exception_of(*response)) {
@@ -199,12 +233,33 @@ std::optional<std::uint32_t> Client::read_refusal() {
 }
 
 Result<Registers> Client::read(const RegisterRange& range) {
+  return believed([&] { return read_once(range); });
+}
+
+/// Reads again, in doubt this time, where it turns out that others are on the line.
+template <typename Read>
+auto Client::believed(Read read) -> decltype(read()) {
+  const Session::Mark mark = session_->mark();
+  auto done = read();
+  if (!done) return done;
+  const auto undisturbed = session_->is_undisturbed_since(mark);
+  if (!undisturbed) return tl::unexpected(undisturbed.error());
+  return *undisturbed ? std::move(done) : read();
+}
+
+Result<Registers> Client::read_once(const RegisterRange& range) {
   const auto request = modbus::read_request(range.table, {range.first}, range.count);
-  return ask(request, retries_).map(modbus::registers_of);
+  return ask(request, retries_, other_reads(range, limits_, absent_registers()))
+      .map(modbus::registers_of);
 }
 
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
                                         const Progress& progress) {
+  return believed([&] { return read_each_once(wanted, progress); });
+}
+
+Result<RegisterImage> Client::read_each_once(const std::vector<RegisterRange>& wanted,
+                                             const Progress& progress) {
   RegisterImage image;
   const auto plan = plan_reads(askable(wanted, image), limits_, absent_registers());
   const std::size_t total = count_pieces(plan);
@@ -239,7 +294,7 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
   std::vector<PlannedRead> allowed;  // a half may have the shape that the whole had not
   append_allowed(planned, limits_, allowed);
   for (const PlannedRead& part : allowed) {
-    auto registers = read(part.range);
+    auto registers = read_once(part.range);
     if (registers) {
       image.store(part.range, *registers);
       settled(part);
@@ -308,9 +363,11 @@ Result<void> Client::write(modbus::RegisterAddress first, RegisterView values) {
 }
 
 Result<Bytes> Client::report_server_id() {
-  return ask(modbus::report_server_id_request(), retries_).map([](const modbus::Pdu& response) {
-    const ByteView data = modbus::server_id_of(response);
-    return Bytes(data.begin(), data.end());
+  return believed([&] {
+    return ask(modbus::report_server_id_request(), retries_).map([](const modbus::Pdu& response) {
+      const ByteView data = modbus::server_id_of(response);
+      return Bytes(data.begin(), data.end());
+    });
   });
 }
 

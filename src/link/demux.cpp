@@ -20,6 +20,15 @@ bool is_addressed(const modbus::Adu& outstanding, const modbus::Adu& received,
                                          : outstanding.unit == received.unit;
 }
 
+/// Whether an answer of this unit counts where the transaction id fits.
+bool is_unit_taken(const modbus::Adu& outstanding, const modbus::Adu& received,
+                   const DemuxRules& rules) {
+  if (rules.framing == modbus::Framing::rtu || outstanding.unit == received.unit) return true;
+  const bool identifies = outstanding.pdu.function ==
+                          static_cast<std::uint8_t>(modbus::FunctionCode::report_server_id);
+  return rules.units == Units::any || (rules.units == Units::identified && identifies);
+}
+
 }  // namespace
 
 Verdict judge(const modbus::Adu* outstanding, const modbus::Adu& received,
@@ -28,6 +37,8 @@ Verdict judge(const modbus::Adu* outstanding, const modbus::Adu& received,
   const bool addressed =
       outstanding != nullptr && is_addressed(*outstanding, received, rules.framing);
   const Fit fit = addressed ? modbus::fit(outstanding->pdu, received.pdu) : Fit::foreign;
+  const bool answers = fit == Fit::answer || fit == Fit::exception_response;
+  if (answers && !is_unit_taken(*outstanding, received, rules)) return Verdict::other_unit;
   if (fit == Fit::answer) return Verdict::answer;
   if (fit == Fit::exception_response) return Verdict::exception_response;
   if (is_spontaneous(received.pdu, rules)) return Verdict::spontaneous;

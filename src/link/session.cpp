@@ -11,7 +11,7 @@
 namespace spindle::link {
 namespace {
 
-// Somebody who watches takes events at once; this bounds memory when nobody does.
+// Events are taken at once where they are watched; this bounds memory elsewhere.
 constexpr std::size_t max_queued = 4096;
 
 // A tool that answers at all has long done so; whoever pressed Ctrl-C hardly notices.
@@ -21,9 +21,61 @@ constexpr Duration longest_settling = std::chrono::milliseconds(250);
 // hardly is by more, and every proof takes time that a stop may be waiting for.
 constexpr Duration::rep longest_doubt = 2;
 
-constexpr std::uint16_t first_transaction = 0x8000;
+constexpr std::uint16_t smallest_transaction = 0x8000;
+
+// An answer that was asked for by another master is over by then.
+constexpr Duration first_listening = std::chrono::milliseconds(20);
+
+// A line that was quiet for so long after it was opened is believed.
+constexpr Duration newness = std::chrono::seconds(2);
+
+// Beyond the longest round trip so far, when the line is listened to behind an answer.
+constexpr Duration trip_margin = std::chrono::milliseconds(10);
+constexpr Duration longest_listening = std::chrono::milliseconds(250);
+
+// More late answers than these hardly come at once.
+constexpr std::size_t most_unanswered = 8;
+
+// Another master that polls all the time leaves few quiet moments.
+constexpr int most_proofs = 4;
 
 using modbus::FunctionCode;
+
+bool is_write(const modbus::Pdu& request) {
+  const auto function = static_cast<modbus::FunctionCode>(request.function);
+  return function == FunctionCode::write_single_register ||
+         function == FunctionCode::write_multiple_registers;
+}
+
+/// The part of the answer to another read that the answer to this one would be.
+modbus::Pdu part_of(const modbus::Pdu& other, std::size_t skip, const modbus::Pdu& answer) {
+  const Registers registers = modbus::registers_of(other);
+  const std::size_t count = modbus::registers_of(answer).size();
+  modbus::Pdu part{.function = answer.function, .data = {answer.data.front()}};
+  for (std::size_t at = skip; at < skip + count; ++at) put_u16(part.data, registers.at(at));
+  return part;
+}
+
+/// A frame of any kind within bytes that no client expects.
+bool holds_request(ByteView bytes) {
+  if (modbus::whole_rtu_frame(bytes)) return true;
+  const auto found = modbus::deframe(modbus::Framing::rtu, modbus::Role::server, bytes);
+  return std::holds_alternative<modbus::Deframed>(found);
+}
+
+std::string_view sentence_of(Evidence evidence) {
+  switch (evidence) {
+    case Evidence::noise:
+      return "bytes come that belong to no answer: noise, or another master is on this line; each "
+             "answer is proved";
+    case Evidence::repeated:
+      return "answers come twice on this line; each answer is proved";
+    case Evidence::frame:
+    case Evidence::query:
+      break;
+  }
+  return "another master is on this line; each answer is proved";
+}
 
 /// Whether the answer is a copy of the request, so that only an echo can be mistaken for it.
 bool is_repeated_by_answer(const modbus::Pdu& request) {
@@ -66,6 +118,7 @@ struct Session::Outstanding {
   TimePoint deadline = {};
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
+  std::optional<modbus::UnitId> other_unit = std::nullopt;  ///< that answered with our id
   std::size_t echoes = 0;   ///< copies of the request that came back
 };
 
@@ -76,50 +129,70 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       options_(std::move(options)),
       trace_(std::move(trace)),
       created_(clock.now()),
+      next_transaction_(std::max(options_.first_transaction, smallest_transaction)),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
   if (options_.past == SessionOptions::Past::doubtful) doubt_answers(created_);
+  const std::string company = is_rtu() ? transport_->company() : std::string();
+  if (company.empty()) return;
+  doubt_.stay();
+  if (trace_.notice) {
+    trace_.notice(fmt::format("{} has this line open, too: perhaps another master is on this line; "
+                              "each answer is proved",
+                              company));
+  }
 }
 
 Session::~Session() {
   if (trace_.bytes) trace_.bytes(Direction::received, {});
 }
 
-/// The line is ours as long as this lives. Whoever has it next keeps the silence that we owe.
+/// The line is ours as long as this lives. Who has it next keeps the silence that we owe.
 class Session::Turn {
  public:
   explicit Turn(Session& session) : session_(&session) {
-    const TimePoint used_until = session_->transport_->begin_turn();
-    session_->last_activity_ = std::max(session_->last_activity_, used_until);
+    const Transport::Turn left = session_->transport_->begin_turn();
+    session_->last_activity_ = std::max(session_->last_activity_, left.used_until);
+    session_->others_late_until_ = left.late_until;
   }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
-  ~Turn() { session_->transport_->end_turn(session_->last_activity_); }
+  ~Turn() {
+    session_->transport_->end_turn(
+        {.used_until = session_->last_activity_, .late_until = session_->doubtful_until_});
+  }
 
  private:
   Session* session_;
 };
 
-Result<modbus::Pdu> Session::transact(const modbus::Pdu& request) {
+Result<modbus::Pdu> Session::transact(const modbus::Pdu& request, const Others& others) {
   const Turn turn(*this);
-  return ask(request);
+  return ask(request, others);
 }
 
-Result<modbus::Pdu> Session::ask(const modbus::Pdu& request) {
+Result<modbus::Pdu> Session::ask(const modbus::Pdu& request, const Others& others) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
   if (quarantined_until_ && !is_repeated_by_answer(request)) {
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
-  const bool provable =
-      is_rtu() && options_.proof == SessionOptions::Proof::loopback && proves_ == Proves::in_doubt;
-  const bool doubtful = clock_->now() < doubtful_until_ && !is_repeated_by_answer(request);
-  return provable && doubtful ? ask_with_proof(request) : exchange(request);
+  if (!is_rtu() || is_repeated_by_answer(request) || is_write(request)) {
+    if (auto passed = let_copies_pass(request); !passed) {
+      return tl::unexpected(std::move(passed.error()));
+    }
+    return exchange(request);
+  }
+  if (auto heard = listen_first(); !heard) return tl::unexpected(std::move(heard.error()));
+  const bool provable = has_loopback() && proves_ == Proves::in_doubt;
+  const bool behind_late =
+      provable && clock_->now() < doubtful_until_ && !doubt_.is_raised(clock_->now());
+  return behind_late ? ask_behind_late(request) : ask_carefully(request, others);
 }
 
 /// Units answer in order. So an answer is one to an earlier request when yet another one comes
 /// before that of a loop-back sent behind it.
-Result<modbus::Pdu> Session::ask_with_proof(const modbus::Pdu& request) {
+Result<modbus::Pdu> Session::ask_behind_late(const modbus::Pdu& request) {
   auto answer = exchange(request);
   if (!answer) return answer;
   const std::uint64_t strays = counters_.strays;
@@ -136,6 +209,169 @@ Result<modbus::Pdu> Session::ask_with_proof(const modbus::Pdu& request) {
                               .tried = modbus::describe_request(request)});
 }
 
+/// A read whose answer is proved where there is doubt: about the line, or about this answer.
+Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Others& others) {
+  for (int proofs = 0; proofs < most_proofs; ++proofs) {
+    const std::uint64_t disturbances = doubt_.disturbances();
+    const std::uint64_t noises = noises_;
+    auto answer = exchange(request);
+    if (!answer) return answer;
+    const TimePoint now = clock_->now();
+    const bool may_be_copy = options_.others == SessionOptions::Others::possible &&
+                             doubt_.may_be_copy(request, *answer, now);
+    const bool beside = doubt_.disturbances() != disturbances || noises_ != noises ||
+                        !buffer_.empty();
+    std::optional<modbus::Pdu> believed = *answer;
+    if (doubt_.is_raised(now) || beside || may_be_copy) {
+      const Duration round_trip = last_round_trip_;
+      auto proved = prove(request, *answer, others);
+      if (!proved) return tl::unexpected(std::move(proved.error()));
+      last_round_trip_ = round_trip;
+      believed = std::move(*proved);
+    }
+    if (believed) return std::move(*believed);
+  }
+  return tl::unexpected(
+      Error{.code = Errc::no_answer,
+            .message = fmt::format("no answer to '{}' can be told from what others say on this line",
+                                   modbus::describe_request(request)),
+            .hint = "end the other master or program on this line, or wait until it is quiet",
+            .tried = modbus::describe_request(request)});
+}
+
+/// The answer that is proved, or none where another one came.
+Result<std::optional<modbus::Pdu>> Session::prove(const modbus::Pdu& request,
+                                                  const modbus::Pdu& answer,
+                                                  const Others& others) {
+  decide(Decision::proof, modbus::explain_request(request));
+  const std::uint64_t mark = doubt_.disturbances();
+  const bool is_exception = modbus::exception_of(answer).has_value();
+  const OtherRead* other = is_exception ? nullptr : own_shape_of(others);
+  if (other != nullptr) {
+    auto proved = prove_by_other(answer, *other);
+    if (!proved || *proved) return proved;
+  }
+  // Where another program reads the same port it may have taken the answer to us, so that order
+  // says nothing.
+  const bool in_order = has_loopback() && transport_->company().empty();
+  auto proved =
+      in_order ? prove_by_loopback(mark) : prove_by_repetition(request, answer, mark);
+  if (!proved) return tl::unexpected(std::move(proved.error()));
+  return *proved ? std::optional(answer) : std::nullopt;
+}
+
+/// What has an unusual shape is hardly the answer to another master's request. Two such answers that
+/// agree are proof even where the value changed since it was asked for first.
+Result<std::optional<modbus::Pdu>> Session::prove_by_other(const modbus::Pdu& answer,
+                                                           const OtherRead& other) {
+  std::optional<modbus::Pdu> before = answer;
+  for (int turn = 0; turn < 2; ++turn) {
+    auto again = exchange(other.request);
+    if (!again) return tl::unexpected(std::move(again.error()));
+    if (modbus::exception_of(*again)) return std::nullopt;
+    modbus::Pdu part = part_of(*again, other.skip, answer);
+    if (part == *before) return part;
+    before = std::move(part);
+  }
+  return std::nullopt;
+}
+
+/// Units answer in order: had the answer been another's, ours would come in front of the loop-back.
+Result<bool> Session::prove_by_loopback(std::uint64_t mark) {
+  return exchange(modbus::loopback_request(fresh_word())).map([&](const modbus::Pdu&) {
+    return doubt_.disturbances() == mark;
+  });
+}
+
+Result<bool> Session::prove_by_repetition(const modbus::Pdu& request, const modbus::Pdu& answer,
+                                          std::uint64_t mark) {
+  return exchange(request).map([&](const modbus::Pdu& again) {
+    return again == answer && doubt_.disturbances() == mark;
+  });
+}
+
+/// The first of them whose answers have a shape that nobody else's had here.
+const OtherRead* Session::own_shape_of(const Others& others) const {
+  const auto own = std::find_if(others.begin(), others.end(), [&](const OtherRead& other) {
+    return !doubt_.is_shape_taken(other.request);
+  });
+  return own == others.end() ? nullptr : &*own;
+}
+
+/// The copy of the answer to an equal write is no answer to this one.
+Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
+  const bool careful = is_rtu() && is_write(write) && doubt_.is_raised(clock_->now()) &&
+                       proves_ == Proves::in_doubt;
+  if (!careful) return {};
+  const modbus::Pdu answer{.function = write.function,
+                           .data = Bytes(write.data.begin(), write.data.begin() + 4)};
+  const auto end = doubt_.copies_end(answer);
+  return end ? wait_for_silence(*end) : Result<void>();
+}
+
+/// A line that others may have in use is listened to once, before the first read.
+Result<void> Session::listen_first() {
+  if (heard_ == Heard::line || options_.others == SessionOptions::Others::none) return {};
+  heard_ = Heard::line;
+  return wait_for_silence(std::max(clock_->now(), last_activity_ + options_.gap) + first_listening);
+}
+
+Session::Mark Session::mark() const {
+  return {.disturbances = doubt_.disturbances(), .proves = doubt_.is_raised(clock_->now())};
+}
+
+Result<bool> Session::is_undisturbed_since(const Mark& mark) {
+  if (mark.proves) return true;
+  const TimePoint now = clock_->now();
+  const bool is_new = now < created_ + newness;
+  const bool listens = is_rtu() && options_.others == SessionOptions::Others::possible && is_new &&
+                       proves_ == Proves::in_doubt && !doubt_.is_raised(now);
+  if (listens) {
+    const Turn turn(*this);
+    const Duration trip = std::min(longest_round_trip_ + trip_margin, longest_listening);
+    if (auto silent = wait_for_silence(now + trip); !silent) {
+      return tl::unexpected(std::move(silent.error()));
+    }
+  }
+  return doubt_.disturbances() == mark.disturbances;
+}
+
+/// Whether a late answer of our own, or of another session of this program, may still come.
+bool Session::may_be_late() const {
+  return clock_->now() < std::max(doubtful_until_, others_late_until_);
+}
+
+/// A late answer of our own is no sign of another master. Each request has one.
+bool Session::take_late(const modbus::Adu& stray) {
+  const TimePoint now = clock_->now();
+  if (stray.unit != options_.unit && now < others_late_until_) return true;
+  if (now >= doubtful_until_) unanswered_.clear();
+  const auto late = std::find_if(
+      unanswered_.begin(), unanswered_.end(), [&](const modbus::Adu& request) {
+        const Verdict verdict = judge(&request, stray, options_.rules);
+        return verdict == Verdict::answer || verdict == Verdict::exception_response;
+      });
+  if (late == unanswered_.end()) return false;
+  unanswered_.erase(late);
+  return true;
+}
+
+void Session::find(Evidence evidence, std::string_view what) {
+  if (evidence == Evidence::noise) ++noises_;
+  const bool is_new = doubt_.find(evidence, clock_->now());
+  decide(Decision::doubt, what);
+  if (is_new && trace_.notice) trace_.notice(sentence_of(evidence));
+}
+
+/// Bytes beside the frames: those of another master's request, or noise.
+void Session::judge_noise(ByteView bytes) {
+  if (bytes.empty() || !is_rtu()) return;
+  const bool echo = !sent_.empty() && std::search(bytes.begin(), bytes.end(), sent_.begin(),
+                                                  sent_.end()) != bytes.end();
+  if (!echo && holds_request(bytes)) return find(Evidence::query, "the request of another master");
+  if (!may_be_late()) find(Evidence::noise, "unexpected bytes");
+}
+
 void Session::doubt_answers(TimePoint since) {
   doubtful_until_ = since + longest_doubt * options_.answer_timeout;
 }
@@ -143,13 +379,14 @@ void Session::doubt_answers(TimePoint since) {
 Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
   const modbus::Adu adu{.transaction = {next_transaction_}, .unit = options_.unit, .pdu = request};
   next_transaction_ = next_transaction_ == 0xFFFF
-                          ? first_transaction
+                          ? smallest_transaction
                           : static_cast<std::uint16_t>(next_transaction_ + 1);
   if (is_rtu() && options_.unit == modbus::UnitId{}) return tl::unexpected(everybody_error());
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
   auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
   if (answer) {
     last_round_trip_ = clock_->now() - outstanding.sent;
+    longest_round_trip_ = std::max(longest_round_trip_, last_round_trip_);
     return answer;
   }
   Error error = std::move(answer.error());
@@ -173,6 +410,8 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     doubt_answers(*quarantined_until_);
     buffer_.clear();
+    if (unanswered_.size() == most_unanswered) unanswered_.erase(unanswered_.begin());
+    unanswered_.push_back(outstanding.request);
     const bool mistakable = !is_repeated_by_answer(outstanding.request.pdu);
     if (mistakable) abandoned_ = outstanding.request;
   }
@@ -197,7 +436,7 @@ void Session::learn_echo(const Outstanding& outstanding) {
 Result<void> Session::find_echo(const modbus::Pdu& request) {
   const bool loopback = request.function == static_cast<std::uint8_t>(FunctionCode::diagnostics);
   if (!is_rtu() || !loopback || echo_ != LocalEcho::automatic) return {};
-  return ask(modbus::read_request(modbus::RegisterTable::holding, {}, 1))
+  return ask(modbus::read_request(modbus::RegisterTable::holding, {}, 1), {})
       .map([](const modbus::Pdu&) {});
 }
 
@@ -234,6 +473,7 @@ Result<std::optional<Spontaneous>> Session::next_spontaneous(TimePoint deadline)
 
 Result<void> Session::send(const modbus::Adu& adu, ByteView bytes) {
   ++counters_.requests;
+  sent_.assign(bytes.begin(), bytes.end());
   if (trace_.bytes) trace_.bytes(Direction::sent, bytes);
   decide(Decision::request, adu);
   const TimePoint began = clock_->now();
@@ -253,7 +493,10 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
     auto sorted = sort_buffered(&outstanding);
     if (!sorted) return tl::unexpected(std::move(sorted.error()));
     if (outstanding.answer) return *outstanding.answer;
-    if (expired) return tl::unexpected(timeout_error(outstanding));
+    if (expired) {
+      if (!is_rtu()) torn_ = buffer_.size();
+      return tl::unexpected(timeout_error(outstanding));
+    }
     auto more = fill(outstanding.deadline);
     if (!more) return tl::unexpected(std::move(more.error()));
     expired = !*more || clock_->now() >= outstanding.deadline;
@@ -289,12 +532,13 @@ Result<bool> Session::fill(TimePoint deadline) {
 }
 
 /// The next complete frame in the buffer, if there is one.
-Result<std::optional<modbus::Adu>> Session::take_frame() {
+Result<std::optional<modbus::Adu>> Session::take_frame(const Outstanding* outstanding) {
   while (!buffer_.empty()) {
+    if (!leave_torn(outstanding)) return std::nullopt;
     auto deframing = modbus::deframe(options_.rules.framing, modbus::Role::client, buffer_);
     if (std::holds_alternative<modbus::NeedMore>(deframing)) return std::nullopt;
     if (auto* frame = std::get_if<modbus::Deframed>(&deframing)) {
-      note_noise(frame->skipped);
+      note_noise(ByteView(buffer_).first(frame->skipped));
       buffer_.erase(buffer_.begin(),
                     buffer_.begin() + static_cast<std::ptrdiff_t>(frame->consumed));
       return std::move(frame->adu);
@@ -304,22 +548,47 @@ Result<std::optional<modbus::Adu>> Session::take_frame() {
     if (options_.rules.framing == modbus::Framing::tcp) {
       // Left in the buffer: every later attempt on this connection fails alike, until it is
       // reopened.
+      out_of_step_ = true;
       return tl::unexpected(
           Error{.code = Errc::malformed_answer,
                 .message = fmt::format("what came is not Modbus TCP: {}", junk.reason),
                 .hint = "is this a Modbus TCP port? the connection has to be opened anew"});
     }
     counters_.noise_bytes += junk.size;
+    judge_noise(ByteView(buffer_).first(junk.size));
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(junk.size));
   }
   return std::nullopt;
+}
+
+/// TCP: where the answer to the request that is out begins behind a frame whose rest never came, the
+/// torn frame is left. False while too little has come to tell.
+bool Session::leave_torn(const Outstanding* outstanding) {
+  if (torn_ == 0 || buffer_.size() <= torn_) return true;
+  if (outstanding == nullptr) {
+    torn_ = 0;
+    return true;
+  }
+  constexpr std::size_t telling = 4;  // transaction id, protocol identifier
+  const ByteView answer = ByteView(outstanding->bytes).first(telling);
+  const ByteView behind = ByteView(buffer_).subspan(torn_);
+  const std::size_t known = std::min(telling, behind.size());
+  const bool begins = std::equal(answer.begin(), answer.begin() + static_cast<std::ptrdiff_t>(known),
+                                 behind.begin());
+  if (begins && known < telling) return false;
+  if (begins) {
+    note_noise(ByteView(buffer_).first(torn_));
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(torn_));
+  }
+  torn_ = 0;
+  return true;
 }
 
 /// Sorts every complete frame, so that each is kept with the time of its own arrival.
 Result<void> Session::sort_buffered(Outstanding* outstanding) {
   const auto answered = [&] { return outstanding != nullptr && outstanding->answer; };
   while (true) {
-    auto frame = take_frame();
+    auto frame = take_frame(outstanding);
     // Junk behind the answer is left for the next who asks.
     if (!frame && !answered()) return tl::unexpected(std::move(frame.error()));
     if (!frame || !*frame) return {};
@@ -336,6 +605,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
     case Verdict::exception_response:
       decide(Decision::exception_response, received);
       outstanding->answer = received.pdu;
+      if (is_rtu()) doubt_.remember(outstanding->request.pdu, received.pdu, clock_->now());
       return;
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
@@ -345,16 +615,30 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       decide(Decision::broken, received);
       outstanding->broken = describe_frame(received);
       ++counters_.strays;
+      return doubt_because_of(received);
+    case Verdict::other_unit:
+      decide(Decision::broken, received);
+      outstanding->other_unit = received.unit;
+      ++counters_.strays;
       return;
     case Verdict::stray:
       decide(is_late(received) ? Decision::late : Decision::stray, received);
       ++counters_.strays;
-      return;
+      return doubt_because_of(received);
   }
 }
 
+/// RTU: a frame that answered nothing.
+void Session::doubt_because_of(const modbus::Adu& stray) {
+  if (!is_rtu() || take_late(stray)) return;
+  doubt_.note_shape(stray.pdu);
+  const bool copy = doubt_.is_copy(stray.pdu, clock_->now());
+  find(copy ? Evidence::repeated : Evidence::frame,
+       copy ? "an answer came twice" : "a frame that answers nothing");
+}
+
 /// The answer, unless it is the adapter's copy of a request that its answer repeats.
-void Session::accept(const modbus::Adu& received, Outstanding& outstanding) const {
+void Session::accept(const modbus::Adu& received, Outstanding& outstanding) {
   const bool copy = is_rtu() && received.pdu == outstanding.request.pdu;
   if (copy && echo_ == LocalEcho::present && outstanding.echoes == 0) {
     decide(Decision::echo, received);
@@ -362,6 +646,7 @@ void Session::accept(const modbus::Adu& received, Outstanding& outstanding) cons
   } else {
     decide(Decision::answer, received);
     outstanding.answer = received.pdu;
+    if (is_rtu()) doubt_.remember(outstanding.request.pdu, received.pdu, clock_->now());
   }
 }
 
@@ -377,7 +662,18 @@ void Session::keep(const modbus::Pdu& pdu) {
 }
 
 /// RTU: returns when the line was silent for the gap. What arrives meanwhile answers nothing.
-Result<void> Session::keep_gap() { return is_rtu() ? wait_for_silence({}) : Result<void>(); }
+Result<void> Session::keep_gap() { return is_rtu() ? wait_for_silence({}) : discard_early(); }
+
+/// TCP: what came before a request is sent is not its answer, whatever id it has.
+Result<void> Session::discard_early() {
+  constexpr int most_reads = 16;  // a flood must not keep the request for ever
+  for (int reads = 0; reads < most_reads; ++reads) {
+    auto more = fill(clock_->now());
+    if (!more) return tl::unexpected(std::move(more.error()));
+    if (!*more) break;
+  }
+  return sort_buffered(nullptr);
+}
 
 /// Waits by receiving, because a frame that is still unread (an answer sent twice) would be taken
 /// for the next answer, and because a shielded transport waits on where the clock is interrupted.
@@ -395,15 +691,16 @@ Result<void> Session::wait_for_silence(TimePoint not_before) {
                                   .hint = "another master, noise or a wrong rate?"});
     }
   }
-  note_noise(buffer_.size());
+  note_noise(buffer_);
   buffer_.clear();
   return {};
 }
 
-void Session::note_noise(std::size_t bytes) {
-  if (bytes == 0) return;
-  counters_.noise_bytes += bytes;
-  decide(Decision::junk, counted(bytes, "byte") + " skipped");
+void Session::note_noise(ByteView bytes) {
+  if (bytes.empty()) return;
+  counters_.noise_bytes += bytes.size();
+  decide(Decision::junk, counted(bytes.size(), "byte") + " skipped");
+  judge_noise(bytes);
 }
 
 /// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
@@ -448,7 +745,26 @@ std::uint16_t Session::fresh_word() const {
 
 /// Whether the frame has an id that only our own requests have had.
 bool Session::is_late(const modbus::Adu& stray) const {
-  return !is_rtu() && stray.transaction.value >= first_transaction;
+  return !is_rtu() && stray.transaction.value >= smallest_transaction;
+}
+
+/// Whether what is left may be the beginning of the answer, and not that of another frame.
+bool Session::begins_answer(const Outstanding& outstanding) const {
+  const Bytes& request = outstanding.bytes;
+  if (!is_rtu()) {  // the id comes first
+    const std::size_t known = std::min<std::size_t>(buffer_.size(), 2);
+    return known > 0 && std::equal(request.begin(),
+                                   request.begin() + static_cast<std::ptrdiff_t>(known),
+                                   buffer_.begin());
+  }
+  if (buffer_.empty()) return false;
+  const bool spontaneous =
+      buffer_.size() > 2 &&
+      std::any_of(options_.rules.spontaneous.begin(), options_.rules.spontaneous.end(),
+                  [&](const SpontaneousShape& shape) {
+                    return buffer_[1] == shape.function && buffer_[2] == shape.byte_count;
+                  });
+  return !spontaneous;
 }
 
 Error Session::timeout_error(const Outstanding& outstanding) const {
@@ -460,7 +776,16 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
         fmt::format("the answer to '{}' does not fit the request ({})", tried, outstanding.broken);
     return error;
   }
-  if (buffer_.empty()) {
+  if (outstanding.other_unit) {
+    error.code = Errc::malformed_answer;
+    error.message = fmt::format("unit {} answered '{}', though unit {} was asked",
+                                outstanding.other_unit->value, tried,
+                                outstanding.request.unit.value);
+    error.hint = fmt::format("if that is the tool, ask for it with ?unit={}",
+                             outstanding.other_unit->value);
+    return error;
+  }
+  if (!begins_answer(outstanding)) {
     if (outstanding.echoes > 0) error.code = Errc::local_echo;
     return error;
   }

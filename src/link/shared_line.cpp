@@ -25,13 +25,19 @@ class SharedLine::Share : public Transport {
     if (opened_ == line_->opened_ && --line_->shares_ == 0) line_->transport_.reset();
   }
 
-  TimePoint begin_turn() override {
+  Turn begin_turn() override {
     turn_ = std::unique_lock(line_->turn_);
-    return line_->used_until_;
+    return line_->left_;
   }
-  void end_turn(TimePoint used_until) override {
-    line_->used_until_ = std::max(line_->used_until_, used_until);
+  void end_turn(const Turn& left) override {
+    line_->left_.used_until = std::max(line_->left_.used_until, left.used_until);
+    line_->left_.late_until = std::max(line_->left_.late_until, left.late_until);
     turn_.unlock();
+  }
+
+  [[nodiscard]] std::string company() const override {
+    const std::lock_guard lock(line_->mutex_);
+    return line_->transport_ ? line_->transport_->company() : std::string();
   }
 
   Result<void> send(ByteView bytes, TimePoint deadline) override {

@@ -28,9 +28,8 @@ struct ReadLimits {
   /// Areas that are said not to exist. What is wanted there is asked for register by register, so
   /// that no other answer is spoilt and a wrong saying loses nothing.
   std::vector<RegisterRange> absent = {};
-  /// A read whose answer would look like a spontaneous frame; never issued.
-  std::optional<RegisterRange> forbidden_shape =
-      std::nullopt;  // table and count; `first` is ignored
+  /// Reads whose answers would look like a spontaneous frame; never issued.
+  std::vector<RegisterRange> forbidden_shapes = {};  // table and count; `first` is ignored
   /// Where the server says, in a code of its own, why it sent its last exception response.
   std::optional<RegisterRange> refusal = std::nullopt;
 };
@@ -47,6 +46,11 @@ struct PlannedRead {
 std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
                                     const ReadLimits& limits,
                                     const std::set<std::uint32_t>& absent = {});
+
+/// Reads of up to three more registers, all within a contiguous area, whose answers hold the range,
+/// too. Pure.
+std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits& limits,
+                                   const std::set<std::uint32_t>& absent = {});
 
 /// Key of one register in sets and maps.
 constexpr std::uint32_t register_key(modbus::RegisterTable table, std::uint16_t address) {
@@ -70,7 +74,8 @@ class RegisterImage {
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Reads and writes within what the server allows. Only reads are repeated, and only when no answer
-/// came.
+/// came, or a damaged one. On a serial line whose answers turn out to be others' while it reads, all
+/// is read again, each answer proved.
 class Client {
  public:
   Client(Session& session, ReadLimits limits, unsigned retries);
@@ -106,7 +111,13 @@ class Client {
   [[nodiscard]] Session& session() { return *session_; }
 
  private:
-  Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries);
+  Result<modbus::Pdu> ask(const modbus::Pdu& request, unsigned retries,
+                          const std::vector<OtherRead>& others = {});
+  Result<Registers> read_once(const RegisterRange& range);
+  Result<RegisterImage> read_each_once(const std::vector<RegisterRange>& wanted,
+                                       const Progress& progress);
+  template <typename Read>
+  auto believed(Read read) -> decltype(read());
   std::vector<RegisterRange> askable(const std::vector<RegisterRange>& wanted,
                                      RegisterImage& image) const;
   [[nodiscard]] std::optional<std::uint32_t> read_refusal();

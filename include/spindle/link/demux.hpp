@@ -14,12 +14,20 @@ struct SpontaneousShape {
   std::uint8_t byte_count = 0;
 };
 
+/// TCP: whose answers are taken.
+enum class Units : std::uint8_t {
+  asked,       ///< only those of the unit that was asked
+  identified,  ///< also another unit's answer to FC 11h: the product is not known yet
+  any,         ///< the product answers with any unit identifier
+};
+
 /// How answers are told from everything else on one connection.
 struct DemuxRules {
-  /// TCP: the transaction id decides, the unit is ignored (tools answer with another one).
+  /// TCP: the transaction id decides, and the unit as `units` says.
   /// RTU: the unit identifier decides, there is no id.
   modbus::Framing framing = modbus::Framing::tcp;
-  std::vector<SpontaneousShape> spontaneous;
+  std::vector<SpontaneousShape> spontaneous = {};
+  Units units = Units::asked;
 };
 
 enum class Verdict : std::uint8_t {
@@ -27,6 +35,7 @@ enum class Verdict : std::uint8_t {
   exception_response,  ///< id (or unit) fits, function with bit 7, one byte
   spontaneous,         ///< a shape that the profile declares as sent unasked
   broken,  ///< carries the outstanding request's id (or unit and function), but is not its answer
+  other_unit,  ///< TCP: would be the answer, but another unit gave it
   stray,   ///< anything else: counted, traced, never fatal
 };
 

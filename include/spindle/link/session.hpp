@@ -6,8 +6,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "spindle/link/demux.hpp"
+#include "spindle/link/line_doubt.hpp"
 #include "spindle/link/local_echo.hpp"
 #include "spindle/link/trace.hpp"
 #include "spindle/link/transport.hpp"
@@ -35,6 +37,17 @@ struct SessionOptions {
   TimePoint in_use_until = {};
   /// RTU: whether a late answer may come that an earlier session on this line did not wait for.
   enum class Past : std::uint8_t { clean, doubtful } past = Past::clean;
+  /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is listened
+  /// to before the first read and behind the first answers.
+  enum class Others : std::uint8_t { none, possible } others = Others::none;
+  /// TCP: id of the first request, at least 8000h; tools use small ones for what they send unasked.
+  std::uint16_t first_transaction = 0x8000;
+};
+
+/// Another read whose answer holds the registers of a read, too, in an answer of another shape.
+struct OtherRead {
+  modbus::Pdu request;
+  std::size_t skip = 0;  ///< registers in front of those
 };
 
 /// A frame that nobody asked for, with the time when its last byte arrived.
@@ -55,6 +68,12 @@ struct SessionCounters {
 /// The dialogue on one connection: one outstanding request, everything else sorted by judge(). What
 /// arrives while somebody waits for something else is kept, not dropped and not mistaken; a late
 /// answer never becomes the next value.
+///
+/// RTU: a frame that nothing asked for, the request of another master, junk beside an answer, the
+/// same answer to another request, or another program that has the port open make the line doubtful
+/// until it was quiet for a while. On a doubtful line each answer is proved: by another read that
+/// holds the same registers, by FC 08 behind it, or by the same read again. What can not be proved
+/// is `no_answer`. That others are on the line is told once, by the trace's `notice`.
 class Session {
  public:
   Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -72,7 +91,21 @@ class Session {
   /// RTU: after a failure the line is in quarantine. A read then waits until no late answer can
   /// come any more and the line is proved; only FC 06 and FC 08, whose answers repeat them, go out
   /// at once. Unit 0 is `usage`: broadcast() is for that.
-  Result<modbus::Pdu> transact(const modbus::Pdu& request);
+  ///
+  /// `others` are what may be asked to prove the answer to a read on a doubtful line.
+  Result<modbus::Pdu> transact(const modbus::Pdu& request, const std::vector<OtherRead>& others = {});
+
+  /// RTU: what was known of the line at some time.
+  struct Mark {
+    std::uint64_t disturbances = 0;
+    bool proves = false;  ///< each answer is proved from then on
+  };
+  [[nodiscard]] Mark mark() const;
+  /// RTU: whether all answers since `mark` can be believed. On a new line it waits as long as an
+  /// answer takes, because behind the answer to another master's request comes that to ours.
+  Result<bool> is_undisturbed_since(const Mark& mark);
+  /// TCP: whether the stream has lost its frame boundaries, so that only a new connection helps.
+  [[nodiscard]] bool is_out_of_step() const { return out_of_step_; }
 
   /// RTU: sends to unit 0, and keeps the pause behind it. Nobody answers, so success means "sent",
   /// never "done".
@@ -117,17 +150,40 @@ class Session {
   struct Outstanding;
   class Turn;
 
-  Result<modbus::Pdu> ask(const modbus::Pdu& request);
-  Result<modbus::Pdu> ask_with_proof(const modbus::Pdu& request);
+  using Others = std::vector<OtherRead>;
+
+  Result<modbus::Pdu> ask(const modbus::Pdu& request, const Others& others);
+  Result<modbus::Pdu> ask_behind_late(const modbus::Pdu& request);
+  Result<modbus::Pdu> ask_carefully(const modbus::Pdu& request, const Others& others);
+  Result<void> let_copies_pass(const modbus::Pdu& write);
+  Result<std::optional<modbus::Pdu>> prove(const modbus::Pdu& request, const modbus::Pdu& answer,
+                                           const Others& others);
+  Result<std::optional<modbus::Pdu>> prove_by_other(const modbus::Pdu& answer,
+                                                    const OtherRead& other);
+  Result<bool> prove_by_loopback(std::uint64_t mark);
+  Result<bool> prove_by_repetition(const modbus::Pdu& request, const modbus::Pdu& answer,
+                                   std::uint64_t mark);
+  [[nodiscard]] const OtherRead* own_shape_of(const Others& others) const;
+  [[nodiscard]] bool has_loopback() const {
+    return options_.proof == SessionOptions::Proof::loopback;
+  }
+  Result<void> listen_first();
+  Result<void> discard_early();
+  void find(Evidence evidence, std::string_view what);
+  void judge_noise(ByteView bytes);
+  void doubt_because_of(const modbus::Adu& stray);
+  [[nodiscard]] bool may_be_late() const;
+  bool take_late(const modbus::Adu& stray);
   void doubt_answers(TimePoint since);
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
   Result<modbus::Pdu> send_and_await(Outstanding& outstanding);
   Result<void> send(const modbus::Adu& adu, ByteView bytes);
   Result<modbus::Pdu> await(Outstanding& outstanding);
   Result<bool> fill(TimePoint deadline);
-  Result<std::optional<modbus::Adu>> take_frame();
+  Result<std::optional<modbus::Adu>> take_frame(const Outstanding* outstanding = nullptr);
+  bool leave_torn(const Outstanding* outstanding);
   void strip_echo(Outstanding& outstanding);
-  void accept(const modbus::Adu& received, Outstanding& outstanding) const;
+  void accept(const modbus::Adu& received, Outstanding& outstanding);
   void learn_echo(const Outstanding& outstanding);
   Result<void> find_echo(const modbus::Pdu& request);
   Result<void> sort_buffered(Outstanding* outstanding);
@@ -138,8 +194,9 @@ class Session {
   Result<void> leave_quarantine();
   [[nodiscard]] bool is_rtu() const { return options_.rules.framing == modbus::Framing::rtu; }
   [[nodiscard]] bool is_late(const modbus::Adu& stray) const;
+  [[nodiscard]] bool begins_answer(const Outstanding& outstanding) const;
   Error timeout_error(const Outstanding& outstanding) const;
-  void note_noise(std::size_t bytes);
+  void note_noise(ByteView bytes);
   void decide(Decision decision, const modbus::Adu& adu) const;
   void decide(Decision decision, std::string_view text) const;
   [[nodiscard]] std::string describe_address(const modbus::Adu& adu) const;
@@ -153,7 +210,7 @@ class Session {
   Bytes buffer_ = {};
   std::deque<Spontaneous> queue_ = {};
   std::function<void(const Spontaneous&)> hear_ = {};
-  std::uint16_t next_transaction_ = 0x8000;
+  std::uint16_t next_transaction_;
   TimePoint created_;
   TimePoint last_activity_;
   /// RTU: when no answer to an abandoned request can come any more.
@@ -163,7 +220,18 @@ class Session {
   enum class Proves : std::uint8_t { in_doubt, never } proves_ = Proves::in_doubt;
   /// RTU: the last request whose answer may still come and be mistaken.
   std::optional<modbus::Adu> abandoned_ = std::nullopt;
-  LocalEcho echo_;  ///< as far as it is known
+  /// RTU: what was asked without an answer, as long as it may come late.
+  std::vector<modbus::Adu> unanswered_ = {};
+  Bytes sent_ = {};  ///< the last request as it was sent
+  /// RTU: until when a late answer to another session of this program may come.
+  TimePoint others_late_until_ = {};
+  LineDoubt doubt_ = {};
+  std::uint64_t noises_ = 0;  ///< how often unexpected bytes came
+  enum class Heard : std::uint8_t { nothing, line } heard_ = Heard::nothing;
+  Duration longest_round_trip_ = {};
+  bool out_of_step_ = false;
+  std::size_t torn_ = 0;  ///< TCP: bytes of a frame whose rest did not come in time
+  LocalEcho echo_;        ///< as far as it is known
   Duration last_round_trip_ = {};
 };
 

@@ -23,15 +23,19 @@ enum class Decision : std::uint8_t {
   echo,
   unanswered,
   retry,
-  resync
+  resync,
+  doubt,
+  proof
 };
 
 /// Hears all bytes and every decision of one connection, for --verbose and --trace. Bytes come as
-/// they are sent and received; none at all say that the connection is over. Either function may be
+/// they are sent and received; none at all say that the connection is over. Each function may be
 /// empty.
 struct Trace {
-  std::function<void(Direction, ByteView bytes)> bytes;
-  std::function<void(Decision, std::string_view text)> decision;
+  std::function<void(Direction, ByteView bytes)> bytes = {};
+  std::function<void(Decision, std::string_view text)> decision = {};
+  /// A sentence that users should read, whether they trace or not.
+  std::function<void(std::string_view sentence)> notice = {};
 };
 
 }  // namespace spindle::link

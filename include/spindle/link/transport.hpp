@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
@@ -28,12 +29,22 @@ class Transport {
   /// (disarm, stop).
   virtual void shield() = 0;
 
+  /// How a line is left to the others of this program who have it, too.
+  struct Turn {
+    TimePoint used_until = {};  ///< when the last byte was sent or received
+    TimePoint late_until = {};  ///< until when an answer may come that was given up
+  };
+
   /// Where others of this program have the same line: waits until none of them awaits an answer,
-  /// and keeps them from it until end_turn(). Returns when they used it last. A line of one's own
-  /// is always free.
-  virtual TimePoint begin_turn() { return {}; }
-  /// `used_until` is what the next one learns from begin_turn().
-  virtual void end_turn(TimePoint used_until) { static_cast<void>(used_until); }
+  /// and keeps them from it until end_turn(). Returns how they left it. A line of one's own is
+  /// always free.
+  virtual Turn begin_turn() { return {}; }
+  /// What the next one learns from begin_turn().
+  virtual void end_turn(const Turn& left) { static_cast<void>(left); }
+
+  /// Another program that has the line open, as far as the system tells: "minicom (process 4711)";
+  /// empty when there is none.
+  [[nodiscard]] virtual std::string company() const { return {}; }
 };
 
 }  // namespace spindle::link
