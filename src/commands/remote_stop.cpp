@@ -110,7 +110,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
           fmt::format("warning: not all of the tools file counts: {}", describe(*left_out)));
     }
   }
-  for (Target& target : targets) target.reach = options.reach;
+  for (Target& target : targets) {
+    target.reach = options.reach;
+    target.endpoint.claim = link::Claim::beside;
+  }
   const auto results = stop_all(targets, options, context);
   Outcome outcome;
   Listing listing(context, stop_columns());

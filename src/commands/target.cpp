@@ -89,6 +89,16 @@ void add_named(const std::string& name, const Context& context, Resolution& reso
   for (Result<Target>& found : named_targets(name, context)) add(std::move(found), resolution);
 }
 
+/// What tools send unasked, by all profiles: a tool whose profile is not known may be any of them.
+std::vector<link::SpontaneousShape> unasked_shapes(const Context& context) {
+  std::vector<link::SpontaneousShape> shapes;
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto profile = context.profiles.load(entry.id);
+    if (profile && profile->events) shapes.push_back(device::shape_of(*profile->events));
+  }
+  return shapes;
+}
+
 device::LinkOptions link_options(const Target& target, const catalogue::Profile& profile,
                                  const Context& context) {
   return {
@@ -96,7 +106,9 @@ device::LinkOptions link_options(const Target& target, const catalogue::Profile&
       .connect_timeout = context.common.connect_timeout,
       .retries = context.common.retries,
       .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link), context),
-      .shown = target.shown};
+      .shown = target.shown,
+      .unasked =
+          profile.id.empty() ? unasked_shapes(context) : std::vector<link::SpontaneousShape>()};
 }
 
 SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {

@@ -38,6 +38,10 @@ std::string_view to_text(link::Decision decision) {
       return "asking again";
     case link::Decision::resync:
       return "resync";
+    case link::Decision::doubt:
+      return "doubt";
+    case link::Decision::proof:
+      return "proving the answer";
   }
   return "";
 }
@@ -135,6 +139,9 @@ link::Trace spoken(const std::string& target, const Context& context) {
 
 link::Trace make_trace(const std::string& target, modbus::Framing framing, const Context& context) {
   link::Trace trace = spoken(target, context);
+  trace.notice = [&io = context.io, target](std::string_view sentence) {
+    report::say_warning(io, fmt::format("{}: {}", target, sentence));
+  };
   if (context.common.trace_file.empty()) return trace;
   trace.bytes = both(std::move(trace.bytes), Capture(target, framing, context));
   return trace;

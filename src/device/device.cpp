@@ -73,8 +73,20 @@ bool is_said_absent(const Parameter& parameter, const catalogue::Profile& profil
   });
 }
 
-link::ReadLimits read_limits(const catalogue::Profile& profile) {
+/// The read whose answer has this shape.
+RegisterRange read_of(const link::SpontaneousShape& shape) {
+  const auto holding = static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers);
+  return {shape.function == holding ? modbus::RegisterTable::holding : modbus::RegisterTable::input,
+          0, static_cast<std::uint16_t>(shape.byte_count / 2)};
+}
+
+link::ReadLimits read_limits(const catalogue::Profile& profile,
+                             const std::vector<link::SpontaneousShape>& unasked) {
   link::ReadLimits limits;
+  // Of what is not known nothing says where registers are, and a wrong value is worse than a
+  // refused one.
+  limits.neighbours =
+      profile.id.empty() ? link::Neighbours::anywhere : link::Neighbours::contiguous;
   limits.max_read = profile.link.max_read;
   std::vector<Area> absent = profile.link.absent;
   std::sort(absent.begin(), absent.end(),
@@ -86,9 +98,9 @@ link::ReadLimits read_limits(const catalogue::Profile& profile) {
     limits.absent.push_back(
         {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
   }
-  if (profile.events) {
-    limits.forbidden_shape =
-        RegisterRange{catalogue::table_of(*profile.events), 0, profile.events->count};
+  if (profile.events) limits.forbidden_shapes.push_back(read_of(shape_of(*profile.events)));
+  for (const link::SpontaneousShape& shape : unasked) {
+    limits.forbidden_shapes.push_back(read_of(shape));
   }
   if (profile.refusals) {
     if (const auto code = profile.find(profile.refusals->parameter)) {
@@ -108,13 +120,22 @@ Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
   return caution * link::standard_silence(baud);
 }
 
+link::Units units_of(const catalogue::Profile& profile) {
+  if (profile.link.any_unit) return link::Units::any;
+  return profile.id.empty() ? link::Units::identified : link::Units::asked;
+}
+
 link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
-  link::DemuxRules rules{.framing = framing, .spontaneous = {}};
-  if (profile.events) {
-    rules.spontaneous.push_back(
-        {profile.events->function, static_cast<std::uint8_t>(2 * profile.events->count)});
-  }
+  link::DemuxRules rules{.framing = framing, .units = units_of(profile)};
+  if (profile.events) rules.spontaneous.push_back(shape_of(*profile.events));
   return rules;
+}
+
+/// 8000h or above. The nanoseconds of a clock are chance enough: they keep answers that a server
+/// sent before, or makes up, from having the id of a request.
+std::uint16_t transaction_at(TimePoint now) {
+  constexpr std::uint16_t smallest = 0x8000;
+  return smallest | static_cast<std::uint16_t>(now.time_since_epoch().count() & 0x7FFF);
 }
 
 link::SessionOptions session_options(const catalogue::Profile& profile,
@@ -124,6 +145,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   session.rules = demux_rules(profile, framing_of(endpoint, profile.link));
   session.unit = endpoint.unit.value_or(modbus::UnitId{profile.link.unit});
   session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
+  session.first_transaction = transaction_at(now);
   if (session.rules.framing == modbus::Framing::rtu) {
     const catalogue::SerialFacts& serial = profile.link.serial;
     const auto line = link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits);
@@ -132,6 +154,9 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
     session.character_time = character_time(line);
     session.echo =
         endpoint.medium == link::Medium::simulated ? link::LocalEcho::absent : endpoint.echo;
+    session.others = endpoint.medium == link::Medium::simulated
+                         ? link::SessionOptions::Others::none
+                         : link::SessionOptions::Others::possible;
     session.in_use_until = now;
     session.past = options.past;
   }
@@ -249,6 +274,10 @@ modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::Link
   return facts.framing;
 }
 
+link::SpontaneousShape shape_of(const catalogue::EventFacts& events) {
+  return {events.function, static_cast<std::uint8_t>(2 * events.count)};
+}
+
 Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
                const LinkOptions& options, std::unique_ptr<link::Session> session)
     : target_(target_of(endpoint, options)),
@@ -256,7 +285,8 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       profile_(&profile),
       session_(std::move(session)),
       retries_(options.retries.value_or(profile.link.retries)),
-      client_(*session_, read_limits(*profile_), retries_) {}
+      limits_(read_limits(*profile_, options.unasked)),
+      client_(*session_, limits_, retries_) {}
 
 Device::~Device() {
   if (session_) session_->settle();
@@ -324,19 +354,20 @@ Result<Bytes> Device::report_server_id() {
 void Device::hang_up() {
   session_ = std::make_unique<link::Session>(std::make_unique<HungUp>(), session_->clock(),
                                              session_->options());
-  client_ = link::Client(*session_, read_limits(*profile_), retries_);
+  client_ = link::Client(*session_, limits_, retries_);
 }
 
 void Device::set_retries(unsigned retries) {
   retries_ = retries;
-  client_ = link::Client(*session_, read_limits(*profile_), retries_);
+  client_ = link::Client(*session_, limits_, retries_);
 }
 
 void Device::use(const catalogue::Profile& profile, catalogue::Identity identity) {
   profile_ = &profile;
   identity_ = std::move(identity);
   session_->set_rules(demux_rules(*profile_, session_->options().rules.framing));
-  client_ = link::Client(*session_, read_limits(*profile_), retries_);
+  limits_ = read_limits(*profile_, {});
+  client_ = link::Client(*session_, limits_, retries_);
   registers_known_ = true;
 }
 

@@ -114,6 +114,7 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   assign(link.retries, map.number<unsigned>("retries"));
   assign(link.settle, map.duration("settle"));
   assign(link.loopback, map.flag("loopback"));
+  assign(link.any_unit, map.flag("any-unit"));
   assign(link.even_pairs, map.word<bool>("pairs", "pairs", pair_words));
   if (const YamlNode* serial = map.get("serial")) read_serial(*serial, link.serial, findings);
   assign(link.contiguous, read_areas(map.get("contiguous"), findings));

@@ -347,6 +347,10 @@ void link_is_usable(const ProfileDraft& draft, Findings& findings) {
   };
   check("max-read", link.max_read, modbus::max_read_count);
   check("max-write", link.max_write, modbus::max_write_count);
+  if (link.any_unit && link.framing == modbus::Framing::rtu) {
+    findings.add_once(draft.link.of("any-unit"),
+                      "any-unit is for TCP: on a serial line the unit tells whose answer it is");
+  }
   if (!link.units) return;
   // 0 is everybody, and 248 to 255 are reserved on a serial line.
   constexpr unsigned highest_unit = 247;

@@ -153,12 +153,10 @@ std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits&
       if (before > range.first || end_of(range) + more - before > all_registers) continue;
       const RegisterRange other{range.table, static_cast<std::uint16_t>(range.first - before),
                                 static_cast<std::uint16_t>(range.count + more)};
-      if (is_forbidden(other, limits) ||
-          !may_bridge(range.table, other.first, end_of(other), limits, absent)) {
-        continue;
-      }
-      others.push_back(
-          {modbus::read_request(other.table, {other.first}, other.count), before});
+      const bool allowed = limits.neighbours == Neighbours::anywhere ||
+                           may_bridge(range.table, other.first, end_of(other), limits, absent);
+      if (!allowed || is_forbidden(other, limits)) continue;
+      others.push_back({modbus::read_request(other.table, {other.first}, other.count), before});
       break;
     }
   }
@@ -202,8 +200,8 @@ Client::Client(Session& session, ReadLimits limits, unsigned retries)
 Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries,
                                 const std::vector<OtherRead>& others) {
   auto response = session_->transact(request, others);
-  for (unsigned retry = 0; retry < retries && !response && is_lost(response.error()) &&
-                           !session_->is_out_of_step();
+  for (unsigned retry = 0;
+       retry < retries && !response && is_lost(response.error()) && !session_->is_out_of_step();
        ++retry) {
     session_->tell_retry(request);
     response = session_->transact(request, others);
@@ -249,8 +247,11 @@ auto Client::believed(Read read) -> decltype(read()) {
 
 Result<Registers> Client::read_once(const RegisterRange& range) {
   const auto request = modbus::read_request(range.table, {range.first}, range.count);
-  return ask(request, retries_, other_reads(range, limits_, absent_registers()))
-      .map(modbus::registers_of);
+  std::vector<OtherRead> others;
+  if (session_->options().rules.framing == modbus::Framing::rtu) {
+    others = other_reads(range, limits_, absent_registers());
+  }
+  return ask(request, retries_, others).map(modbus::registers_of);
 }
 
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,

@@ -24,8 +24,8 @@ bool is_addressed(const modbus::Adu& outstanding, const modbus::Adu& received,
 bool is_unit_taken(const modbus::Adu& outstanding, const modbus::Adu& received,
                    const DemuxRules& rules) {
   if (rules.framing == modbus::Framing::rtu || outstanding.unit == received.unit) return true;
-  const bool identifies = outstanding.pdu.function ==
-                          static_cast<std::uint8_t>(modbus::FunctionCode::report_server_id);
+  const bool identifies =
+      outstanding.pdu.function == static_cast<std::uint8_t>(modbus::FunctionCode::report_server_id);
   return rules.units == Units::any || (rules.units == Units::identified && identifies);
 }
 

@@ -8,8 +8,6 @@ namespace {
 // Longer than the pause between two polls of a usual master.
 constexpr Duration quiet = std::chrono::seconds(10);
 
-// Gateways and drivers were seen to repeat an answer after up to 40 ms.
-constexpr Duration longest_copy = std::chrono::milliseconds(100);
 constexpr std::size_t most_remembered = 32;
 
 // A line of many devices must not make this grow without end.
@@ -26,12 +24,14 @@ bool writes(const modbus::Pdu& request) {
 bool LineDoubt::find(Evidence evidence, TimePoint now) {
   until_ = std::max(until_, now + quiet);
   if (evidence != Evidence::noise) ++disturbances_;
-  return found_.insert(evidence).second;
+  const bool is_worse = !worst_ || evidence > *worst_;
+  if (is_worse) worst_ = evidence;
+  return is_worse;
 }
 
 void LineDoubt::remember(const modbus::Pdu& request, const modbus::Pdu& answer, TimePoint now) {
-  while (!accepted_.empty() && (now - accepted_.front().at > longest_copy ||
-                                accepted_.size() >= most_remembered)) {
+  while (!accepted_.empty() &&
+         (now - accepted_.front().at > longest_copy || accepted_.size() >= most_remembered)) {
     accepted_.pop_front();
   }
   if (writes(request)) {

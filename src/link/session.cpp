@@ -27,10 +27,12 @@ constexpr std::uint16_t smallest_transaction = 0x8000;
 constexpr Duration first_listening = std::chrono::milliseconds(20);
 
 // A line that was quiet for so long after it was opened is believed.
-constexpr Duration newness = std::chrono::seconds(2);
+constexpr Duration newness = std::chrono::seconds(1);
 
-// Beyond the longest round trip so far, when the line is listened to behind an answer.
-constexpr Duration trip_margin = std::chrono::milliseconds(10);
+// Behind an answer the line is listened to for as many round trips, as the quickest of them may
+// have been that of another one's answer, and a bit longer.
+constexpr Duration::rep trips_listened = 2;
+constexpr Duration trip_margin = std::chrono::milliseconds(20);
 constexpr Duration longest_listening = std::chrono::milliseconds(250);
 
 // More late answers than these hardly come at once.
@@ -70,8 +72,7 @@ std::string_view sentence_of(Evidence evidence) {
              "answer is proved";
     case Evidence::repeated:
       return "answers come twice on this line; each answer is proved";
-    case Evidence::frame:
-    case Evidence::query:
+    case Evidence::master:
       break;
   }
   return "another master is on this line; each answer is proved";
@@ -119,7 +120,7 @@ struct Session::Outstanding {
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
   std::optional<modbus::UnitId> other_unit = std::nullopt;  ///< that answered with our id
-  std::size_t echoes = 0;   ///< copies of the request that came back
+  std::size_t echoes = 0;  ///< copies of the request that came back
 };
 
 Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -128,18 +129,22 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       clock_(&clock),
       options_(std::move(options)),
       trace_(std::move(trace)),
-      created_(clock.now()),
       next_transaction_(std::max(options_.first_transaction, smallest_transaction)),
+      created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
-  if (options_.past == SessionOptions::Past::doubtful) doubt_answers(created_);
+  if (options_.past == SessionOptions::Past::doubtful) {
+    doubt_answers(created_);
+    others_late_until_ = past_until_ = doubtful_until_;
+  }
   const std::string company = is_rtu() ? transport_->company() : std::string();
   if (company.empty()) return;
   doubt_.stay();
   if (trace_.notice) {
-    trace_.notice(fmt::format("{} has this line open, too: perhaps another master is on this line; "
-                              "each answer is proved",
-                              company));
+    trace_.notice(
+        fmt::format("{} has this line open, too: perhaps another master is on this line; "
+                    "each answer is proved",
+                    company));
   }
 }
 
@@ -153,7 +158,7 @@ class Session::Turn {
   explicit Turn(Session& session) : session_(&session) {
     const Transport::Turn left = session_->transport_->begin_turn();
     session_->last_activity_ = std::max(session_->last_activity_, left.used_until);
-    session_->others_late_until_ = left.late_until;
+    session_->others_late_until_ = std::max(session_->past_until_, left.late_until);
   }
   Turn(const Turn&) = delete;
   Turn& operator=(const Turn&) = delete;
@@ -212,6 +217,11 @@ Result<modbus::Pdu> Session::ask_behind_late(const modbus::Pdu& request) {
 /// A read whose answer is proved where there is doubt: about the line, or about this answer.
 Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Others& others) {
   for (int proofs = 0; proofs < most_proofs; ++proofs) {
+    if (proofs > 0) {
+      // Where one answer was another's, ours may still come, and each would be one too late.
+      auto silent = wait_for_silence(clock_->now() + time_to_listen());
+      if (!silent) return tl::unexpected(std::move(silent.error()));
+    }
     const std::uint64_t disturbances = doubt_.disturbances();
     const std::uint64_t noises = noises_;
     auto answer = exchange(request);
@@ -219,8 +229,8 @@ Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Oth
     const TimePoint now = clock_->now();
     const bool may_be_copy = options_.others == SessionOptions::Others::possible &&
                              doubt_.may_be_copy(request, *answer, now);
-    const bool beside = doubt_.disturbances() != disturbances || noises_ != noises ||
-                        !buffer_.empty();
+    const bool beside =
+        doubt_.disturbances() != disturbances || noises_ != noises || !buffer_.empty();
     std::optional<modbus::Pdu> believed = *answer;
     if (doubt_.is_raised(now) || beside || may_be_copy) {
       const Duration round_trip = last_round_trip_;
@@ -231,63 +241,102 @@ Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Oth
     }
     if (believed) return std::move(*believed);
   }
-  return tl::unexpected(
-      Error{.code = Errc::no_answer,
-            .message = fmt::format("no answer to '{}' can be told from what others say on this line",
-                                   modbus::describe_request(request)),
-            .hint = "end the other master or program on this line, or wait until it is quiet",
-            .tried = modbus::describe_request(request)});
+  return tl::unexpected(Error{
+      .code = Errc::no_answer,
+      .message = fmt::format("no answer to '{}' can be told from what others say on this line",
+                             modbus::describe_request(request)),
+      .hint = "end the other master or program on this line, or wait until it is quiet",
+      .tried = modbus::describe_request(request)});
 }
 
-/// The answer that is proved, or none where another one came.
+/// The answer that is proved, or none where another one came. A frame that could be the answer,
+/// too, and says something else, refutes.
 Result<std::optional<modbus::Pdu>> Session::prove(const modbus::Pdu& request,
-                                                  const modbus::Pdu& answer,
-                                                  const Others& others) {
+                                                  const modbus::Pdu& answer, const Others& others) {
   decide(Decision::proof, modbus::explain_request(request));
-  const std::uint64_t mark = doubt_.disturbances();
+  const TimePoint now = clock_->now();
+  if (doubt_.is_raised(now) && doubt_.may_be_copy(request, answer, now)) {
+    // Copies of what was asked before must not prove each other; what comes instead refutes.
+    contested_ = {request};
+    accepted_ = answer;
+    refutations_ = 0;
+    auto silent = wait_for_silence(now + longest_copy);
+    contested_.clear();
+    if (!silent) return tl::unexpected(std::move(silent.error()));
+    if (refutations_ > 0) return std::nullopt;
+  }
   const bool is_exception = modbus::exception_of(answer).has_value();
   const OtherRead* other = is_exception ? nullptr : own_shape_of(others);
-  if (other != nullptr) {
-    auto proved = prove_by_other(answer, *other);
-    if (!proved || *proved) return proved;
+  // Units answer in order: had the answer been another's, ours would come in front of that of the
+  // loop-back. But where others read what comes for us, too, they may have taken ours.
+  const bool in_order = has_loopback() && order_ == Order::kept && transport_->company().empty();
+  if (in_order) {
+    contested_ = {request};
+    auto proved = prove_by_loopback(answer);
+    if (!proved || *proved || other == nullptr) return proved;
   }
-  // Where another program reads the same port it may have taken the answer to us, so that order
-  // says nothing.
-  const bool in_order = has_loopback() && transport_->company().empty();
-  auto proved =
-      in_order ? prove_by_loopback(mark) : prove_by_repetition(request, answer, mark);
-  if (!proved) return tl::unexpected(std::move(proved.error()));
-  return *proved ? std::optional(answer) : std::nullopt;
+  if (other != nullptr) return prove_by_other(request, answer, *other);
+  contested_ = {request};
+  auto again = exchange_contested(request, answer);
+  if (!again) return tl::unexpected(std::move(again.error()));
+  if (*again != answer || refutations_ > 0) return std::nullopt;
+  if (!has_loopback()) return answer;
+  contested_ = {request};
+  return prove_by_loopback(answer);
 }
 
-/// What has an unusual shape is hardly the answer to another master's request. Two such answers that
-/// agree are proof even where the value changed since it was asked for first.
-Result<std::optional<modbus::Pdu>> Session::prove_by_other(const modbus::Pdu& answer,
+/// What has an unusual shape is hardly the answer to another master's request. Two such answers
+/// that agree are proof even where the value changed since it was asked for first.
+Result<std::optional<modbus::Pdu>> Session::prove_by_other(const modbus::Pdu& request,
+                                                           const modbus::Pdu& answer,
                                                            const OtherRead& other) {
-  std::optional<modbus::Pdu> before = answer;
-  for (int turn = 0; turn < 2; ++turn) {
-    auto again = exchange(other.request);
+  constexpr int most_turns = 4;
+  modbus::Pdu before = answer;
+  modbus::Pdu accepted = answer;
+  for (int turn = 0; turn < most_turns; ++turn) {
+    contested_ = {other.request};
+    if (turn == 0) contested_.push_back(request);
+    auto again = exchange_contested(other.request, accepted);
     if (!again) return tl::unexpected(std::move(again.error()));
     if (modbus::exception_of(*again)) return std::nullopt;
     modbus::Pdu part = part_of(*again, other.skip, answer);
-    if (part == *before) return part;
+    if (part == before && refutations_ == 0) return part;
+    accepted = std::move(*again);
     before = std::move(part);
   }
-  return std::nullopt;
-}
-
-/// Units answer in order: had the answer been another's, ours would come in front of the loop-back.
-Result<bool> Session::prove_by_loopback(std::uint64_t mark) {
-  return exchange(modbus::loopback_request(fresh_word())).map([&](const modbus::Pdu&) {
-    return doubt_.disturbances() == mark;
+  if (!has_loopback()) return std::nullopt;  // else a value that never stands still can be proved
+  contested_ = {other.request};
+  return prove_by_loopback(accepted).map([&](const std::optional<modbus::Pdu>& proved) {
+    return proved ? std::optional(before) : std::nullopt;
   });
 }
 
-Result<bool> Session::prove_by_repetition(const modbus::Pdu& request, const modbus::Pdu& answer,
-                                          std::uint64_t mark) {
-  return exchange(request).map([&](const modbus::Pdu& again) {
-    return again == answer && doubt_.disturbances() == mark;
-  });
+Result<std::optional<modbus::Pdu>> Session::prove_by_loopback(const modbus::Pdu& answer) {
+  return exchange_contested(modbus::loopback_request(fresh_word()), answer)
+      .map([&](const modbus::Pdu&) {
+        return refutations_ == 0 ? std::optional(answer) : std::nullopt;
+      });
+}
+
+/// An exchange that counts what refutes the answer accepted before.
+Result<modbus::Pdu> Session::exchange_contested(const modbus::Pdu& request,
+                                                const modbus::Pdu& accepted) {
+  refutations_ = 0;
+  accepted_ = accepted;
+  auto answer = exchange(request);
+  contested_.clear();
+  return answer;
+}
+
+void Session::note_refutation(const modbus::Adu& stray) {
+  const bool refutes =
+      stray.pdu != accepted_ &&
+      std::any_of(contested_.begin(), contested_.end(), [&](const auto& request) {
+        const modbus::Adu asked{.transaction = {}, .unit = options_.unit, .pdu = request};
+        const Verdict verdict = judge(&asked, stray, options_.rules);
+        return verdict == Verdict::answer || verdict == Verdict::exception_response;
+      });
+  if (refutes) ++refutations_;
 }
 
 /// The first of them whose answers have a shape that nobody else's had here.
@@ -300,8 +349,8 @@ const OtherRead* Session::own_shape_of(const Others& others) const {
 
 /// The copy of the answer to an equal write is no answer to this one.
 Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
-  const bool careful = is_rtu() && is_write(write) && doubt_.is_raised(clock_->now()) &&
-                       proves_ == Proves::in_doubt;
+  const bool careful =
+      is_rtu() && is_write(write) && doubt_.is_raised(clock_->now()) && proves_ == Proves::in_doubt;
   if (!careful) return {};
   const modbus::Pdu answer{.function = write.function,
                            .data = Bytes(write.data.begin(), write.data.begin() + 4)};
@@ -316,24 +365,30 @@ Result<void> Session::listen_first() {
   return wait_for_silence(std::max(clock_->now(), last_activity_ + options_.gap) + first_listening);
 }
 
+Duration Session::time_to_listen() const {
+  return std::min(trips_listened * longest_round_trip_ + trip_margin, longest_listening);
+}
+
 Session::Mark Session::mark() const {
-  return {.disturbances = doubt_.disturbances(), .proves = doubt_.is_raised(clock_->now())};
+  return {.requests = counters_.requests,
+          .disturbances = doubt_.disturbances(),
+          .noises = noises_,
+          .proves = doubt_.is_raised(clock_->now())};
 }
 
 Result<bool> Session::is_undisturbed_since(const Mark& mark) {
-  if (mark.proves) return true;
+  if (mark.proves || mark.requests == counters_.requests) return true;
   const TimePoint now = clock_->now();
   const bool is_new = now < created_ + newness;
   const bool listens = is_rtu() && options_.others == SessionOptions::Others::possible && is_new &&
                        proves_ == Proves::in_doubt && !doubt_.is_raised(now);
   if (listens) {
     const Turn turn(*this);
-    const Duration trip = std::min(longest_round_trip_ + trip_margin, longest_listening);
-    if (auto silent = wait_for_silence(now + trip); !silent) {
+    if (auto silent = wait_for_silence(now + time_to_listen()); !silent) {
       return tl::unexpected(std::move(silent.error()));
     }
   }
-  return doubt_.disturbances() == mark.disturbances;
+  return doubt_.disturbances() == mark.disturbances && noises_ == mark.noises;
 }
 
 /// Whether a late answer of our own, or of another session of this program, may still come.
@@ -344,10 +399,11 @@ bool Session::may_be_late() const {
 /// A late answer of our own is no sign of another master. Each request has one.
 bool Session::take_late(const modbus::Adu& stray) {
   const TimePoint now = clock_->now();
-  if (stray.unit != options_.unit && now < others_late_until_) return true;
+  const bool ours = stray.unit == options_.unit;
+  if (ours ? now < past_until_ : now < others_late_until_) return true;
   if (now >= doubtful_until_) unanswered_.clear();
-  const auto late = std::find_if(
-      unanswered_.begin(), unanswered_.end(), [&](const modbus::Adu& request) {
+  const auto late =
+      std::find_if(unanswered_.begin(), unanswered_.end(), [&](const modbus::Adu& request) {
         const Verdict verdict = judge(&request, stray, options_.rules);
         return verdict == Verdict::answer || verdict == Verdict::exception_response;
       });
@@ -358,9 +414,8 @@ bool Session::take_late(const modbus::Adu& stray) {
 
 void Session::find(Evidence evidence, std::string_view what) {
   if (evidence == Evidence::noise) ++noises_;
-  const bool is_new = doubt_.find(evidence, clock_->now());
   decide(Decision::doubt, what);
-  if (is_new && trace_.notice) trace_.notice(sentence_of(evidence));
+  if (doubt_.find(evidence, clock_->now()) && trace_.notice) trace_.notice(sentence_of(evidence));
 }
 
 /// Bytes beside the frames: those of another master's request, or noise.
@@ -368,7 +423,10 @@ void Session::judge_noise(ByteView bytes) {
   if (bytes.empty() || !is_rtu()) return;
   const bool echo = !sent_.empty() && std::search(bytes.begin(), bytes.end(), sent_.begin(),
                                                   sent_.end()) != bytes.end();
-  if (!echo && holds_request(bytes)) return find(Evidence::query, "the request of another master");
+  if (!echo && holds_request(bytes)) {
+    ++queries_;
+    return find(Evidence::master, "the request of another master");
+  }
   if (!may_be_late()) find(Evidence::noise, "unexpected bytes");
 }
 
@@ -561,8 +619,8 @@ Result<std::optional<modbus::Adu>> Session::take_frame(const Outstanding* outsta
   return std::nullopt;
 }
 
-/// TCP: where the answer to the request that is out begins behind a frame whose rest never came, the
-/// torn frame is left. False while too little has come to tell.
+/// TCP: where the answer to the request that is out begins behind a frame whose rest never came,
+/// the torn frame is left. False while too little has come to tell.
 bool Session::leave_torn(const Outstanding* outstanding) {
   if (torn_ == 0 || buffer_.size() <= torn_) return true;
   if (outstanding == nullptr) {
@@ -573,8 +631,8 @@ bool Session::leave_torn(const Outstanding* outstanding) {
   const ByteView answer = ByteView(outstanding->bytes).first(telling);
   const ByteView behind = ByteView(buffer_).subspan(torn_);
   const std::size_t known = std::min(telling, behind.size());
-  const bool begins = std::equal(answer.begin(), answer.begin() + static_cast<std::ptrdiff_t>(known),
-                                 behind.begin());
+  const bool begins = std::equal(
+      answer.begin(), answer.begin() + static_cast<std::ptrdiff_t>(known), behind.begin());
   if (begins && known < telling) return false;
   if (begins) {
     note_noise(ByteView(buffer_).first(torn_));
@@ -630,10 +688,13 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
 
 /// RTU: a frame that answered nothing.
 void Session::doubt_because_of(const modbus::Adu& stray) {
-  if (!is_rtu() || take_late(stray)) return;
+  if (!is_rtu()) return;
+  note_refutation(stray);
+  if (take_late(stray)) return;
   doubt_.note_shape(stray.pdu);
   const bool copy = doubt_.is_copy(stray.pdu, clock_->now());
-  find(copy ? Evidence::repeated : Evidence::frame,
+  if (!copy && queries_ == 0) order_ = Order::unknown;
+  find(copy ? Evidence::repeated : Evidence::master,
        copy ? "an answer came twice" : "a frame that answers nothing");
 }
 
@@ -666,11 +727,12 @@ Result<void> Session::keep_gap() { return is_rtu() ? wait_for_silence({}) : disc
 
 /// TCP: what came before a request is sent is not its answer, whatever id it has.
 Result<void> Session::discard_early() {
-  constexpr int most_reads = 16;  // a flood must not keep the request for ever
-  for (int reads = 0; reads < most_reads; ++reads) {
-    auto more = fill(clock_->now());
-    if (!more) return tl::unexpected(std::move(more.error()));
-    if (!*more) break;
+  constexpr int most_reads = 100;  // a flood must not keep the request for ever
+  constexpr Duration longest_discarding = std::chrono::milliseconds(1);
+  const TimePoint began = clock_->now();
+  for (int reads = 0; reads < most_reads && clock_->now() < began + longest_discarding; ++reads) {
+    const auto more = fill(began);
+    if (!more || !*more) break;  // what is wrong shows when the request is sent
   }
   return sort_buffered(nullptr);
 }
@@ -753,9 +815,9 @@ bool Session::begins_answer(const Outstanding& outstanding) const {
   const Bytes& request = outstanding.bytes;
   if (!is_rtu()) {  // the id comes first
     const std::size_t known = std::min<std::size_t>(buffer_.size(), 2);
-    return known > 0 && std::equal(request.begin(),
-                                   request.begin() + static_cast<std::ptrdiff_t>(known),
-                                   buffer_.begin());
+    return known > 0 &&
+           std::equal(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(known),
+                      buffer_.begin());
   }
   if (buffer_.empty()) return false;
   const bool spontaneous =
@@ -778,11 +840,11 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
   }
   if (outstanding.other_unit) {
     error.code = Errc::malformed_answer;
-    error.message = fmt::format("unit {} answered '{}', though unit {} was asked",
-                                outstanding.other_unit->value, tried,
-                                outstanding.request.unit.value);
-    error.hint = fmt::format("if that is the tool, ask for it with ?unit={}",
-                             outstanding.other_unit->value);
+    error.message =
+        fmt::format("unit {} answered '{}', though unit {} was asked",
+                    outstanding.other_unit->value, tried, outstanding.request.unit.value);
+    error.hint =
+        fmt::format("if that is the tool, ask for it with ?unit={}", outstanding.other_unit->value);
     return error;
   }
   if (!begins_answer(outstanding)) {

@@ -52,14 +52,35 @@ std::optional<long> lock_holder(int descriptor) {
   return std::nullopt;
 }
 
+/// Whether a descriptor of a process is the other end of this pseudo terminal.
+bool is_other_end(const fs::path& process, const fs::path& descriptor, const fs::path& port) {
+  std::ifstream info(process / "fdinfo" / descriptor);
+  for (std::string line; std::getline(info, line);) {
+    std::istringstream words(line);
+    std::string key;
+    std::string number;
+    words >> key >> number;
+    if (key == "tty-index:") return port.filename() == number;
+  }
+  return false;
+}
+
+/// Whether a process has the port open. A process that has the other end of a pseudo terminal is
+/// the device behind the port, and often has the port itself open to keep it.
 bool has_open(const fs::path& process, const fs::path& port) {
+  const bool pseudo = port.parent_path() == "/dev/pts";
+  bool found = false;
   std::error_code failed;  // other users' processes show nothing
   for (fs::directory_iterator file(process / "fd", failed), end; !failed && file != end;
        file.increment(failed)) {
     std::error_code unreadable;
-    if (fs::read_symlink(*file, unreadable) == port && !unreadable) return true;
+    const fs::path target = fs::read_symlink(*file, unreadable);
+    if (unreadable) continue;
+    if (target == port) found = true;
+    const bool multiplexer = pseudo && target.filename() == "ptmx";
+    if (multiplexer && is_other_end(process, file->path().filename(), port)) return false;
   }
-  return false;
+  return found;
 }
 
 std::optional<long> opener(const std::string& path) {
@@ -82,6 +103,11 @@ std::string port_holder(const std::string& path, int descriptor) {
   auto holder = descriptor < 0 ? std::nullopt : lock_holder(descriptor);
   if (!holder) holder = opener(path);
   return holder ? program(*holder) : std::string();
+}
+
+std::string port_company(const std::string& path) {
+  const auto other = opener(path);
+  return other ? program(*other) : std::string();
 }
 
 }  // namespace spindle::posix

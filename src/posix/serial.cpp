@@ -222,12 +222,13 @@ Port::~Port() {
 
 class SerialTransport final : public link::Transport {
  public:
-  SerialTransport(Port port, const Clock& clock, const Interrupt& interrupt)
-      : port_(std::move(port)), wait_(clock, interrupt) {}
+  SerialTransport(Port port, std::string company, const Clock& clock, const Interrupt& interrupt)
+      : port_(std::move(port)), company_(std::move(company)), wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void shield() override { wait_.shield(); }
+  [[nodiscard]] std::string company() const override { return company_; }
 
  private:
   [[nodiscard]] bool hung_up() const;
@@ -235,6 +236,7 @@ class SerialTransport final : public link::Transport {
   Result<void> drain() const;
 
   Port port_;
+  std::string company_;
   LineWait wait_;
 };
 
@@ -309,7 +311,7 @@ Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
   if (switching == link::LineSwitching::kernel) {
     if (auto done = port->switch_by_kernel(); !done) return tl::unexpected(std::move(done.error()));
   }
-  return std::make_unique<SerialTransport>(std::move(*port), clock, interrupt);
+  return std::make_unique<SerialTransport>(std::move(*port), port_company(path), clock, interrupt);
 }
 
 }  // namespace spindle::posix

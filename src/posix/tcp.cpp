@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include "posix/descriptor.hpp"
+#include "posix/line_lock.hpp"
 #include "posix/resolve.hpp"
 #include "posix/socket_errors.hpp"
 #include "posix/wait.hpp"
@@ -43,15 +44,17 @@ void set_options(const Descriptor& socket) {
 
 class TcpTransport final : public link::Transport {
  public:
-  TcpTransport(Descriptor socket, const Clock& clock, const Interrupt& interrupt)
-      : socket_(std::move(socket)), wait_(clock, interrupt) {}
+  TcpTransport(Descriptor socket, LineLock lock, const Clock& clock, const Interrupt& interrupt)
+      : socket_(std::move(socket)), lock_(std::move(lock)), wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void shield() override { wait_.shield(); }
+  [[nodiscard]] std::string company() const override { return lock_.holder; }
 
  private:
   Descriptor socket_;
+  LineLock lock_;
   LineWait wait_;
 };
 
@@ -129,9 +132,37 @@ bool says_more(const Error& newer, const std::optional<Error>& older) {
 struct Attempt {
   TimePoint deadline;
   Duration allowed;
+  Behind behind;
 };
 
-Result<Descriptor> connect_to_any(const Resolved& resolved, const Attempt& attempt,
+struct Connection {
+  Descriptor socket;
+  LineLock lock = {};
+};
+
+Error busy_error(const Address& address, const LineLock& lock) {
+  return {.code = Errc::port_busy,
+          .message = fmt::format("the serial line behind {} port {} is in use by {}",
+                                 to_text(address), port_of(address), lock.holder),
+          .hint = "end the other program, or wait until it has ended"};
+}
+
+/// Locked before it is connected: some device servers drop the older of two connections.
+Result<Connection> connect_line(const Address& address, const Attempt& attempt, TimePoint deadline,
+                                const Clock& clock, const Interrupt& interrupt) {
+  LineLock lock;
+  if (attempt.behind != Behind::tool) {
+    lock = lock_line(fmt::format("{}-{}", to_text(address), port_of(address)));
+  }
+  if (attempt.behind == Behind::line && !lock.holder.empty()) {
+    return tl::unexpected(busy_error(address, lock));
+  }
+  return connect_to(address, deadline, clock, interrupt).map([&](Descriptor socket) {
+    return Connection{std::move(socket), std::move(lock)};
+  });
+}
+
+Result<Connection> connect_to_any(const Resolved& resolved, const Attempt& attempt,
                                   const Clock& clock, const Interrupt& interrupt) {
   std::optional<Error> failure;
   auto untried = static_cast<std::int64_t>(resolved.addresses.size());
@@ -139,11 +170,12 @@ Result<Descriptor> connect_to_any(const Resolved& resolved, const Attempt& attem
     // An address that swallows everything must leave time for those after it.
     const TimePoint now = clock.now();
     const TimePoint share = now + (attempt.deadline - now) / untried--;
-    Result<Descriptor> socket = connect_to(address, share, clock, interrupt);
-    if (socket) return socket;
+    Result<Connection> connection = connect_line(address, attempt, share, clock, interrupt);
+    if (connection) return connection;
     if (interrupt.raised()) return tl::unexpected(interrupt.error());
 
-    Error error = std::move(socket.error());
+    Error error = std::move(connection.error());
+    if (error.code == Errc::port_busy) return tl::unexpected(std::move(error));
     if (error.code == Errc::connect_timeout) error.waited = attempt.allowed;
     if (resolved.given == Resolved::Given::name) {
       error.message = fmt::format("{} (address {})", message_of(error), to_text(address));
@@ -157,14 +189,16 @@ Result<Descriptor> connect_to_any(const Resolved& resolved, const Attempt& attem
 
 Result<std::unique_ptr<link::Transport>> open_tcp(const std::string& host, std::uint16_t port,
                                                   Duration connect_timeout, Clock& clock,
-                                                  const Interrupt& interrupt) {
-  const Attempt attempt = {.deadline = clock.now() + connect_timeout, .allowed = connect_timeout};
+                                                  const Interrupt& interrupt, Behind behind) {
+  const Attempt attempt = {
+      .deadline = clock.now() + connect_timeout, .allowed = connect_timeout, .behind = behind};
   const Result<Resolved> resolved = resolve(host, port, attempt.deadline, clock, interrupt);
   if (!resolved) return tl::unexpected(resolved.error());
-  Result<Descriptor> socket = connect_to_any(*resolved, attempt, clock, interrupt);
-  if (!socket) return tl::unexpected(std::move(socket.error()));
-  set_options(*socket);
-  return std::make_unique<TcpTransport>(std::move(*socket), clock, interrupt);
+  Result<Connection> connection = connect_to_any(*resolved, attempt, clock, interrupt);
+  if (!connection) return tl::unexpected(std::move(connection.error()));
+  set_options(connection->socket);
+  return std::make_unique<TcpTransport>(std::move(connection->socket), std::move(connection->lock),
+                                        clock, interrupt);
 }
 
 }  // namespace spindle::posix

@@ -10,6 +10,14 @@
 #include "spindle/posix/tcp.hpp"
 
 namespace spindle::posix {
+namespace {
+
+Behind behind(const link::Endpoint& endpoint) {
+  if (endpoint.medium != link::Medium::rtu_over_tcp) return Behind::tool;
+  return endpoint.claim == link::Claim::beside ? Behind::busy_line : Behind::line;
+}
+
+}  // namespace
 
 std::function<Result<std::unique_ptr<link::Transport>>(const link::Endpoint&,
                                                        const catalogue::LinkFacts&, Duration)>
@@ -25,7 +33,7 @@ line_opener(Clock& clock, const Interrupt& interrupt) {
               endpoint.switching, clock, interrupt);
         }
         return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
-                        interrupt);
+                        interrupt, behind(endpoint));
       };
 }
 

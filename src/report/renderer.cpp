@@ -50,6 +50,11 @@ void say_error(const Streams& streams, const Error& error) {
   streams.err("spindle: " + printable(describe(error), LineBreaks::fold) + "\n");
 }
 
+void say_warning(const Streams& streams, std::string_view sentence) {
+  if (streams.err_is_ready && !streams.err_is_ready()) return;
+  streams.err(printable(sentence, LineBreaks::fold) + "\n");
+}
+
 void say_sentence(const Streams& streams, Talk talk, std::string_view sentence) {
   if (talk == Talk::quiet || sentence.empty()) return;
   streams.err(printable(sentence, LineBreaks::fold) + "\n");

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -56,6 +57,8 @@ struct Script {
   Bytes flood = {};
   Duration flood_every = std::chrono::milliseconds(1);
 
+  std::string company = {};  ///< another program that has the line open
+
   std::vector<Sent> sent = {};
   std::size_t receives = 0;
   bool shielded = false;
@@ -93,6 +96,7 @@ class ScriptedTransport final : public link::Transport {
   }
 
   void shield() override { script_->shielded = true; }
+  [[nodiscard]] std::string company() const override { return script_->company; }
 
  private:
   [[nodiscard]] bool interrupted() const {

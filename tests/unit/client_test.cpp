@@ -53,7 +53,7 @@ Ranges requests_of(const std::vector<PlannedRead>& plan) {
 ReadLimits bm_limits() {
   return {.max_read = 100,
           .contiguous = {{input, 3200, 14}, {input, 3300, 14}},
-          .forbidden_shape = RegisterRange{input, 0, 14}};
+          .forbidden_shapes = {RegisterRange{input, 0, 14}}};
 }
 
 std::uint16_t value_at(RegisterTable table, std::uint32_t address) {
@@ -221,7 +221,7 @@ TEST_CASE("the fewest requests") {
        {{holding, 8, 2}, {holding, 10, 1}, {holding, 11, 1}, {holding, 12, 3}}},
       {"pieces of the forbidden shape",
        {{input, 0, 28}},
-       {.max_read = 14, .forbidden_shape = RegisterRange{input, 0, 14}},
+       {.max_read = 14, .forbidden_shapes = {RegisterRange{input, 0, 14}}},
        {{input, 0, 13}, {input, 13, 13}, {input, 26, 2}}},
   };
   for (const Row& row : rows) {
@@ -232,8 +232,9 @@ TEST_CASE("the fewest requests") {
 
 TEST_CASE("limits without sense still lead to a plan") {
   CHECK(plan_reads({{holding, 0, 3}}, {.max_read = 0}).size() == 3);
-  CHECK(plan_reads({{holding, 0, 1}}, {.forbidden_shape = RegisterRange{holding, 0, 1}}).size() ==
-        1);
+  CHECK(
+      plan_reads({{holding, 0, 1}}, {.forbidden_shapes = {RegisterRange{holding, 0, 1}}}).size() ==
+      1);
 }
 
 TEST_CASE("the parameter space of a BM in as many requests as its registers need") {
@@ -261,7 +262,7 @@ TEST_CASE("a plan covers what is wanted, whatever is wanted") {
     const auto table = numbers.below(2) == 0 ? holding : input;
     if (numbers.below(2) == 0) {
       const auto count = static_cast<std::uint16_t>(2U + numbers.below(20));
-      limits.forbidden_shape = RegisterRange{table, 0, count};
+      limits.forbidden_shapes = {RegisterRange{table, 0, count}};
     }
     std::set<std::uint32_t> absent;
     for (unsigned n = 0; n < 10; ++n) absent.insert(register_key(table, numbers.below(260)));
@@ -278,8 +279,8 @@ TEST_CASE("a plan covers what is wanted, whatever is wanted") {
       const RegisterRange& range = planned.range;
       REQUIRE(range.count >= 1);
       REQUIRE(range.count <= limits.max_read);
-      if (limits.forbidden_shape && limits.forbidden_shape->table == range.table) {
-        REQUIRE(range.count != limits.forbidden_shape->count);
+      if (!limits.forbidden_shapes.empty() && limits.forbidden_shapes[0].table == range.table) {
+        REQUIRE(range.count != limits.forbidden_shapes[0].count);
       }
       // Nobody asks for a register without reason.
       REQUIRE(wanted_keys.count(register_key(range.table, range.first)) == 1);
@@ -299,8 +300,8 @@ TEST_CASE("a plan covers what is wanted, whatever is wanted") {
     // What fits into one request comes with one request.
     for (const RegisterRange& range : wanted) {
       if (range.count > limits.max_read) continue;
-      if (limits.forbidden_shape && limits.forbidden_shape->table == range.table &&
-          limits.forbidden_shape->count == range.count) {
+      if (!limits.forbidden_shapes.empty() && limits.forbidden_shapes[0].table == range.table &&
+          limits.forbidden_shapes[0].count == range.count) {
         continue;
       }
       REQUIRE(std::any_of(plan.begin(), plan.end(), [&](const PlannedRead& planned) {
@@ -536,7 +537,7 @@ TEST_CASE("a read without answer is repeated as often as was said, then it ends 
   }
 }
 
-TEST_CASE("only a missing answer makes a read be repeated") {
+TEST_CASE("a line that broke makes no read be repeated") {
   struct Row {
     std::string_view what;
     test::Reaction reaction;
@@ -553,8 +554,7 @@ TEST_CASE("only a missing answer makes a read be repeated") {
          return std::vector<Arrival>{{1ms, Errc::reset}};
        },
        Errc::reset},
-      {"malformed", test::say(1ms, hex("8000 0000 0005 00 03 02 0000")), Errc::malformed_answer},
-      {"incomplete", test::say(1ms, hex("8000 0000 0005")), Errc::incomplete_answer},
+      {"no Modbus TCP", test::say(1ms, hex("FFFF FFFF FFFF FFFF")), Errc::malformed_answer},
   };
   for (const Row& row : rows) {
     CAPTURE(row.what);
@@ -562,6 +562,75 @@ TEST_CASE("only a missing answer makes a read be repeated") {
     bench.script.on_request(row.reaction);
     CHECK(bench.client.read_each({{holding, 0, 2}}).error().code == row.code);
     CHECK(bench.script.sent.size() == 1);
+  }
+}
+
+TEST_CASE("a damaged answer makes a read be repeated like a lost one, on either framing") {
+  struct Row {
+    std::string_view what;
+    Bytes bytes;
+  };
+  for (const Row& row :
+       {Row{"nothing", {}}, Row{"another count", hex("8000 0000 0005 00 03 02 0000")},
+        Row{"half a header", hex("8000 0000 00")},
+        Row{"all but a byte", hex("8000 0000 0007 00 03 04 0000 00")},
+        Row{"half a pushed frame", hex("0001 0000 001F 00 04 1C 07AA")}}) {
+    for (const std::size_t chunk : {std::size_t{4096}, std::size_t{1}}) {
+      CAPTURE(row.what);
+      CAPTURE(chunk);
+      Bench bench({}, 1);
+      bench.script.chunk = chunk;
+      bench.script.on_request(test::say(1ms, row.bytes));
+      CHECK(bench.client.read({holding, 2, 2}).value() ==
+            Registers{value_at(holding, 2), value_at(holding, 3)});
+      CHECK(bench.script.sent.size() == 2);
+    }
+  }
+  Bytes flipped =
+      modbus::frame(Framing::rtu, {{}, {1}, modbus::read_response(holding, Registers{7})});
+  const Bytes whole = flipped;
+  flipped.back() ^= 1U;
+  for (const Bytes& bytes : {Bytes(), flipped, Bytes(whole.begin(), whole.begin() + 4)}) {
+    FakeClock clock;
+    test::Script script(clock);
+    Session session(transport_to(script), clock,
+                    {.rules = {.framing = Framing::rtu}, .unit = {1}, .answer_timeout = 100ms});
+    Client client(session, {}, 1);
+    script.on_request(test::say(1ms, bytes));
+    script.on_request(test::say(1ms, whole));
+    CHECK(client.read({holding, 0, 1}).value() == Registers{7});
+  }
+}
+
+TEST_CASE("a read can be asked for in other shapes where neighbours may be read") {
+  struct Row {
+    RegisterRange wanted;
+    ReadLimits limits;
+    std::vector<std::pair<Pdu, std::size_t>> others;
+  };
+  const auto read = [](std::uint16_t first, std::uint16_t count) {
+    return modbus::read_request(holding, {first}, count);
+  };
+  const std::vector<Row> rows = {
+      {{holding, 10, 2}, {}, {}},
+      {{holding, 10, 2}, {.contiguous = {{holding, 8, 6}}}, {{read(10, 3), 0}, {read(10, 4), 0}}},
+      {{holding, 10, 2}, {.max_read = 3, .contiguous = {{holding, 9, 3}}}, {{read(9, 3), 1}}},
+      {{holding, 10, 2},
+       {.contiguous = {{holding, 8, 6}}, .forbidden_shapes = {{holding, 0, 3}, {holding, 0, 4}}},
+       {}},
+      {{holding, 0, 1},
+       {.neighbours = Neighbours::anywhere},
+       {{read(0, 2), 0}, {read(0, 3), 0}, {read(0, 4), 0}}},
+      {{holding, 65535, 1},
+       {.max_read = 2, .neighbours = Neighbours::anywhere},
+       {{read(65534, 2), 1}}},
+  };
+  for (const Row& row : rows) {
+    std::vector<std::pair<Pdu, std::size_t>> others;
+    for (const OtherRead& other : other_reads(row.wanted, row.limits)) {
+      others.emplace_back(other.request, other.skip);
+    }
+    CHECK(others == row.others);
   }
 }
 

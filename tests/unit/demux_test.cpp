@@ -70,8 +70,8 @@ std::vector<Row> rows() {
       {"the loop-back word", loop, pending, unit, loop, V::answer, V::answer},
 
       // bm-bmt.md, section 1: answers may carry unit 1 although 0 was asked.
-      {"the answer of another unit", read_two, pending, 1, two, V::answer, V::stray},
-      {"the answer of unit 77", read_two, pending, 77, two, V::answer, V::stray},
+      {"the answer of another unit", read_two, pending, 1, two, V::other_unit, V::stray},
+      {"another unit's exception", read_two, pending, 77, {0x83, {2}}, V::other_unit, V::stray},
       {"an answer with an older id", read_two, 0x8004, unit, two, V::stray, V::answer},
       {"an answer with the next id", read_two, 0x8006, unit, two, V::stray, V::answer},
       {"an answer with id 1", read_two, 1, unit, two, V::stray, V::answer},
@@ -280,5 +280,32 @@ TEST_CASE("no frame with a wrong id or of a wrong shape is ever an answer") {
       const Verdict other = judge(&request, {{0x8004}, {unit}, pdu}, rules(Framing::tcp));
       CHECK((other == Verdict::stray || other == Verdict::spontaneous));
     }
+  }
+}
+
+TEST_CASE("tcp: whose answers are taken") {
+  struct Row {
+    Units units;
+    Pdu request;
+    Pdu response;
+    Verdict verdict;
+  };
+  const Pdu two = modbus::read_response(RegisterTable::holding, Registers{271, 1000});
+  const Pdu identity = modbus::report_server_id_response(hex("0001 0002"));
+  const std::vector<Row> rows = {
+      {Units::asked, read_two, two, Verdict::other_unit},
+      {Units::identified, read_two, two, Verdict::other_unit},
+      {Units::any, read_two, two, Verdict::answer},
+      {Units::asked, identify, identity, Verdict::other_unit},
+      {Units::identified, identify, identity, Verdict::answer},
+      {Units::identified, identify, {0x91, {1}}, Verdict::exception_response},
+      {Units::any, identify, identity, Verdict::answer},
+      {Units::any, read_two, {0x83, {2}}, Verdict::exception_response},
+  };
+  for (const Row& row : rows) {
+    DemuxRules demux = rules(Framing::tcp);
+    demux.units = row.units;
+    const Adu request{{pending}, {unit}, row.request};
+    CHECK(judge(&request, {{pending}, {9}, row.response}, demux) == row.verdict);
   }
 }

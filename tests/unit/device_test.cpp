@@ -13,6 +13,7 @@
 #include "spindle/sim/sim_transport.hpp"
 #include "support/fake_clock.hpp"
 #include "support/fault_plan.hpp"
+#include "support/scripted_transport.hpp"
 
 using namespace spindle;
 using namespace spindle::device;
@@ -484,8 +485,9 @@ Profile drive() {
 
 link::SessionOptions options_for(const std::string& url, const Profile& profile) {
   test::FakeClock clock;
-  const OpenTransport open = [](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
-    return Result<std::unique_ptr<link::Transport>>();
+  test::Script script(clock);
+  const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
+    return Result<std::unique_ptr<link::Transport>>(transport_to(script));
   };
   const auto endpoint = link::parse_endpoint(url).value();
   auto device = Device::open(endpoint, profile, {}, open, clock).value();

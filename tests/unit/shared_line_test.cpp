@@ -138,7 +138,7 @@ TEST_CASE("shared line: outside of a turn nothing is received, and a wait can be
   CHECK(world.clock.now() == deadline);
   idle->begin_turn();
   CHECK(idle->receive(bytes, deadline).value() == 3);
-  idle->end_turn(deadline);
+  idle->end_turn({.used_until = deadline});
   world.interrupt.raise(SIGINT);
   CHECK(idle->receive(bytes, deadline + 1s).error().code == Errc::interrupted);
 }

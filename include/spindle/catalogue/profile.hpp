@@ -65,6 +65,7 @@ struct LinkFacts {
   /// How long a written value may take until it reads back, unless its parameter says otherwise.
   Duration settle = std::chrono::milliseconds(500);
   bool loopback = false;    ///< FC 08 00 is answered
+  bool any_unit = false;    ///< TCP: answers may carry another unit identifier than was asked
   bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
   SerialFacts serial = {};
   std::vector<Area> contiguous = {};  ///< registers may be read along here

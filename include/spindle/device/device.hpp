@@ -22,6 +22,9 @@ using OpenTransport = std::function<Result<std::unique_ptr<link::Transport>>(
 /// How frames are bounded there: by the medium, and by the product where it is simulated.
 modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts);
 
+/// The frames that an armed tool sends.
+link::SpontaneousShape shape_of(const catalogue::EventFacts& events);
+
 /// What the user may override of a profile's link facts.
 struct LinkOptions {
   std::optional<Duration> answer_timeout = std::nullopt;
@@ -30,6 +33,9 @@ struct LinkOptions {
   link::Trace trace = {};
   std::string shown = {};  ///< how errors name the tool; empty: by its endpoint's text
   link::SessionOptions::Past past = link::SessionOptions::Past::clean;
+  /// Of a product that is not known: what it may send unasked. Nothing is asked whose answer could
+  /// look like that.
+  std::vector<link::SpontaneousShape> unasked = {};
 };
 
 /// One parameter as read. `registers` and `value` hold the same error when it could not be.
@@ -258,6 +264,7 @@ class Device {
   const catalogue::Profile* profile_;
   std::unique_ptr<link::Session> session_;
   unsigned retries_;
+  link::ReadLimits limits_;
   link::Client client_;
   Clock* calm_ = nullptr;  ///< empty: the session's
   bool registers_known_ = false;

@@ -20,11 +20,18 @@ struct RegisterRange {
   friend auto operator<=>(const RegisterRange&, const RegisterRange&) = default;
 };
 
+/// Which registers may be read along for no other reason than to prove an answer.
+enum class Neighbours : std::uint8_t {
+  contiguous,  ///< those of contiguous areas
+  anywhere,
+};
+
 /// What a server allows, from the profile.
 struct ReadLimits {
   std::uint16_t max_read = modbus::max_read_count;
   /// Areas in which registers that nobody asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
+  Neighbours neighbours = Neighbours::contiguous;
   /// Areas that are said not to exist. What is wanted there is asked for register by register, so
   /// that no other answer is spoilt and a wrong saying loses nothing.
   std::vector<RegisterRange> absent = {};
@@ -47,8 +54,8 @@ std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
                                     const ReadLimits& limits,
                                     const std::set<std::uint32_t>& absent = {});
 
-/// Reads of up to three more registers, all within a contiguous area, whose answers hold the range,
-/// too. Pure.
+/// Reads of up to three more registers, as far as neighbours may be read, whose answers hold the
+/// range, too. Pure.
 std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits& limits,
                                    const std::set<std::uint32_t>& absent = {});
 
@@ -74,8 +81,8 @@ class RegisterImage {
 using Progress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Reads and writes within what the server allows. Only reads are repeated, and only when no answer
-/// came, or a damaged one. On a serial line whose answers turn out to be others' while it reads, all
-/// is read again, each answer proved.
+/// came, or a damaged one. On a serial line whose answers turn out to be others' while it reads,
+/// all is read again, each answer proved.
 class Client {
  public:
   Client(Session& session, ReadLimits limits, unsigned retries);

@@ -36,7 +36,7 @@ enum class Verdict : std::uint8_t {
   spontaneous,         ///< a shape that the profile declares as sent unasked
   broken,  ///< carries the outstanding request's id (or unit and function), but is not its answer
   other_unit,  ///< TCP: would be the answer, but another unit gave it
-  stray,   ///< anything else: counted, traced, never fatal
+  stray,       ///< anything else: counted, traced, never fatal
 };
 
 /// What one received frame means while `outstanding` (null: none) waits for its answer. Pure.

@@ -17,6 +17,12 @@ enum class Parity : std::uint8_t { none, even, odd };
 /// the kernel with the port's RTS signal.
 enum class LineSwitching : std::uint8_t { adapter, kernel };
 
+/// Whether a line behind a device server may be used while another program of the user has it.
+enum class Claim : std::uint8_t {
+  alone,
+  beside,  ///< to stop a motor, which waits for no other program
+};
+
 /// Where a tool is, as the user wrote it (contract, section 2.1). What a URL leaves out is empty
 /// here and filled from the profile later.
 struct Endpoint {
@@ -33,6 +39,7 @@ struct Endpoint {
   std::optional<Duration> gap = std::nullopt;  ///< silence before a request; else the profile's
   LineSwitching switching = LineSwitching::adapter;
   LocalEcho echo = LocalEcho::automatic;
+  Claim claim = Claim::alone;
 };
 
 /// Whether the text can only be meant as a URL: it begins with "WORD:".

@@ -11,12 +11,16 @@
 
 namespace spindle::link {
 
-/// What came on a serial line that no request of ours explains.
+/// How long behind an answer a copy of it may come. Gateways and drivers were seen to repeat an
+/// answer after up to 40 ms.
+inline constexpr Duration longest_copy = std::chrono::milliseconds(100);
+
+/// What came on a serial line that no request of ours explains; each one says more than those
+/// before it.
 enum class Evidence : std::uint8_t {
   noise,     ///< bytes that are no frame
   repeated,  ///< an answer that had come before
-  frame,     ///< any other frame that answers nothing
-  query,     ///< the request of another master
+  master,    ///< the request of another master, or any other frame that answers nothing
 };
 
 /// Whether the answers on a serial line can be believed as they come. RTU answers carry neither
@@ -24,8 +28,8 @@ enum class Evidence : std::uint8_t {
 /// the answer to the request that is out. Pure: times are given.
 class LineDoubt {
  public:
-  /// The line is doubtful from now on, until it has been quiet for a while. True for the first
-  /// evidence of its kind.
+  /// The line is doubtful from now on, until it has been quiet for a while. True where this says
+  /// more than what was found before.
   bool find(Evidence evidence, TimePoint now);
   /// The line is doubtful for good: another program has it, too.
   void stay() { lasting_ = true; }
@@ -64,7 +68,7 @@ class LineDoubt {
   TimePoint until_ = {};
   bool lasting_ = false;
   std::uint64_t disturbances_ = 0;
-  std::set<Evidence> found_ = {};
+  std::optional<Evidence> worst_ = std::nullopt;
   std::deque<Accepted> accepted_ = {};  ///< the last ones
   std::set<Shape> shapes_ = {};
 };

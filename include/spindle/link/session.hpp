@@ -37,8 +37,8 @@ struct SessionOptions {
   TimePoint in_use_until = {};
   /// RTU: whether a late answer may come that an earlier session on this line did not wait for.
   enum class Past : std::uint8_t { clean, doubtful } past = Past::clean;
-  /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is listened
-  /// to before the first read and behind the first answers.
+  /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is
+  /// listened to before the first read and behind the first answers.
   enum class Others : std::uint8_t { none, possible } others = Others::none;
   /// TCP: id of the first request, at least 8000h; tools use small ones for what they send unasked.
   std::uint16_t first_transaction = 0x8000;
@@ -93,11 +93,14 @@ class Session {
   /// at once. Unit 0 is `usage`: broadcast() is for that.
   ///
   /// `others` are what may be asked to prove the answer to a read on a doubtful line.
-  Result<modbus::Pdu> transact(const modbus::Pdu& request, const std::vector<OtherRead>& others = {});
+  Result<modbus::Pdu> transact(const modbus::Pdu& request,
+                               const std::vector<OtherRead>& others = {});
 
   /// RTU: what was known of the line at some time.
   struct Mark {
+    std::uint64_t requests = 0;
     std::uint64_t disturbances = 0;
+    std::uint64_t noises = 0;
     bool proves = false;  ///< each answer is proved from then on
   };
   [[nodiscard]] Mark mark() const;
@@ -158,11 +161,12 @@ class Session {
   Result<void> let_copies_pass(const modbus::Pdu& write);
   Result<std::optional<modbus::Pdu>> prove(const modbus::Pdu& request, const modbus::Pdu& answer,
                                            const Others& others);
-  Result<std::optional<modbus::Pdu>> prove_by_other(const modbus::Pdu& answer,
+  Result<std::optional<modbus::Pdu>> prove_by_other(const modbus::Pdu& request,
+                                                    const modbus::Pdu& answer,
                                                     const OtherRead& other);
-  Result<bool> prove_by_loopback(std::uint64_t mark);
-  Result<bool> prove_by_repetition(const modbus::Pdu& request, const modbus::Pdu& answer,
-                                   std::uint64_t mark);
+  Result<std::optional<modbus::Pdu>> prove_by_loopback(const modbus::Pdu& answer);
+  Result<modbus::Pdu> exchange_contested(const modbus::Pdu& request, const modbus::Pdu& accepted);
+  void note_refutation(const modbus::Adu& stray);
   [[nodiscard]] const OtherRead* own_shape_of(const Others& others) const;
   [[nodiscard]] bool has_loopback() const {
     return options_.proof == SessionOptions::Proof::loopback;
@@ -173,6 +177,7 @@ class Session {
   void judge_noise(ByteView bytes);
   void doubt_because_of(const modbus::Adu& stray);
   [[nodiscard]] bool may_be_late() const;
+  [[nodiscard]] Duration time_to_listen() const;
   bool take_late(const modbus::Adu& stray);
   void doubt_answers(TimePoint since);
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
@@ -225,8 +230,16 @@ class Session {
   Bytes sent_ = {};  ///< the last request as it was sent
   /// RTU: until when a late answer to another session of this program may come.
   TimePoint others_late_until_ = {};
+  TimePoint past_until_ = {};  ///< RTU: the same to an earlier session for this unit
   LineDoubt doubt_ = {};
-  std::uint64_t noises_ = 0;  ///< how often unexpected bytes came
+  std::uint64_t noises_ = 0;   ///< how often unexpected bytes came
+  std::uint64_t queries_ = 0;  ///< of other masters that were heard
+  /// RTU: whether all answers of the line come here. On a bus the request of another master is
+  /// heard in front of its answer; where it is not, others may read the same port.
+  enum class Order : std::uint8_t { kept, unknown } order_ = Order::kept;
+  std::vector<modbus::Pdu> contested_ = {};  ///< requests whose other answers would refute
+  modbus::Pdu accepted_ = {};                ///< what would be refuted
+  std::uint64_t refutations_ = 0;
   enum class Heard : std::uint8_t { nothing, line } heard_ = Heard::nothing;
   Duration longest_round_trip_ = {};
   bool out_of_step_ = false;

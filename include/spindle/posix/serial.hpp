@@ -14,6 +14,7 @@ namespace spindle::posix {
 /// are read back: what the port does not do is an error, never another rate in silence. send()
 /// returns when the last byte has left. Errors: `port_missing`; `port_busy`, with the holder where
 /// the system tells; `port_unusable` (no permission, no terminal, a setting that the port lacks).
+/// Another program that has the port open without a lock is the transport's company().
 /// When an adapter is pulled out, sending and receiving fail with `reset`.
 Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
                                                      const link::SerialSettings& settings,

@@ -9,13 +9,21 @@
 
 namespace spindle::posix {
 
+/// What is behind a TCP port.
+enum class Behind : std::uint8_t {
+  tool,       ///< which serves each connection by itself
+  line,       ///< a serial line, which is locked among the programs of one user
+  busy_line,  ///< the same, but used also where another program has the lock: to stop a motor
+};
+
 /// Connects to HOST:PORT within `connect_timeout`, name resolution included, trying all addresses
 /// of the name in turn. TCP_NODELAY, keep-alive and user timeout are set. Errors, each told apart:
 /// `name_not_found`, `connection_refused`, `no_route`, `connect_timeout`, `interrupted`,
-/// `terminated`. The message names the address tried where that helps. An interrupt ends any wait
-/// at once, name resolution too.
+/// `terminated`; `port_busy` where another spindle uses the line. The message names the address
+/// tried where that helps. An interrupt ends any wait at once, name resolution too.
 Result<std::unique_ptr<link::Transport>> open_tcp(const std::string& host, std::uint16_t port,
                                                   Duration connect_timeout, Clock& clock,
-                                                  const Interrupt& interrupt);
+                                                  const Interrupt& interrupt,
+                                                  Behind behind = Behind::tool);
 
 }  // namespace spindle::posix
