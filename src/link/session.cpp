@@ -227,8 +227,7 @@ Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Oth
     auto answer = exchange(request);
     if (!answer) return answer;
     const TimePoint now = clock_->now();
-    const bool may_be_copy = options_.others == SessionOptions::Others::possible &&
-                             doubt_.may_be_copy(request, *answer, now);
+    const bool may_be_copy = expects_others() && doubt_.may_be_copy(request, *answer, now);
     const bool beside =
         doubt_.disturbances() != disturbances || noises_ != noises || !buffer_.empty();
     std::optional<modbus::Pdu> believed = *answer;
@@ -360,7 +359,7 @@ Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
 
 /// A line that others may have in use is listened to once, before the first read.
 Result<void> Session::listen_first() {
-  if (heard_ == Heard::line || options_.others == SessionOptions::Others::none) return {};
+  if (heard_ == Heard::line || !expects_others()) return {};
   heard_ = Heard::line;
   return wait_for_silence(std::max(clock_->now(), last_activity_ + options_.gap) + first_listening);
 }
@@ -380,8 +379,8 @@ Result<bool> Session::is_undisturbed_since(const Mark& mark) {
   if (mark.proves || mark.requests == counters_.requests) return true;
   const TimePoint now = clock_->now();
   const bool is_new = now < created_ + newness;
-  const bool listens = is_rtu() && options_.others == SessionOptions::Others::possible && is_new &&
-                       proves_ == Proves::in_doubt && !doubt_.is_raised(now);
+  const bool listens = is_rtu() && expects_others() && is_new && proves_ == Proves::in_doubt &&
+                       !doubt_.is_raised(now);
   if (listens) {
     const Turn turn(*this);
     if (auto silent = wait_for_silence(now + time_to_listen()); !silent) {

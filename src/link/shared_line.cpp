@@ -39,6 +39,10 @@ class SharedLine::Share : public Transport {
     const std::lock_guard lock(line_->mutex_);
     return line_->transport_ ? line_->transport_->company() : std::string();
   }
+  [[nodiscard]] bool is_private() const override {
+    const std::lock_guard lock(line_->mutex_);
+    return line_->transport_ && line_->transport_->is_private();
+  }
 
   Result<void> send(ByteView bytes, TimePoint deadline) override {
     return transport().and_then(

@@ -27,6 +27,7 @@ class SimTransport final : public link::Transport {
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
+  [[nodiscard]] bool is_private() const override { return true; }
   void shield() override { shielding_ = Shielding::on; }
 
  private:
@@ -117,6 +118,7 @@ class OwningSimTransport final : public link::Transport {
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
     return transport_.receive(into, deadline);
   }
+  [[nodiscard]] bool is_private() const override { return true; }
   void shield() override { transport_.shield(); }
 
  private:

@@ -1,10 +1,12 @@
 #include "spindle/device/device.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -466,6 +468,91 @@ TEST_CASE("the whole last event is read without a frame that looks like a pushed
   CHECK((*event)->front() == 1961);
   CHECK((*event)->back() == 402);
   for (const Pdu& request : bench.requests) CHECK(get_u16(request.data, 2) != 14);
+}
+
+// ---- what a connection believes ----
+
+namespace {
+
+/// A device of holding and input registers in which N has the value N, on any profile.
+struct Opened {
+  explicit Opened(const Profile& profile, const LinkOptions& options = {}) {
+    script.otherwise = [](ByteView request) {
+      const Pdu pdu = test::request_of(modbus::Framing::tcp, request).pdu;
+      const auto parsed = modbus::parse_request(pdu).value();
+      const auto& read = std::get<modbus::ReadRequest>(parsed);
+      Registers registers;
+      for (std::uint16_t at = 0; at < read.count; ++at) {
+        registers.push_back(static_cast<std::uint16_t>(read.first.value + at));
+      }
+      return std::vector<test::Arrival>{
+          {Duration(1ms), test::response_to(modbus::Framing::tcp, request,
+                                            modbus::read_response(read.table, registers))}};
+    };
+    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
+      return Result<std::unique_ptr<link::Transport>>(transport_to(script));
+    };
+    device = Device::open(link::parse_endpoint("tcp://192.168.10.23").value(), profile, options,
+                          open, clock);
+    REQUIRE(device.has_value());
+  }
+
+  test::FakeClock clock;
+  test::Script script{clock};
+  Result<Device> device = tl::unexpected(Error());
+};
+
+Parameter input_register(std::uint16_t address) {
+  Parameter parameter;
+  parameter.name = fmt::format("@input:{}", address);
+  parameter.table = modbus::RegisterTable::input;
+  parameter.address = {address};
+  return parameter;
+}
+
+}  // namespace
+
+TEST_CASE("without a profile nothing is asked whose answer could be a frame that is sent unasked") {
+  std::vector<Parameter> block;
+  for (std::uint16_t at = 3300; at < 3314; ++at) block.push_back(input_register(at));
+  const auto requests_for = [&](const LinkOptions& options) {
+    Opened opened(Profile(), options);
+    const auto readings = opened.device->read_each(block, Limits::skip);
+    REQUIRE(readings.has_value());
+    for (const Reading& reading : *readings) {
+      CHECK(reading.registers == Registers{reading.parameter.address.value});
+    }
+    std::vector<std::uint16_t> counts;
+    for (const test::Sent& sent : opened.script.sent) counts.push_back(get_u16(sent.bytes, 10));
+    return counts;
+  };
+  CHECK(requests_for({}) == std::vector<std::uint16_t>{14});
+  CHECK(requests_for({.unasked = {shape_of(*bm().events)}}) == std::vector<std::uint16_t>{13, 1});
+}
+
+TEST_CASE("the first id of a connection is not known before, and never small") {
+  std::set<std::uint16_t> ids;
+  for (const Duration later : {Duration(0), Duration(1), Duration(4711), Duration(1s + 17ns)}) {
+    test::FakeClock clock;
+    clock.advance(later);
+    test::Script script(clock);
+    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
+      return Result<std::unique_ptr<link::Transport>>(transport_to(script));
+    };
+    auto device =
+        Device::open(link::parse_endpoint("tcp://192.168.10.23").value(), bm(), {}, open, clock);
+    ids.insert(device->session().options().first_transaction);
+  }
+  CHECK(ids.size() == 4);
+  CHECK(*ids.begin() >= 0x8000);
+}
+
+TEST_CASE("whose answers are taken is the profile's") {
+  Profile known;
+  known.id = "known";
+  CHECK(Opened(Profile()).device->session().options().rules.units == link::Units::identified);
+  CHECK(Opened(known).device->session().options().rules.units == link::Units::asked);
+  CHECK(Opened(bm()).device->session().options().rules.units == link::Units::any);
 }
 
 // ---- serial lines ----

@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <netdb.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -254,6 +255,33 @@ TEST_CASE("open: bytes go both ways over an address and over a name") {
     REQUIRE(size.has_value());
     CHECK(*size == 2);
   }
+}
+
+TEST_CASE("open: the line behind a device server is used by one at a time") {
+  World world;
+  test::Acceptor acceptor;
+  const auto open = [&](posix::Behind behind) {
+    return posix::open_tcp("127.0.0.1", acceptor.port(), patience, world.clock, world.waking.get(),
+                           behind);
+  };
+  auto first = open(posix::Behind::line);
+  REQUIRE(first.has_value());
+  CHECK((*first)->company().empty());
+
+  const auto second = open(posix::Behind::line);
+  REQUIRE_FALSE(second);
+  CHECK(second.error().code == Errc::port_busy);
+  CHECK(message_of(second.error()) ==
+        fmt::format("the serial line behind 127.0.0.1 port {} is in use by this program itself",
+                    acceptor.port()));
+  CHECK(open(posix::Behind::tool).has_value());  // no line: each connection is its own
+
+  const auto beside = open(posix::Behind::busy_line);  // to stop a motor
+  REQUIRE(beside.has_value());
+  CHECK((*beside)->company() == "this program itself");
+
+  first->reset();
+  CHECK(open(posix::Behind::line).has_value());
 }
 
 TEST_CASE("open: IPv6") {

@@ -177,6 +177,9 @@ class Session {
   void judge_noise(ByteView bytes);
   void doubt_because_of(const modbus::Adu& stray);
   [[nodiscard]] bool may_be_late() const;
+  [[nodiscard]] bool expects_others() const {
+    return options_.others == SessionOptions::Others::possible && !transport_->is_private();
+  }
   [[nodiscard]] Duration time_to_listen() const;
   bool take_late(const modbus::Adu& stray);
   void doubt_answers(TimePoint since);

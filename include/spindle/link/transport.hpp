@@ -45,6 +45,9 @@ class Transport {
   /// Another program that has the line open, as far as the system tells: "minicom (process 4711)";
   /// empty when there is none.
   [[nodiscard]] virtual std::string company() const { return {}; }
+
+  /// Whether nothing but this program can be on the line.
+  [[nodiscard]] virtual bool is_private() const { return false; }
 };
 
 }  // namespace spindle::link
