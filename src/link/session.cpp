@@ -237,6 +237,8 @@ Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Oth
       if (!proved) return tl::unexpected(std::move(proved.error()));
       last_round_trip_ = round_trip;
       believed = std::move(*proved);
+    } else {
+      ++unproved_;
     }
     if (believed) return std::move(*believed);
   }
@@ -370,8 +372,7 @@ Duration Session::time_to_listen() const {
 
 Session::Mark Session::mark() const {
   return {.requests = counters_.requests,
-          .disturbances = doubt_.disturbances(),
-          .noises = noises_,
+          .unproved = unproved_,
           .proves = doubt_.is_raised(clock_->now())};
 }
 
@@ -387,7 +388,7 @@ Result<bool> Session::is_undisturbed_since(const Mark& mark) {
       return tl::unexpected(std::move(silent.error()));
     }
   }
-  return doubt_.disturbances() == mark.disturbances && noises_ == mark.noises;
+  return doubted_ <= mark.unproved;
 }
 
 /// Whether a late answer of our own, or of another session of this program, may still come.
@@ -413,6 +414,7 @@ bool Session::take_late(const modbus::Adu& stray) {
 
 void Session::find(Evidence evidence, std::string_view what) {
   if (evidence == Evidence::noise) ++noises_;
+  doubted_ = unproved_;
   decide(Decision::doubt, what);
   if (doubt_.find(evidence, clock_->now()) && trace_.notice) trace_.notice(sentence_of(evidence));
 }

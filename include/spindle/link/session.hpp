@@ -99,9 +99,8 @@ class Session {
   /// RTU: what was known of the line at some time.
   struct Mark {
     std::uint64_t requests = 0;
-    std::uint64_t disturbances = 0;
-    std::uint64_t noises = 0;
-    bool proves = false;  ///< each answer is proved from then on
+    std::uint64_t unproved = 0;  ///< answers that were believed as they came
+    bool proves = false;         ///< each answer is proved from then on
   };
   [[nodiscard]] Mark mark() const;
   /// RTU: whether all answers since `mark` can be believed. On a new line it waits as long as an
@@ -235,8 +234,10 @@ class Session {
   TimePoint others_late_until_ = {};
   TimePoint past_until_ = {};  ///< RTU: the same to an earlier session for this unit
   LineDoubt doubt_ = {};
-  std::uint64_t noises_ = 0;   ///< how often unexpected bytes came
-  std::uint64_t queries_ = 0;  ///< of other masters that were heard
+  std::uint64_t unproved_ = 0;  ///< answers that were believed as they came
+  std::uint64_t doubted_ = 0;   ///< how many of them were when something unexpected came last
+  std::uint64_t noises_ = 0;    ///< how often unexpected bytes came
+  std::uint64_t queries_ = 0;   ///< of other masters that were heard
   /// RTU: whether all answers of the line come here. On a bus the request of another master is
   /// heard in front of its answer; where it is not, others may read the same port.
   enum class Order : std::uint8_t { kept, unknown } order_ = Order::kept;
