@@ -38,11 +38,14 @@ class GroupTest(unittest.TestCase):
         return str(finished.records("value")[0]["value"])
 
     def changed(self):
-        """What was recorded: (target, name, result)."""
+        """What became of what was begun: (target, name, result)."""
         if not self.changes.exists():
             return []
         records = [support.parse_json(line) for line in self.changes.read_text("utf-8").splitlines()]
-        return [(r["target"], r["name"], r["result"]) for r in records]
+        begun = sorted((r["target"], r["name"], r["id"]) for r in records if r["result"] == "begun")
+        ended = [r for r in records if r["result"] != "begun"]
+        self.assertEqual(begun, sorted((r["target"], r["name"], r["id"]) for r in ended))
+        return [(r["target"], r["name"], r["result"]) for r in ended]
 
     def enter_simulators(self, *profiles):
         return [self.enterContext(support.simulator(profile)) for profile in profiles]
@@ -215,7 +218,10 @@ class InterruptionTest(GroupTest):
             finished = running.finish()
         self.assertEqual(finished.status, 130, finished)
         written = [(r["target"], r["name"], r["result"]) for r in finished.records("write")]
-        self.assertEqual(written, [("one", TORQUE, "written"), ("one", "preset.2.speed", "written")])
+        self.assertEqual(
+            written,
+            [("one", TORQUE, "written"), ("one", "preset.2.speed", "written"), ("silent", TORQUE, "unknown")],
+        )
         errors = {r["target"]: r for r in finished.records("error")}
         self.assertEqual(sorted(errors), ["last", "silent"])
         self.assertEqual(errors["silent"]["name"], TORQUE)

@@ -164,7 +164,11 @@ class FaultTest(BackupTest):
         self.server.arm(0, None)
         self.assertEqual(self.restore(self.server.url, self.path_of_backup).status, 0)
         lines = (self.state / "changes.jsonl").read_text(encoding="utf-8").splitlines()
-        changes = [support.parse_json(line) for line in lines]
+        records = [support.parse_json(line) for line in lines]
+        begun, changes = records[::2], records[1::2]
+        self.assertEqual({c["result"] for c in begun}, {"begun"})
+        self.assertEqual([c["id"] for c in begun], [c["id"] for c in changes])
+        self.assertEqual({c["result"] for c in changes}, {"written"})
         self.assertEqual([c["name"] for c in changes], [f"p{n}" for n in PLAN])
         self.assertEqual({c["command"] for c in changes}, {"restore"})
         self.assertEqual([c["new"] for c in changes], self.wanted)
