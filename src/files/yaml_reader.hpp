@@ -19,7 +19,7 @@ struct Position {
   friend auto operator<=>(const Position&, const Position&) = default;
 };
 
-/// Faults of several files, collected instead of stopping at the first.
+/// Faults of several files, collected instead of stopping at the first. Keeps the first thousand.
 class Findings {
  public:
   /// The number by which positions name this file.
@@ -73,8 +73,9 @@ enum class Documents : std::uint8_t { first, all };
 Result<std::string> read_text_file(const std::string& path);
 
 /// The documents of a YAML text. Strict: aliases, anchors, tags, duplicate keys, keys that are no
-/// plain text, deep nesting, NUL and invalid UTF-8 are findings. After a syntax error the documents
-/// before it are returned; empty ones at the end are dropped.
+/// plain text, NUL and invalid UTF-8 are findings. After a syntax error the documents before it are
+/// returned; empty ones at the end are dropped. Time and memory are bounded whatever the text is:
+/// one that is too large, nested too deep or has too many values is a finding and is not read on.
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
                                  Findings& findings);
 
