@@ -128,22 +128,31 @@ Result<Chain> read_chain(const std::string& path, Documents documents,
   return chain;
 }
 
-Profile build(const Chain& chain, Findings& findings) {
+/// How much is asked of a profile: what it needs to be used, or to be called good.
+enum class Strictness : std::uint8_t { load, check };
+
+ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings) {
   ProfileDraft draft;
+  const std::string& missing_base = chain.back()->head.extends;
+  draft.incomplete = !missing_base.empty();
   draft.profile.path = chain.front()->path;
+  for (const Layer* layer : chain) {
+    if (!layer->head.extends.empty()) draft.profile.bases.push_back(layer->head.extends);
+  }
   for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
     if ((*layer)->documents.empty()) continue;
     read_profile((*layer)->documents.front(), draft, findings);
   }
-  const bool complete = findings.empty();
-  const bool concrete = !chain.front()->head.abstract;
-  if (complete && concrete && draft.link.entry == nullptr) {
+  if (draft.top.entry == nullptr) return draft;  // not a document could be read
+  const bool whole = !draft.incomplete && !chain.front()->head.abstract;
+  if (whole && draft.link.entry == nullptr) {
     findings.add(draft.top.entry->at, "key 'link' is missing");
   }
-  // Rules speak of a profile whose every entry could be read; on half-read ones they would add
-  // findings that are none.
-  if (complete) check_rules(draft, findings);
-  return std::move(draft.profile);
+  // On what is half read, rules would find faults that are none.
+  draft.leave_out_half_read();
+  check_rules(draft, findings);
+  if (strictness == Strictness::check) check_guards(draft, findings);
+  return draft;
 }
 
 catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
@@ -253,7 +262,7 @@ Result<OpenChain> open_chain(std::string_view name_or_file, Documents documents,
 Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
   auto open = open_chain(name_or_file, Documents::first, folders_);
   if (!open) return tl::unexpected(std::move(open.error()));
-  Profile profile = build(open->chain, open->findings);
+  Profile profile = build(open->chain, Strictness::load, open->findings).profile;
   if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
   if (open->chain.front()->head.abstract) {
     return tl::unexpected(Error{.code = Errc::bad_file,
@@ -297,11 +306,13 @@ Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view na
 Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
   auto open = open_chain(name_or_file, Documents::all, folders_);
   if (!open) return tl::unexpected(std::move(open.error()));
-  const Profile profile = build(open->chain, open->findings);
+  const ProfileDraft draft = build(open->chain, Strictness::check, open->findings);
   collect_texts(open->chain, open->findings);
   if (const YamlNode* part = nearest_simulation(open->chain, open->findings)) {
     read_simulation(*part, open->findings);
-    check_simulation(profile, *part, open->findings);
+    // Its patterns may mean what could not be read.
+    const bool known = !draft.incomplete && draft.half_read.empty();
+    if (known) check_simulation(draft.profile, *part, open->findings);
   }
   return open->findings.list();
 }
@@ -315,7 +326,7 @@ std::vector<Profile> ProfileStore::load_all() const {
     Findings findings;
     const auto chain = read_chain(path, Documents::first, folders_, library, findings);
     if (!chain || chain->front()->head.abstract) continue;
-    Profile profile = build(*chain, findings);
+    Profile profile = build(*chain, Strictness::load, findings).profile;
     if (findings.empty()) profiles.push_back(std::move(profile));
   }
   return profiles;

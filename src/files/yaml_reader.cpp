@@ -51,7 +51,8 @@ class Places {
   [[nodiscard]] char here() const { return byte_ < text_.size() ? text_[byte_] : '\0'; }
   /// Whether only blanks stand in front of it in its line.
   [[nodiscard]] bool begins_line() const {
-    const std::string_view line = text_.substr(0, byte_).substr(byte_ + 1 - static_cast<std::size_t>(at_.column));
+    const std::string_view line =
+        text_.substr(0, byte_).substr(byte_ + 1 - static_cast<std::size_t>(at_.column));
     return line.find_first_not_of(" \t") == std::string_view::npos;
   }
 
@@ -82,8 +83,8 @@ class Parser {
     sound_ = yaml_parser_initialize(&parser_) != 0;
     if (!sound_) return;
     yaml_parser_set_encoding(&parser_, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(
-        &parser_, reinterpret_cast<const unsigned char*>(text.data()), text.size());
+    yaml_parser_set_input_string(&parser_, reinterpret_cast<const unsigned char*>(text.data()),
+                                 text.size());
   }
   ~Parser() {
     forget();
@@ -183,8 +184,8 @@ class TreeBuilder {
       return false;
     }
     if (values_ > most_values) {
-      findings_.add(at, fmt::format("more than {} values; this is no file of spindle's",
-                                    most_values));
+      findings_.add(at,
+                    fmt::format("more than {} values; this is no file of spindle's", most_values));
       return false;
     }
     return true;
@@ -284,10 +285,12 @@ std::string_view cause_of(std::string_view complaint, const Places& places) {
       Cause{"found unknown escape character", "an unknown escape behind '\\' in a quoted text"},
       Cause{"found invalid Unicode character escape code", "an escape that is no character"},
       Cause{"did not find expected hexdecimal number", "an escape without its digits"},
-      Cause{"mapping values are not allowed", "a ':' where no key is; quote texts that contain ': '"},
+      Cause{"mapping values are not allowed",
+            "a ':' where no key is; quote texts that contain ': '"},
       Cause{"mapping keys are not allowed", "a '?' where no key is"},
       Cause{"block sequence entries are not allowed", "a '-' where no list is"},
-      Cause{"could not find expected ':'", "a line that is neither 'key: value' nor part of a text"},
+      Cause{"could not find expected ':'",
+            "a line that is neither 'key: value' nor part of a text"},
       Cause{"found a tab character", "a tab in the indentation; use spaces"},
       Cause{"control characters are not allowed", "a character that YAML does not allow"},
       Cause{"found incompatible YAML document", "another version of YAML than 1.1 and 1.2"},
@@ -319,8 +322,7 @@ void add_complaint(const Parser& parser, std::size_t file, Places& places, Findi
   }
   const Position at = state.error == YAML_READER_ERROR ? places.find_byte(state.problem_offset)
                                                        : places.find(state.problem_mark.index);
-  findings.add(at,
-               fmt::format("not valid YAML here: {}", cause_of(state.problem, places)));
+  findings.add(at, fmt::format("not valid YAML here: {}", cause_of(state.problem, places)));
 }
 
 void parse_documents(std::string_view text, std::size_t file, Documents wanted, Findings& findings,
@@ -403,6 +405,7 @@ std::size_t Findings::add_file(std::string path) {
 }
 
 void Findings::add(const Position& at, std::string message) {
+  ++told_;
   if (entries_.size() == most_findings) return;
   auto place = std::lower_bound(
       entries_.begin(), entries_.end(), at,
@@ -417,6 +420,7 @@ void Findings::add_once(const Position& at, std::string message) {
   const auto place = std::lower_bound(
       entries_.begin(), entries_.end(), at,
       [](const Entry& entry, const Position& position) { return entry.at < position; });
+  ++told_;
   if (place == entries_.end() || place->at != at) add(at, std::move(message));
 }
 

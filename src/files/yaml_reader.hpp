@@ -31,6 +31,8 @@ class Findings {
   void add_once(const Position& at, std::string message);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
+  /// How often something was told so far: grows with every fault, also with one told before.
+  [[nodiscard]] std::size_t told() const { return told_; }
   /// Sorted by place.
   [[nodiscard]] std::vector<Finding> list() const;
   /// The first finding as `bad_file`, and how many there are. Requires at least one.
@@ -43,6 +45,7 @@ class Findings {
   };
   std::vector<std::string> files_;
   std::vector<Entry> entries_;  ///< sorted by place
+  std::size_t told_ = 0;
 };
 
 struct YamlEntry;

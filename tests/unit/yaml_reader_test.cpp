@@ -174,9 +174,10 @@ TEST_CASE("no text takes more than a bounded tree") {
   };
   constexpr std::size_t most = std::size_t{1} << 20;
   for (const std::string_view part :
-       {"[", "{", "- ", "? ", "[a,", "{a: ", "a,", "- a\n", "[]\n", "---\n", "&a ", "!a ", "*a ", "\"",
-        "'", "|\n", ">\n", "a: b\n", "%a\n", "%TAG !a! b\n", "\n", " ", "\t", "#", ": ", "\xC2\x85",
-        "\xE2\x80\xA8", "\xEF\xBB\xBF", "a\n\n", "[a]: ", "\"\\\n"}) {
+       {"[",    "{",        "- ",           "? ",           "[a,",   "{a: ",  "a,",    "- a\n",
+        "[]\n", "---\n",    "&a ",          "!a ",          "*a ",   "\"",    "'",     "|\n",
+        ">\n",  "a: b\n",   "%a\n",         "%TAG !a! b\n", "\n",    " ",     "\t",    "#",
+        ": ",   "\xC2\x85", "\xE2\x80\xA8", "\xEF\xBB\xBF", "a\n\n", "[a]: ", "\"\\\n"}) {
     CAPTURE(part);
     const Parsed parsed = parse(repeated(part, most));
     CHECK(parsed.findings.size() <= 1000);
