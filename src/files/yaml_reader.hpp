@@ -7,6 +7,7 @@
 
 #include "spindle/base/error.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/files/read_text.hpp"
 
 namespace spindle::files {
 
@@ -71,9 +72,6 @@ struct YamlEntry {
 
 /// Which documents of a file are wanted; the rest is not even scanned.
 enum class Documents : std::uint8_t { first, all };
-
-/// Reads a whole file. Error `bad_file` when it cannot be read or is larger than any file of ours.
-Result<std::string> read_text_file(const std::string& path);
 
 /// The documents of a YAML text. Strict: aliases, anchors, tags, duplicate keys, keys that are no
 /// plain text, NUL and invalid UTF-8 are findings. After a syntax error the documents before it are
