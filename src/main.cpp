@@ -22,7 +22,7 @@ int main(int count, char** arguments) {
       .serve = tool_server(clock, signals.interrupt()),
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,
-      .disk = local_disk(),
+      .disk = local_disk(environment("SPINDLE_TRUST").value_or("")),
       .installation = installation()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
 }

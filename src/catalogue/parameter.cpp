@@ -55,6 +55,24 @@ Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) 
   return parameter;
 }
 
+std::string_view to_text(Hazard hazard) {
+  switch (hazard) {
+    case Hazard::none:
+      return "none";
+    case Hazard::moves:
+      return "moves";
+    case Hazard::locks:
+      return "locks";
+    case Hazard::unclear:
+      return "unclear";
+    case Hazard::erases:
+      return "erases";
+    case Hazard::link:
+      return "link";
+  }
+  return "";
+}
+
 std::string_view to_text(Effect effect) {
   return effect_texts.at(static_cast<std::size_t>(effect));
 }

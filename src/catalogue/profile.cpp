@@ -275,6 +275,42 @@ std::optional<Profile::LimitRegisters> Profile::limit_registers(const Parameter&
   return LimitRegisters{mirror(limits->minimum_offset), mirror(limits->maximum_offset)};
 }
 
+Judgement judge(const Profile& profile, const Identity& identity) {
+  switch (generation_of(*profile.identity, identity)) {
+    case Generation::unknown:
+      return Judgement::unknown;
+    case Generation::later:
+      return Judgement::later;
+    case Generation::known:
+      break;
+  }
+  const std::string& product = identity.product_profile;
+  const auto is = [&](const std::string& id) {
+    return profile.id == id ||
+           std::find(profile.bases.begin(), profile.bases.end(), id) != profile.bases.end();
+  };
+  const auto& products = profile.identity->products;
+  const bool is_another = std::any_of(products.begin(), products.end(),
+                                      [&](const auto& entry) { return is(entry.second); });
+  return product.empty() || is(product) || !is_another ? Judgement::fits : Judgement::other_product;
+}
+
+std::string misfit(const Profile& profile, const Identity& identity) {
+  switch (judge(profile, identity)) {
+    case Judgement::later:
+      return fmt::format("firmware {} has another register map than {} (below {})",
+                         identity.firmware.value_or(0), profile.id,
+                         profile.identity->firmware_below);
+    case Judgement::other_product:
+      return fmt::format("the serial number is that of a {}, not of a {}", identity.product_profile,
+                         profile.id);
+    case Judgement::unknown:
+    case Judgement::fits:
+      break;
+  }
+  return "this is not the identity of any known product";
+}
+
 std::optional<Result<Parameter>> parse_raw_register(std::string_view text) {
   if (!text.starts_with('@')) return std::nullopt;
   return parse_raw(text);

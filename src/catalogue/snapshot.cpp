@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/danger.hpp"
 
 namespace spindle::catalogue {
 namespace {
@@ -59,6 +60,8 @@ std::vector<Parameter> numbered_space(const Profile& profile) {
     Parameter parameter = profile.numbered_parameter(static_cast<std::uint16_t>(number));
     if (claims.take(parameter)) space.push_back(std::move(parameter));
   }
+  const Dangers dangers(profile);
+  std::erase_if(space, [&](const Parameter& one) { return dangers.find(one).has_value(); });
   std::stable_sort(space.begin(), space.end(), [](const Parameter& a, const Parameter& b) {
     return std::pair(a.table, a.address.value) < std::pair(b.table, b.address.value);
   });
@@ -121,6 +124,14 @@ Result<std::vector<std::string>> understand(const std::vector<std::string>& patt
     const auto same = std::find_if(stored.begin(), stored.end(), [&](const Parameter& parameter) {
       return parameter.table == meant->front().table && parameter.address == meant->front().address;
     });
+    if (meant->size() == 1 && same == stored.end()) {
+      if (const auto danger = danger_of(meant->front(), profile)) {
+        return tl::unexpected(Error{.code = Errc::usage,
+                                    .message = danger->effect() + ", so no backup holds it",
+                                    .hint = danger->remedy(),
+                                    .name = pattern});
+      }
+    }
     if (meant->size() != 1 || same == stored.end()) {
       return tl::unexpected(Error{.code = Errc::unknown_name,
                                   .message = "this is no stored parameter, so no backup holds it",
@@ -242,12 +253,11 @@ const MissingEntry* Snapshot::find_missing(std::string_view name) const {
 std::vector<Parameter> stored_parameters(const Profile& profile) {
   if (profile.numbered) return numbered_space(profile);
   Claims claims;
+  const Dangers dangers(profile);
   std::vector<Parameter> stored;
   for (const Parameter& parameter : profile.parameters) {
-    // A command word must never come out of a file: it would start a motor.
-    const bool commands = profile.run && parameter.name == profile.run->command;
     const bool is_setting = parameter.table == modbus::RegisterTable::holding &&
-                            parameter.access == Access::read_write && !commands;
+                            parameter.access == Access::read_write && !dangers.find(parameter);
     if (is_setting && claims.take(parameter)) stored.push_back(parameter);
   }
   return stored;
@@ -347,6 +357,9 @@ RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const 
   RestorePlan plan;
   const Sides sides = destination == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
   UnitFindings unit_findings;
+  for (const Parameter& parameter : backup.dangerous) {
+    if (selection.contains(parameter)) plan.skipped.push_back({parameter, Skip::dangerous});
+  }
   for (const Parameter& parameter : stored_parameters(profile)) {
     const SnapshotEntry* wanted = backup.find(parameter.name);
     if (wanted == nullptr || !selection.contains(parameter)) continue;

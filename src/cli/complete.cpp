@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/danger.hpp"
 #include "spindle/link/endpoint.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/sim/outage.hpp"
@@ -263,8 +264,10 @@ class Completer {
     const std::size_t equals = word.find('=');
     if (equals == std::string::npos) {
       std::vector<Candidate> names;
+      const catalogue::Dangers dangers(profile);
       for (const Parameter& parameter : profile.parameters) {
-        if (parameter.access == catalogue::Access::read_only) continue;
+        const bool read_only = parameter.access == catalogue::Access::read_only;
+        if (read_only || dangers.find(parameter)) continue;
         names.push_back({parameter.name + "=", parameter.title});
       }
       return offer_names(std::move(names), word);

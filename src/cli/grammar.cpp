@@ -1162,6 +1162,23 @@ std::optional<std::string> option_without_value(const CLI::App& app) {
   return std::nullopt;
 }
 
+/// Whether one of the words that may be a target can only be told from the tools file. A URL says
+/// itself where its tool is, and a stop that has one waits for no file. A command that takes no
+/// words at all is about the file.
+bool names_tools(const CLI::App& command) {
+  constexpr std::array<std::string_view, 5> targets = {"TARGET", "BUS", "A", "B", "PATTERN"};
+  bool takes_words = false;
+  for (const CLI::Option* known : command.get_options()) {
+    if (!known->get_positional()) continue;
+    takes_words = true;
+    const std::string name = known->get_name(true);
+    if (std::find(targets.begin(), targets.end(), name) == targets.end()) continue;
+    const auto& words = known->results();
+    if (std::any_of(words.begin(), words.end(), files::may_name_tools)) return true;
+  }
+  return !takes_words;
+}
+
 Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   Invocation invocation;
   const auto extra = first_extra(app);
@@ -1191,6 +1208,7 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
+  if (!names_tools(*draft.chosen)) invocation.tools_use = Invocation::ToolsFile::only_found;
   invocation.run = std::move(draft.run);
   return invocation;
 }

@@ -74,9 +74,9 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   if (path.empty()) return files::Tools();
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
-      return files::load_tools(path);
+      return files::load_tools(path, world.disk.read_trusted);
     case Invocation::ToolsFile::salvaged:
-      return files::salvage_tools(path);
+      return files::salvage_tools(path, world.disk.read_trusted);
     case Invocation::ToolsFile::only_found:
       break;
   }
@@ -111,7 +111,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                                       report::Renderer& renderer) {
   const auto tools = find_tools(world, invocation);
   if (!tools) return tl::unexpected(tools.error());
-  const files::ProfileStore profiles(profile_folders(world));
+  const files::ProfileStore profiles(profile_folders(world), world.disk.read_trusted);
   const std::string state = state_folder(world);
   commands::Context context{
       {.clock = world.clock, .interrupt = world.interrupt, .open = world.open},
@@ -145,7 +145,7 @@ int run_completion(const std::vector<std::string>& words, World& world) {
   const auto typed = parse(words);
   const auto tools = find_tools(world, typed.value_or(Invocation()));
   const files::Tools none;
-  const files::ProfileStore profiles(profile_folders(world));
+  const files::ProfileStore profiles(profile_folders(world), world.disk.read_trusted);
   const Completion completion =
       complete(words, describe_grammar(), {tools ? *tools : none, profiles});
   const auto written = world.io.out(to_text(completion));
@@ -158,7 +158,8 @@ Result<void> tell_version(const World& world, report::Format format, report::Ren
                                         library, files::profile_format);
   if (format != report::Format::json) return world.io.out(plain + "\n");
   report::Texts profiles;
-  for (const auto& entry : files::ProfileStore(profile_folders(world)).list()) {
+  for (const auto& entry :
+       files::ProfileStore(profile_folders(world), world.disk.read_trusted).list()) {
     profiles.push_back(entry.id);
   }
   return renderer.line({.type = "version",

@@ -10,6 +10,7 @@
 #include "group.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/danger.hpp"
 #include "stops.hpp"
 
 namespace spindle::commands {
@@ -83,6 +84,14 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
   const auto equals = text.find('=');
   auto action = profile.find_action(text.substr(0, equals));
   if (!action) return tl::unexpected(std::move(action.error()));
+  if (catalogue::moves_without_end(*action)) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "it starts a motion, and its profile names no 'stop' that ends it",
+              .hint = "add 'stop: VALUE' to the action; then it is started under a guard",
+              .name = action->name,
+              .register_address = action->address.value});
+  }
   const bool given = equals != std::string::npos;
   if (action->value || action->motion != catalogue::Motion::none) {
     if (!given) return Deed{*action, action->value.value_or(0), secrecy_of(*action, profile)};

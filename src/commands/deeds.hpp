@@ -20,7 +20,8 @@ struct Deed {
   catalogue::Secrecy secrecy = catalogue::Secrecy::open;  ///< of the register that it writes
 };
 
-/// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`.
+/// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`, and
+/// `usage` for an action that begins a motion without an end.
 Result<Deed> parse_deed(const std::string& text, const catalogue::Profile& profile);
 
 /// The evidence rule: what may move or lock a tool is not sent on the word of another product,

@@ -93,19 +93,30 @@ std::string state_words(OpenTool& tool) {
                      alarm, mode->front().name, modes->front().value->to_string());
 }
 
+/// One exchange that touches nothing. A device that knows only reads and writes of registers stays
+/// silent to others, so its first parameter is read.
+Result<Duration> meet_once(OpenTool& tool) {
+  auto round_trip = tool.device.ping();
+  const bool silent = !round_trip && round_trip.error().code == Errc::no_answer;
+  if (!silent || tool.profile->link.loopback || tool.profile->parameters.empty()) return round_trip;
+  const auto read = tool.device.read_each({tool.profile->parameters.front()}, device::Limits::skip);
+  if (!read) return tl::unexpected(read.error());
+  return tool.device.session().last_round_trip();
+}
+
 /// A product without an identity can only be met, not proven.
 Result<Identified> meet(OpenTool& tool, const Clock& clock) {
-  const auto round_trip = tool.device.ping();
+  const auto round_trip = meet_once(tool);
   if (!round_trip) return tl::unexpected(round_trip.error());
   Identification found;
   found.profile = tool.profile->id;
   found.candidates = {tool.profile->id};
   found.maker = tool.profile->maker;
   found.series = tool.profile->series;
-  found.identity.notes.push_back(
-      fmt::format("answers a loop-back, but a {} can not prove what it is: profile {} is what the "
-                  "user named",
-                  tool.profile->series, tool.profile->id));
+  found.identity.notes.push_back(fmt::format(
+      "{}, but {} can not prove what it is: profile {} is what the user named",
+      tool.profile->link.loopback ? "answers a loop-back" : "answers",
+      tool.profile->series.empty() ? "it" : "a " + tool.profile->series, tool.profile->id));
   if (tool.profile->run) found.identity.notes.push_back(state_words(tool));
   return Identified{identity_record(tool, found, *round_trip, clock), std::nullopt};
 }
@@ -116,7 +127,9 @@ Result<Identified> identify_one(const Target& target, const Context& context) {
   const std::string only = profile->id;
   auto tool = connect(target, std::move(*profile), context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
-  if (!tool->profile->identity && tool->profile->link.loopback) return meet(*tool, context.clock);
+  // What says nothing of an identity can not be contradicted by one.
+  const bool named = !target.profile.empty();
+  if (named && !tool->profile->identity) return meet(*tool, context.clock);
   if (target.profile.empty() && target.endpoint.medium != link::Medium::tcp) {
     return tl::unexpected(unproven(tool->target));
   }

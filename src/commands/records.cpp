@@ -146,6 +146,9 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
                  {"source", parameter.source},
                  {"note", text_or_null(parameter.note)}}};
   add_drive_fields(parameter, record);
+  if (parameter.hazard != catalogue::Hazard::none) {
+    record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});
+  }
   return record;
 }
 
@@ -166,24 +169,6 @@ std::vector<Column> parameter_columns(const std::vector<Parameter>& parameters) 
   return columns;
 }
 
-std::string_view hazard_text(catalogue::Hazard hazard) {
-  switch (hazard) {
-    case catalogue::Hazard::none:
-      return "none";
-    case catalogue::Hazard::moves:
-      return "moves";
-    case catalogue::Hazard::locks:
-      return "locks";
-    case catalogue::Hazard::unclear:
-      return "unclear";
-    case catalogue::Hazard::erases:
-      return "erases";
-    case catalogue::Hazard::link:
-      return "link";
-  }
-  return "";
-}
-
 report::Record action_record(const catalogue::Action& action, const std::string& target,
                              const Clock& clock) {
   report::Record record{.type = "action",
@@ -193,7 +178,7 @@ report::Record action_record(const catalogue::Action& action, const std::string&
                                    {"title", action.title},
                                    {"register", number(action.address.value)},
                                    {"values", values_of(action)},
-                                   {"hazard", std::string(hazard_text(action.hazard))},
+                                   {"hazard", std::string(catalogue::to_text(action.hazard))},
                                    {"evidence", std::string(catalogue::to_text(action.evidence))},
                                    {"source", action.source},
                                    {"check", text_or_null(action.check)},

@@ -21,7 +21,7 @@ Result<device::StopResult> stop_one(const Target& target, const RemoteStopOption
                                     const Context& context) {
   auto profile = load_profile(target, context);
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tool = open_tool(target, std::move(*profile), Need::named_registers, context);
+  auto tool = open_tool(target, std::move(*profile), Need::stop_word, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   if (tool->profile->run)
     return stop_motor(*tool, options.stop.value_or(catalogue::StopMode::decelerate), context);

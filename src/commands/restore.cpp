@@ -6,6 +6,7 @@
 #include "records.hpp"
 #include "restore_run.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/danger.hpp"
 #include "spindle/files/backup_file.hpp"
 #include "storing.hpp"
 
@@ -81,8 +82,17 @@ void warn_of_origin(const Snapshot& backup, const Snapshot& present,
   }
 }
 
+std::string why_skipped(const catalogue::Parameter& parameter, Skip why, const Profile& profile) {
+  if (why == Skip::absent) return "this tool has no such register";
+  const auto danger = catalogue::danger_of(parameter, profile);
+  if (!danger) return "it is not copied to another tool";
+  const std::string remedy = danger->remedy();
+  return danger->effect() + (remedy.empty() ? "" : "; ") + remedy;
+}
+
 /// What the writes themselves bring with them, and what is not written.
-void warn_of_plan(const RestoreTask& task, std::vector<std::string>& warnings) {
+void warn_of_plan(const RestoreTask& task, const Profile& profile,
+                  std::vector<std::string>& warnings) {
   if (const auto* other = find_other_unit(task); other != nullptr && task.plan.findings.empty()) {
     const auto named = [](const std::string& unit) {
       return unit.empty() ? std::string("a unit that is not known") : unit;
@@ -97,17 +107,16 @@ void warn_of_plan(const RestoreTask& task, std::vector<std::string>& warnings) {
   }
   for (const auto& [parameter, why] : task.plan.skipped) {
     if (why == Skip::read_only || why == Skip::equal) continue;
-    warnings.push_back(fmt::format("{} is skipped: {}", parameter.name,
-                                   why == Skip::absent ? "this tool has no such register"
-                                                       : "it is not copied to another tool"));
+    warnings.push_back(
+        fmt::format("{} is skipped: {}", parameter.name, why_skipped(parameter, why, profile)));
   }
 }
 
 /// What somebody should know who is about to restore.
-std::vector<std::string> warnings_for(const RestoreTask& task) {
+std::vector<std::string> warnings_for(const RestoreTask& task, const Profile& profile) {
   std::vector<std::string> warnings;
   warn_of_origin(task.backup, task.present, warnings);
-  warn_of_plan(task, warnings);
+  warn_of_plan(task, profile, warnings);
   return warnings;
 }
 
@@ -228,7 +237,7 @@ Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   OpenTool& tool = opened->tool;
   const auto task = plan(std::move(opened->prepared), tool, options, context);
   if (!task) return tl::unexpected(task.error());
-  for (const std::string& warning : warnings_for(*task)) {
+  for (const std::string& warning : warnings_for(*task, tool.device.profile())) {
     context.renderer.note("warning: " + warning);
   }
   if (!task->plan.findings.empty()) return refuse(*task, tool.target, context);

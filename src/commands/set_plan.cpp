@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/snapshot.hpp"
 
 namespace spindle::commands {
@@ -30,6 +31,20 @@ Error not_writable(const Parameter& parameter, const Profile& profile) {
   return error;
 }
 
+/// What may move or lock a tool is no setting, whatever the value and by whatever name.
+Result<void> check_danger(const Parameter& parameter, const Profile& profile) {
+  const auto danger = catalogue::danger_of(parameter, profile);
+  if (!danger) return {};
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = fmt::format(
+                "{}, and 'set' does not stay to {}", danger->effect(),
+                danger->hazard == catalogue::Hazard::moves ? "stop it" : "look after the tool"),
+            .hint = danger->remedy(),
+            .name = parameter.name,
+            .register_address = parameter.address.value});
+}
+
 Result<Assignment> parse_assignment(const std::string& text, const Profile& profile) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
@@ -41,6 +56,9 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
   if (!parameter) return tl::unexpected(std::move(parameter.error()));
   if (parameter->access == catalogue::Access::read_only) {
     return tl::unexpected(not_writable(*parameter, profile));
+  }
+  if (auto harmless = check_danger(*parameter, profile); !harmless) {
+    return tl::unexpected(std::move(harmless.error()));
   }
   if (auto fits = catalogue::check_pair(parameter->encoding.kind, profile.link); !fits) {
     fits.error().name = parameter->name;
@@ -63,26 +81,6 @@ bool overlap(const Parameter& a, const Parameter& b) {
   return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
 }
 
-/// A motor that this would start needs somebody who stays to stop it.
-Result<void> check_motion(const Assignment& assignment, const Profile& profile) {
-  if (!profile.run) return {};
-  const auto command = profile.find(profile.run->command);
-  if (!command || !overlap(*command, assignment.parameter)) return {};
-  const auto registers = catalogue::encode(assignment.parameter, assignment.value.number);
-  if (!registers) return tl::unexpected(registers.error());
-  const unsigned end = assignment.parameter.address.value + unsigned(registers->size());
-  const unsigned low_word =
-      command->address.value + catalogue::register_count(command->encoding.kind) - 1U;
-  const bool starts = end > low_word && (registers->back() & profile.run->starting) != 0;
-  if (!starts) return {};
-  return tl::unexpected(
-      Error{.code = Errc::usage,
-            .message = "it may start the motor, and 'set' does not stay to stop it",
-            .hint = "'spindle remote-start' starts it under a guard that always ends in a stop",
-            .name = assignment.parameter.name,
-            .register_address = assignment.parameter.address.value});
-}
-
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
   return value ? std::optional(value->number) : std::nullopt;
 }
@@ -97,14 +95,13 @@ Result<void> check_own_limits(const Assignment& assignment, const device::Readin
 }
 
 /// Names of bits as they count on this tool.
-Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading,
-                          const Profile& profile) {
+Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading) {
   if (assignment.parameter.bits_by.empty()) return {};
   assignment.parameter = reading.parameter;
   auto value = catalogue::parse_value(assignment.parameter, assignment.text);
   if (!value) return tl::unexpected(std::move(value.error()));
   assignment.value = std::move(*value);
-  return check_motion(assignment, profile);
+  return {};
 }
 
 }  // namespace
@@ -115,9 +112,6 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
   for (const std::string& text : texts) {
     auto assignment = parse_assignment(text, profile);
     if (!assignment) return tl::unexpected(std::move(assignment.error()));
-    if (auto calm = check_motion(*assignment, profile); !calm) {
-      return tl::unexpected(std::move(calm.error()));
-    }
     for (const Assignment& earlier : assignments) {
       if (!overlap(earlier.parameter, assignment->parameter)) continue;
       return tl::unexpected(Error{.code = Errc::usage,
@@ -142,7 +136,7 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   for (std::size_t index = 0; index < assignments.size(); ++index) {
     const device::Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(reading.value.error());
-    if (auto known = resolve_bits(assignments[index], reading, device.profile()); !known) {
+    if (auto known = resolve_bits(assignments[index], reading); !known) {
       return tl::unexpected(std::move(known.error()));
     }
     auto allowed = check_own_limits(assignments[index], reading, device.profile());

@@ -177,12 +177,13 @@ struct Match {
   catalogue::Profile profile;
   catalogue::Identity identity;
   catalogue::Generation generation;
+  bool named;  ///< by the user, rather than looked for
 
-  [[nodiscard]] bool is_product() const {
-    return identity.product_profile.empty() || identity.product_profile == profile.id;
-  }
+  /// Of profiles that nobody named, one that only extends the product's own is not meant.
   [[nodiscard]] bool fits() const {
-    return generation == catalogue::Generation::known && is_product();
+    const std::string& product = identity.product_profile;
+    return catalogue::judge(profile, identity) == catalogue::Judgement::fits &&
+           (named || product.empty() || product == profile.id);
   }
 };
 
@@ -206,7 +207,7 @@ Result<std::vector<Match>> matches_of(ByteView answer, const std::string& only,
     auto identity = catalogue::decode_identity(*profile.identity, answer);
     const auto generation = catalogue::generation_of(*profile.identity, identity);
     if (generation == catalogue::Generation::unknown) continue;
-    matches.push_back({std::move(profile), std::move(identity), generation});
+    matches.push_back({std::move(profile), std::move(identity), generation, !only.empty()});
   }
   return matches;
 }
@@ -216,17 +217,6 @@ Match* best_of(std::vector<Match>& matches) {
       std::find_if(matches.begin(), matches.end(), [](const Match& match) { return match.fits(); });
   if (fitting != matches.end()) return &*fitting;
   return matches.empty() ? nullptr : &matches.front();
-}
-
-/// Why a product of a known maker fits none of the profiles that were asked.
-std::string misfit_of(const Match& match) {
-  if (match.generation == catalogue::Generation::later) {
-    return fmt::format("firmware {} has another register map than {} (below {})",
-                       match.identity.firmware.value_or(0), match.profile.id,
-                       match.profile.identity->firmware_below);
-  }
-  return fmt::format("the serial number is that of a {}, not of a {}",
-                     match.identity.product_profile, match.profile.id);
 }
 
 }  // namespace
@@ -370,7 +360,9 @@ Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Nee
   if (!tool || need == Need::raw_registers) return tool;
   auto known = target.profile.empty() ? find_profile(*tool, context)
                                       : tool->device.require_known_registers();
-  if (!known) return tl::unexpected(std::move(known.error()));
+  // A motor must not run on because the tool is of another product than the profile says.
+  const bool stops = need == Need::stop_word && !known && known.error().code == Errc::mismatch;
+  if (!known && !stops) return tl::unexpected(std::move(known.error()));
   return tool;
 }
 
@@ -396,7 +388,7 @@ Result<Identification> match_identity(ByteView answer, const std::string& only,
   result.maker = best->profile.maker;
   result.identity = best->identity;
   if (result.candidates.empty()) {
-    result.identity.notes.push_back(misfit_of(*best));
+    result.identity.notes.push_back(catalogue::misfit(best->profile, best->identity));
   } else {
     result.matched = std::move(best->profile);
   }

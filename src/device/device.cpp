@@ -379,8 +379,8 @@ Result<void> Device::require_known_registers() {
   }
   const auto& facts = *profile_->identity;
   auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
-  const auto generation = catalogue::generation_of(facts, identity);
-  registers_known_ = generation == catalogue::Generation::known;
+  const catalogue::Judgement judgement = catalogue::judge(*profile_, identity);
+  registers_known_ = judgement == catalogue::Judgement::fits;
   identity_text_ =
       fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
   if (registers_known_) {
@@ -388,8 +388,15 @@ Result<void> Device::require_known_registers() {
     return {};
   }
   Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
+  if (judgement == catalogue::Judgement::other_product) {
+    error.code = Errc::mismatch;
+    error.message = fmt::format("this is not what profile {} describes: {}", profile_->id,
+                                catalogue::misfit(*profile_, identity));
+    error.hint = fmt::format("name its own profile: --profile {}", identity.product_profile);
+    return tl::unexpected(std::move(error));
+  }
   error.message =
-      generation == catalogue::Generation::later
+      judgement == catalogue::Judgement::later
           ? fmt::format("firmware {} has other registers than profile {} (below {})",
                         *identity.firmware, profile_->id, facts.firmware_below)
           : fmt::format(

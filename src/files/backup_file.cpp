@@ -14,6 +14,7 @@
 #include "files/yaml_reader.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
+#include "spindle/catalogue/danger.hpp"
 
 namespace spindle::files {
 namespace {
@@ -316,11 +317,21 @@ void read_document(const YamlNode& document, std::string_view text, BackupFile& 
 class Names {
  public:
   explicit Names(const Profile& profile)
-      : profile_(&profile), stored_(catalogue::stored_parameters(profile)) {
+      : profile_(&profile), dangers_(profile), stored_(catalogue::stored_parameters(profile)) {
     for (const Parameter& parameter : stored_) {
       by_name_.emplace(parameter.name, &parameter);
       by_register_.emplace(std::pair(parameter.table, parameter.address.value), &parameter);
     }
+  }
+
+  /// The parameter that a line means, where it is no setting.
+  [[nodiscard]] std::optional<Parameter> find_dangerous(const BackupLine& line) const {
+    if (by_name_.contains(line.name) || line.name.starts_with('@')) return std::nullopt;
+    auto meant = profile_->find(line.name);
+    const bool at_its_place =
+        meant && meant->address.value == line.address && meant->table == line.table;
+    if (!at_its_place || !dangers_.find(*meant)) return std::nullopt;
+    return std::move(*meant);
   }
 
   /// The stored parameter that a line means; a finding where there is none.
@@ -362,6 +373,7 @@ class Names {
   }
 
   const Profile* profile_;
+  catalogue::Dangers dangers_;
   std::vector<Parameter> stored_;
   std::map<std::string_view, const Parameter*> by_name_ = {};
   std::map<std::pair<modbus::RegisterTable, std::uint16_t>, const Parameter*> by_register_ = {};
@@ -420,6 +432,10 @@ class Understanding {
   [[nodiscard]] Position at(const Place& place) const { return {file_, place.line, place.column}; }
 
   void take(const BackupLine& line) {
+    if (const auto dangerous = names_.find_dangerous(line)) {
+      snapshot_.dangerous.push_back(*dangerous);
+      return;
+    }
     const Parameter* parameter = names_.find(line, at(line.at), findings_);
     if (parameter == nullptr) return;
     if (!seen_.insert(parameter->name).second) {

@@ -122,7 +122,7 @@ class DriveRules {
 
   const catalogue::Parameter* require(const std::string& name, const Position& at) {
     const catalogue::Parameter* parameter = known(name);
-    if (parameter == nullptr) {
+    if (draft_.lacks(name)) {
       findings_.add_once(at, fmt::format("'{}' is no parameter of this profile", name));
     }
     return parameter;
@@ -219,13 +219,15 @@ class DriveRules {
   }
 
   void check_lists() {
+    // A pattern may mean what could not be read.
+    if (draft_.incomplete || !draft_.half_read.empty()) return;
     for (const catalogue::AlarmList& list : draft_.profile.alarm_lists) {
       if (const auto found = draft_.profile.select(list.parameters); !found) {
         findings_.add_once(
             draft_.alarm_lists.entry->at,
             fmt::format("{}: {}: {}", list.name, found.error().name, message_of(found.error())));
       }
-      if (list.codes == catalogue::CodeTable::refusal && !draft_.profile.refusals) {
+      if (list.codes == catalogue::CodeTable::refusal && draft_.refusals.entry == nullptr) {
         findings_.add_once(draft_.alarm_lists.entry->at,
                            fmt::format("{}: the profile has no refusals", list.name));
       }
@@ -296,11 +298,11 @@ class DriveRules {
       findings_.add_once(origin.of("rest"),
                          fmt::format("{}: rest needs a value that differs from it", action.name));
     }
-    if (action.motion != catalogue::Motion::none && !draft_.profile.run) {
+    if (action.motion != catalogue::Motion::none && draft_.run.entry == nullptr) {
       findings_.add_once(origin.of("motion"),
                          fmt::format("{}: a motion needs the section 'run'", action.name));
     }
-    if (action.busy > Duration::zero() && !draft_.profile.run) {
+    if (action.busy > Duration::zero() && draft_.run.entry == nullptr) {
       findings_.add_once(origin.of("busy"), fmt::format("{}: without the section 'run' no status "
                                                         "says that it is busy",
                                                         action.name));

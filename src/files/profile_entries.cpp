@@ -227,6 +227,7 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   assign(parameter.effect, map.word<catalogue::Effect>("effect", "effect", effect_words));
   assign(parameter.risk, map.text("risk"));
   parameter.settle = map.duration("settle");
+  assign(parameter.hazard, map.word<Hazard>("hazard", "hazard", hazard_words));
   assign(parameter.access,
          map.word<catalogue::Access>("access", "access", access_words, Need::required));
   assign(parameter.evidence,
@@ -270,6 +271,7 @@ bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& dra
   if (n > entry.numbers.to) return false;
   const std::uint64_t address = entry.parameter.address.value + step * entry.stride;
   if (address > last_register || draft.profile.parameters.size() >= most_parameters) {
+    draft.incomplete = true;
     findings.add_once(
         entry.origin.of("n"),
         address > last_register
@@ -301,14 +303,19 @@ void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Find
   }
 }
 
-void read_entry(const YamlNode& node, const YamlNode* group, std::size_t layer,
+void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft,
                 std::vector<Template>& entries, Findings& findings) {
+  const std::size_t before = findings.told();
   YamlMap map(node, findings, group);
-  Origin origin{.entry = &node, .group = group, .layer = layer};
+  Origin origin{.entry = &node, .group = group, .layer = draft.layers};
   Template entry = read_template(map, group, origin.overlaps);
   map.finish();
+  origin.sound = findings.told() == before;
   entry.origin = origin;
-  if (!entry.parameter.name.empty()) entries.push_back(std::move(entry));
+  const std::string& name = entry.parameter.name;
+  const bool repeats = name.find(counter) != std::string::npos;
+  if (!origin.sound && (name.empty() || repeats)) draft.incomplete = true;
+  if (!name.empty()) entries.push_back(std::move(entry));
 }
 
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
@@ -317,14 +324,14 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
   for (const std::string_view key :
        {"name",     "n",        "stride",  "table",  "encoding", "scale",    "unit",
         "access",   "evidence", "repeats", "source", "note",     "overlaps", "effect",
-        "notation", "range",    "clone",   "secret", "settle",   "fields"}) {
+        "notation", "range",    "clone",   "secret", "settle",   "hazard",   "fields"}) {
     group.allow(key);
   }
   group.finish();
-  expect(fields, YamlNode::Kind::sequence, findings);
+  if (!expect(fields, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
   std::vector<Template> entries;
   for (const YamlNode& field : fields.items) {
-    read_entry(field, &node, draft.layers, entries, findings);
+    read_entry(field, &node, draft, entries, findings);
   }
   add_entries(entries, draft, findings);
 }
@@ -419,13 +426,13 @@ void add_action(Action action, const Origin& origin, ProfileDraft& draft, Findin
 }  // namespace
 
 void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
-  expect(list, YamlNode::Kind::sequence, findings);
+  if (!expect(list, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
   for (const YamlNode& node : list.items) {
     if (const YamlNode* fields = node.find("fields")) {
       read_group(node, *fields, draft, findings);
     } else {
       std::vector<Template> entries;
-      read_entry(node, nullptr, draft.layers, entries, findings);
+      read_entry(node, nullptr, draft, entries, findings);
       add_entries(entries, draft, findings);
     }
   }
@@ -434,11 +441,14 @@ void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findin
 void read_actions(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
   expect(list, YamlNode::Kind::sequence, findings);
   for (const YamlNode& node : list.items) {
+    const std::size_t before = findings.told();
     YamlMap map(node, findings);
     Action action = read_action(map);
     map.finish();
     if (action.name.empty()) continue;
-    add_action(std::move(action), {.entry = &node, .layer = draft.layers}, draft, findings);
+    const bool sound = findings.told() == before;
+    add_action(std::move(action), {.entry = &node, .layer = draft.layers, .sound = sound}, draft,
+               findings);
   }
 }
 

@@ -98,8 +98,9 @@ void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings&
 void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   catalogue::LinkFacts& link = draft.profile.link;
-  assign(link.framing, map.word<modbus::Framing>("framing", "framing", framing_words,
-                                                 need_of(draft.link.entry != nullptr)));
+  assign(link.framing,
+         map.word<modbus::Framing>("framing", "framing", framing_words,
+                                   need_of(draft.link.entry != nullptr || draft.incomplete)));
   assign(link.port, map.number<std::uint16_t>("port"));
   assign(link.unit, map.number<std::uint8_t>("unit"));
   if (const auto units = map.range("units", last_byte)) {
@@ -322,8 +323,26 @@ void read_section(YamlMap& map, std::string_view key, ReadSection read, Origin& 
                   ProfileDraft& draft) {
   const YamlNode* node = map.get(key);
   if (node == nullptr) return;
+  const std::size_t before = map.findings().told();
   read(*node, draft, map.findings());
-  origin = {.entry = node, .layer = draft.layers};
+  const bool sound = origin.sound && map.findings().told() == before;
+  origin = {.entry = node, .layer = draft.layers, .sound = sound};
+}
+
+/// Erases entries that are not sound, side by side with where they were written.
+template <typename Entry>
+void erase_half_read(std::vector<Entry>& entries, std::vector<Origin>& origins) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (!origins[i].sound) continue;
+    if (kept != i) {
+      entries[kept] = std::move(entries[i]);
+      origins[kept] = origins[i];
+    }
+    ++kept;
+  }
+  entries.resize(kept);
+  origins.resize(kept);
 }
 
 // ---- simulation ----
@@ -390,6 +409,26 @@ Position Origin::of(std::string_view key) const {
     if (const YamlNode* shared = group->find(key)) return shared->at;
   }
   return entry->at;
+}
+
+void ProfileDraft::leave_out_half_read() {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!parameters[i].sound) half_read.insert(profile.parameters[i].name);
+  }
+  erase_half_read(profile.parameters, parameters);
+  erase_half_read(profile.actions, actions);
+  parameter_index.clear();
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    parameter_index.emplace(profile.parameters[i].name, i);
+  }
+  if (!identity.sound) profile.identity.reset();
+  if (!events.sound) profile.events.reset();
+  if (!limits.sound) profile.limits.reset();
+  if (!numbered.sound) profile.numbered.reset();
+  if (!run.sound) profile.run.reset();
+  if (!refusals.sound) profile.refusals.reset();
+  if (!alarm_lists.sound) profile.alarm_lists.clear();
+  if (!watched.sound) profile.watched.clear();
 }
 
 ProfileHead read_head(const YamlNode& document, Findings& findings) {

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "files/yaml_reader.hpp"
@@ -15,6 +16,7 @@ struct Origin {
   const YamlNode* group = nullptr;  ///< shared defaults of a group of parameters; may be null
   std::size_t layer = 0;            ///< 0: the deepest base
   bool overlaps = false;            ///< the entry declares that it shares registers
+  bool sound = true;                ///< nothing was wrong when it was read
 
   /// The value of a key, else the entry as a whole. Requires an entry.
   [[nodiscard]] Position of(std::string_view key) const;
@@ -37,6 +39,19 @@ struct ProfileDraft {
   Origin alarm_lists = {};
   Origin watched = {};
   std::unordered_map<std::string, std::size_t> parameter_index = {};
+  /// Parameters that were left out because not all of them could be read.
+  std::unordered_set<std::string> half_read = {};
+  /// There may be parameters whose names are not known: a base or a name could not be read.
+  bool incomplete = false;
+
+  /// Leaves out every entry and section in which something was wrong, so that rules speak of what
+  /// could be read. Positions of the others stay valid.
+  void leave_out_half_read();
+
+  /// Whether a name is that of no parameter, as far as can be known.
+  [[nodiscard]] bool lacks(const std::string& name) const {
+    return !incomplete && !parameter_index.contains(name) && !half_read.contains(name);
+  }
 };
 
 /// What must be known of a document before anything else is read from it.

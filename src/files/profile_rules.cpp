@@ -10,6 +10,7 @@
 #include "files/profile_drive.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/value.hpp"
 
 namespace spindle::files {
@@ -311,13 +312,14 @@ void entries_have_a_source(const ProfileDraft& draft, Findings& findings) {
 void actions_stay_off_parameters(const ProfileDraft& draft, Findings& findings) {
   const auto& numbered = draft.profile.numbered;
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
-    const unsigned address = action.address.value;
-    const bool taken = numbered && numbered->table == RegisterTable::holding &&
-                       address >= numbered->from && address <= numbered->to;
-    if (!taken) return;
+    if (!numbered || numbered->table != RegisterTable::holding) return;
+    const unsigned first = action.address.value;
+    const unsigned last = first + catalogue::register_count(action.kind) - 1U;
+    const unsigned taken = std::max<unsigned>(first, numbered->from);
+    if (taken > last || taken > numbered->to) return;
     findings.add_once(
         origin.of("register"),
-        fmt::format("{}: register {} belongs to the numbered parameters", action.name, address));
+        fmt::format("{}: register {} belongs to the numbered parameters", action.name, taken));
   });
 }
 
@@ -330,7 +332,7 @@ void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
       }
       return;
     }
-    if (parameter_named(draft, action.confirm) == nullptr) {
+    if (draft.lacks(action.confirm)) {
       findings.add_once(origin.of("confirm"), no_such_parameter(draft, action.confirm));
     }
   });
@@ -339,7 +341,7 @@ void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
 // ---- sections ----
 
 void link_is_usable(const ProfileDraft& draft, Findings& findings) {
-  if (draft.link.entry == nullptr) return;
+  if (draft.link.entry == nullptr || !draft.link.sound) return;
   const catalogue::LinkFacts& link = draft.profile.link;
   const auto check = [&](std::string_view key, std::uint16_t value, std::uint16_t most) {
     if (value >= 1 && value <= most) return;
@@ -408,10 +410,8 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings
           : RegisterTable::input;
   const auto check = [&](std::string_view key, const std::string& name) {
     const Parameter* parameter = parameter_named(draft, name);
-    if (parameter == nullptr) {
-      findings.add_once(draft.events.of(key), no_such_parameter(draft, name));
-      return;
-    }
+    if (draft.lacks(name)) findings.add_once(draft.events.of(key), no_such_parameter(draft, name));
+    if (parameter == nullptr) return;
     const Span span = span_of(*parameter, 0);
     const unsigned end = unsigned{events.first} + events.count;
     if (span.table == table && span.first >= events.first && span.last < end) return;
@@ -467,9 +467,27 @@ void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
+/// Why a parameter that declares no hazard has one.
+std::string reason_of(const catalogue::Danger& danger) {
+  if (!danger.action.empty()) {
+    return fmt::format("it shares a register with action '{}'", danger.action);
+  }
+  return "it shares a register with a parameter that has a hazard";
+}
+
+/// A hazard is one of a write.
+void read_only_has_no_hazard(const ProfileDraft& draft, Findings& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const bool declared = parameter.hazard != catalogue::Hazard::none;
+    if (!declared || parameter.access == Access::read_write) return;
+    findings.add_once(origin.of("hazard"),
+                      fmt::format("{}: what is read-only has no hazard", parameter.name));
+  });
+}
+
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 25> rules = {
+constexpr std::array<Rule, 26> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -481,6 +499,7 @@ constexpr std::array<Rule, 25> rules = {
     read_only_has_no_default,
     read_only_is_never_cloned,
     settling_ends,
+    read_only_has_no_hazard,
     secrets_are_stored,
     defaults_fit,
     labels_are_unique,
@@ -508,6 +527,28 @@ bool is_catalogue_name(std::string_view text) {
     before = c;
   }
   return is_word_character(before);
+}
+
+void check_guards(const ProfileDraft& draft, Findings& findings) {
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    if (!catalogue::moves_without_end(action)) return;
+    findings.add_once(
+        origin.of("hazard"),
+        fmt::format("{}: it moves and has no 'stop', so it is never sent", action.name));
+  });
+  const catalogue::Dangers dangers(draft.profile);
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const bool silent =
+        parameter.access == Access::read_write && parameter.hazard == catalogue::Hazard::none;
+    const auto danger = silent ? dangers.find(parameter) : std::nullopt;
+    if (!danger || danger->runs_motor) return;  // `run` says what its word does
+    const std::string_view hazard = catalogue::to_text(danger->hazard);
+    findings.add_once(
+        origin.of("access"),
+        fmt::format("{}: {} ({}), so it is never set or restored; write 'hazard: {}', or "
+                    "'access: r'",
+                    parameter.name, danger->effect(), reason_of(*danger), hazard));
+  });
 }
 
 void check_rules(const ProfileDraft& draft, Findings& findings) {

@@ -8,8 +8,12 @@ namespace spindle::files {
 /// dots or hyphens ("preset.1.target-torque").
 bool is_catalogue_name(std::string_view text);
 
-/// Every rule that a complete profile must keep, beyond the shape of its files. Runs on every load;
-/// adds a finding for each breach.
+/// Every rule that a profile must keep, beyond the shape of its files. Runs on every load; adds a
+/// finding for each breach. What could not be read is to be left out before.
 void check_rules(const ProfileDraft& draft, Findings& findings);
+
+/// What may move a tool and is guarded by nothing but a refusal: no reason not to load a profile,
+/// so only a check pays for it.
+void check_guards(const ProfileDraft& draft, Findings& findings);
 
 }  // namespace spindle::files

@@ -20,10 +20,6 @@ constexpr std::string_view extension = ".yaml";
 /// Ours have two layers; a user's own makes three.
 constexpr std::size_t deepest_chain = 8;
 
-bool is_path(std::string_view name_or_file) {
-  return name_or_file.find('/') != std::string_view::npos || name_or_file.ends_with(extension);
-}
-
 std::string in_folder(const std::string& folder, std::string_view id) {
   return fmt::format("{}/{}{}", folder, id, extension);
 }
@@ -69,14 +65,14 @@ bool same_file(const std::string& a, const std::string& b) {
   return std::filesystem::equivalent(a, b, problem);
 }
 
-Result<const Layer*> read_layer(const std::string& path, Documents documents, Library& library,
-                                Findings& findings) {
+Result<const Layer*> read_layer(const std::string& path, Documents documents, const ReadText& read,
+                                Library& library, Findings& findings) {
   if (const auto known = library.find(path); known != library.end()) {
     const bool sound = known->second.sound;
     if (!sound) findings.add({findings.add_file(path), 1, 1}, "the file has faults of its own");
     return &known->second;
   }
-  auto text = read_text_file(path);
+  auto text = read(path);
   if (!text) return tl::unexpected(std::move(text.error()));
   Layer layer{.path = path, .file = findings.add_file(path), .documents = {}, .head = {}};
   layer.documents = parse_yaml(*text, layer.file, documents, findings);
@@ -115,12 +111,12 @@ std::optional<std::string> next_of(const Chain& chain, const std::vector<std::st
 }
 
 Result<Chain> read_chain(const std::string& path, Documents documents,
-                         const std::vector<std::string>& folders, Library& library,
-                         Findings& findings) {
+                         const std::vector<std::string>& folders, const ReadText& read,
+                         Library& library, Findings& findings) {
   Chain chain;
   std::optional<std::string> next = path;
   while (next) {
-    auto layer = read_layer(*next, documents, library, findings);
+    auto layer = read_layer(*next, documents, read, library, findings);
     if (!layer) return tl::unexpected(std::move(layer.error()));
     chain.push_back(*layer);
     next = next_of(chain, folders, findings);
@@ -128,22 +124,31 @@ Result<Chain> read_chain(const std::string& path, Documents documents,
   return chain;
 }
 
-Profile build(const Chain& chain, Findings& findings) {
+/// How much is asked of a profile: what it needs to be used, or to be called good.
+enum class Strictness : std::uint8_t { load, check };
+
+ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings) {
   ProfileDraft draft;
+  const std::string& missing_base = chain.back()->head.extends;
+  draft.incomplete = !missing_base.empty();
   draft.profile.path = chain.front()->path;
+  for (const Layer* layer : chain) {
+    if (!layer->head.extends.empty()) draft.profile.bases.push_back(layer->head.extends);
+  }
   for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
     if ((*layer)->documents.empty()) continue;
     read_profile((*layer)->documents.front(), draft, findings);
   }
-  const bool complete = findings.empty();
-  const bool concrete = !chain.front()->head.abstract;
-  if (complete && concrete && draft.link.entry == nullptr) {
+  if (draft.top.entry == nullptr) return draft;  // not a document could be read
+  const bool whole = !draft.incomplete && !chain.front()->head.abstract;
+  if (whole && draft.link.entry == nullptr) {
     findings.add(draft.top.entry->at, "key 'link' is missing");
   }
-  // Rules speak of a profile whose every entry could be read; on half-read ones they would add
-  // findings that are none.
-  if (complete) check_rules(draft, findings);
-  return std::move(draft.profile);
+  // On what is half read, rules would find faults that are none.
+  draft.leave_out_half_read();
+  check_rules(draft, findings);
+  if (strictness == Strictness::check) check_guards(draft, findings);
+  return draft;
 }
 
 catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
@@ -180,23 +185,25 @@ std::map<std::string, std::string> profile_files(const std::vector<std::string>&
   return found;
 }
 
-bool is_abstract(const std::string& path) {
+bool is_abstract(const std::string& path, const ReadText& read) {
   Library library;
   Findings findings;
-  const auto layer = read_layer(path, Documents::first, library, findings);
+  const auto layer = read_layer(path, Documents::first, read, library, findings);
   return layer && (*layer)->head.abstract;
 }
 
-std::vector<ProfileEntry> list_profiles(const std::vector<std::string>& folders) {
+std::vector<ProfileEntry> list_profiles(const std::vector<std::string>& folders,
+                                        const ReadText& read) {
   std::vector<ProfileEntry> entries;
   for (auto& [id, path] : profile_files(folders)) {
-    if (!is_abstract(path)) entries.push_back({id, path});
+    if (!is_abstract(path, read)) entries.push_back({id, path});
   }
   return entries;
 }
 
-Result<std::string> locate(std::string_view name_or_file, const std::vector<std::string>& folders) {
-  if (is_path(name_or_file)) return std::string(name_or_file);
+Result<std::string> locate(std::string_view name_or_file, const std::vector<std::string>& folders,
+                           const ReadText& read) {
+  if (names_profile_file(name_or_file)) return std::string(name_or_file);
   if (is_catalogue_name(name_or_file)) {
     for (const std::string& folder : folders) {
       std::string path = in_folder(folder, name_or_file);
@@ -204,7 +211,7 @@ Result<std::string> locate(std::string_view name_or_file, const std::vector<std:
     }
   }
   std::vector<std::string> ids;
-  for (const ProfileEntry& entry : list_profiles(folders)) ids.push_back(entry.id);
+  for (const ProfileEntry& entry : list_profiles(folders, read)) ids.push_back(entry.id);
   std::string hint = suggestion(name_or_file, ids);
   if (hint.empty()) hint = "'spindle profile list' shows those that exist";
   return tl::unexpected(Error{.code = Errc::unknown_name,
@@ -238,11 +245,11 @@ struct OpenChain {
 };
 
 Result<OpenChain> open_chain(std::string_view name_or_file, Documents documents,
-                             const std::vector<std::string>& folders) {
-  auto path = locate(name_or_file, folders);
+                             const std::vector<std::string>& folders, const ReadText& read) {
+  auto path = locate(name_or_file, folders, read);
   if (!path) return tl::unexpected(std::move(path.error()));
   OpenChain open(std::move(*path));
-  auto chain = read_chain(open.path, documents, folders, open.library, open.findings);
+  auto chain = read_chain(open.path, documents, folders, read, open.library, open.findings);
   if (!chain) return tl::unexpected(std::move(chain.error()));
   open.chain = std::move(*chain);
   return open;
@@ -250,10 +257,14 @@ Result<OpenChain> open_chain(std::string_view name_or_file, Documents documents,
 
 }  // namespace
 
+bool names_profile_file(std::string_view text) {
+  return text.find('/') != std::string_view::npos || text.ends_with(extension);
+}
+
 Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::first, folders_);
+  auto open = open_chain(name_or_file, Documents::first, folders_, read_);
   if (!open) return tl::unexpected(std::move(open.error()));
-  Profile profile = build(open->chain, open->findings);
+  Profile profile = build(open->chain, Strictness::load, open->findings).profile;
   if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
   if (open->chain.front()->head.abstract) {
     return tl::unexpected(Error{.code = Errc::bad_file,
@@ -266,7 +277,7 @@ Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
 
 Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_);
+  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
   if (!open) return tl::unexpected(std::move(open.error()));
   const YamlNode* part = nearest_simulation(open->chain, open->findings);
   catalogue::SimulationFacts facts;
@@ -287,7 +298,7 @@ Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view nam
 }
 
 Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_);
+  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
   if (!open) return tl::unexpected(std::move(open.error()));
   catalogue::CodeTables codes = collect_texts(open->chain, open->findings);
   if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
@@ -295,27 +306,29 @@ Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view na
 }
 
 Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_);
+  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
   if (!open) return tl::unexpected(std::move(open.error()));
-  const Profile profile = build(open->chain, open->findings);
+  const ProfileDraft draft = build(open->chain, Strictness::check, open->findings);
   collect_texts(open->chain, open->findings);
   if (const YamlNode* part = nearest_simulation(open->chain, open->findings)) {
     read_simulation(*part, open->findings);
-    check_simulation(profile, *part, open->findings);
+    // Its patterns may mean what could not be read.
+    const bool known = !draft.incomplete && draft.half_read.empty();
+    if (known) check_simulation(draft.profile, *part, open->findings);
   }
   return open->findings.list();
 }
 
-std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(folders_); }
+std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(folders_, read_); }
 
 std::vector<Profile> ProfileStore::load_all() const {
   std::vector<Profile> profiles;
   Library library;
   for (const auto& [id, path] : profile_files(folders_)) {
     Findings findings;
-    const auto chain = read_chain(path, Documents::first, folders_, library, findings);
+    const auto chain = read_chain(path, Documents::first, folders_, read_, library, findings);
     if (!chain || chain->front()->head.abstract) continue;
-    Profile profile = build(*chain, findings);
+    Profile profile = build(*chain, Strictness::load, findings).profile;
     if (findings.empty()) profiles.push_back(std::move(profile));
   }
   return profiles;

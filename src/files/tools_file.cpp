@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include "files/yaml_map.hpp"
 #include "files/yaml_reader.hpp"
+#include "spindle/files/profile_store.hpp"
 
 namespace spindle::files {
 namespace {
@@ -109,15 +111,25 @@ void read_tools(const YamlNode& document, Tools& tools, Findings& findings) {
   map.finish();
 }
 
+/// A profile's file where the tools file means it; ids and absolute paths as they are.
+std::string beside(const std::string& tools_file, std::string profile) {
+  const std::filesystem::path folder = std::filesystem::path(tools_file).parent_path();
+  const std::filesystem::path file(profile);
+  const bool here = folder.empty() || folder == ".";
+  if (here || file.is_absolute() || !names_profile_file(profile)) return profile;
+  return (folder / file).lexically_normal().string();
+}
+
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, Findings& findings) {
-  const auto text = read_text_file(path);
+Result<Tools> read_tools_file(const std::string& path, const ReadText& read, Findings& findings) {
+  const auto text = read(path);
   if (!text) return tl::unexpected(text.error());
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
   Tools tools;
   tools.path = path;
   if (!documents.empty()) read_tools(documents.front(), tools, findings);
+  for (Tool& tool : tools.tools) tool.profile = beside(path, std::move(tool.profile));
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
   return tools;
@@ -132,24 +144,26 @@ Error refusal_of(const Findings& findings) {
 
 }  // namespace
 
-Result<Tools> load_tools(const std::string& path) {
+bool may_name_tools(std::string_view word) { return word.starts_with('@') || is_tool_name(word); }
+
+Result<Tools> load_tools(const std::string& path, const ReadText& read) {
   Findings findings;
-  auto tools = read_tools_file(path, findings);
+  auto tools = read_tools_file(path, read, findings);
   if (!tools || findings.empty()) return tools;
   return tl::unexpected(refusal_of(findings));
 }
 
-Tools salvage_tools(const std::string& path) {
+Tools salvage_tools(const std::string& path, const ReadText& read) {
   Findings findings;
-  auto tools = read_tools_file(path, findings);
+  auto tools = read_tools_file(path, read, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
   return std::move(*tools);
 }
 
-Result<CheckedTools> check_tools(const std::string& path) {
+Result<CheckedTools> check_tools(const std::string& path, const ReadText& read) {
   Findings findings;
-  auto tools = read_tools_file(path, findings);
+  auto tools = read_tools_file(path, read, findings);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   return CheckedTools{std::move(*tools), findings.list()};
 }

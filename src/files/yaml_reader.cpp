@@ -1,10 +1,7 @@
 #include "files/yaml_reader.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/depthguard.h>
-#include <yaml-cpp/eventhandler.h>
-#include <yaml-cpp/exceptions.h>
-#include <yaml-cpp/parser.h>
+#include <yaml.h>
 
 #include <algorithm>
 #include <array>
@@ -12,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
-#include <sstream>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
@@ -30,59 +26,145 @@ constexpr std::size_t read_step = 16384;
 /// No format of ours nests deeper than six; bounds recursion over the tree.
 constexpr std::size_t deepest_nesting = 32;
 
-/// An explicit end: without it the parser takes a quoted text that is never closed for complete.
-/// Behind an empty text it makes an empty document.
-constexpr std::string_view end_of_text = "\n...\n";
+/// A backup of two thousand parameters has twenty thousand; bounds the memory of the tree.
+constexpr std::size_t most_values = 100'000;
 
-Position to_position(const YAML::Mark& mark, std::size_t file) {
-  return {file, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
+/// Nobody mends more in one go; bounds the work on a file that is something else altogether.
+constexpr std::size_t most_findings = 1'000;
+
+/// Places by the number of code points in front, which is how the parser counts; they are asked for
+/// in the order of the text.
+class Places {
+ public:
+  Places(std::string_view text, std::size_t file) : text_(text), at_{file, 1, 1} {}
+
+  /// The place, or the last one asked for when that is behind it.
+  Position find(std::size_t index) {
+    while (index_ < index && byte_ < text_.size()) step();
+    return at_;
+  }
+  Position find_byte(std::size_t byte) {
+    while (byte_ < byte && byte_ < text_.size()) step();
+    return at_;
+  }
+  /// What stands at the place that was found last; NUL at the end of the text.
+  [[nodiscard]] char here() const { return byte_ < text_.size() ? text_[byte_] : '\0'; }
+  /// Whether only blanks stand in front of it in its line.
+  [[nodiscard]] bool begins_line() const {
+    const std::string_view line =
+        text_.substr(0, byte_).substr(byte_ + 1 - static_cast<std::size_t>(at_.column));
+    return line.find_first_not_of(" \t") == std::string_view::npos;
+  }
+
+ private:
+  void step() {
+    const std::size_t length = first_code_point(text_.substr(byte_)).length;
+    at_.column += static_cast<int>(length);
+    if (text_[byte_] == '\n') {
+      ++at_.line;
+      at_.column = 1;
+    }
+    byte_ += length;
+    ++index_;
+  }
+
+  std::string_view text_;
+  std::size_t index_ = 0;
+  std::size_t byte_ = 0;
+  Position at_;
+};
+
+/// The parser of libyaml over one text. It looks at most 1,024 characters ahead, and keeps of
+/// what it has told only how deep it is nested.
+class Parser {
+ public:
+  explicit Parser(std::string_view text) {
+    // Its only failure is a lack of memory, which next() tells as well.
+    sound_ = yaml_parser_initialize(&parser_) != 0;
+    if (!sound_) return;
+    yaml_parser_set_encoding(&parser_, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(&parser_, reinterpret_cast<const unsigned char*>(text.data()),
+                                 text.size());
+  }
+  ~Parser() {
+    forget();
+    if (sound_) yaml_parser_delete(&parser_);
+  }
+  Parser(const Parser&) = delete;
+  Parser& operator=(const Parser&) = delete;
+
+  /// The next event, valid until the next call; null when the text is no YAML from here on.
+  const yaml_event_t* next() {
+    forget();
+    has_event_ = sound_ && yaml_parser_parse(&parser_, &event_) != 0;
+    return has_event_ ? &event_ : nullptr;
+  }
+
+  [[nodiscard]] const yaml_parser_t& state() const { return parser_; }
+  /// False: the parser could not even begin.
+  [[nodiscard]] bool sound() const { return sound_; }
+
+ private:
+  void forget() {
+    if (has_event_) yaml_event_delete(&event_);
+    has_event_ = false;
+  }
+
+  yaml_parser_t parser_ = {};
+  yaml_event_t event_ = {};
+  bool sound_ = false;
+  bool has_event_ = false;
+};
+
+std::string_view to_view(const yaml_char_t* text, std::size_t length) {
+  return {reinterpret_cast<const char*>(text), length};
 }
 
-/// Tags that the parser makes up itself: "?" for plain and "!" for quoted scalars, "" or "?" for
-/// collections.
-bool is_explicit(const std::string& tag) { return !tag.empty() && tag != "?" && tag != "!"; }
+/// Plain words that YAML takes for no value at all.
+bool is_null_word(std::string_view text) {
+  constexpr std::array<std::string_view, 5> words = {"", "~", "null", "Null", "NULL"};
+  return std::find(words.begin(), words.end(), text) != words.end();
+}
 
 /// Builds the tree from events; a collection is kept open on a stack until its end.
-class TreeBuilder : public YAML::EventHandler {
+class TreeBuilder {
  public:
-  TreeBuilder(std::size_t file, Findings& findings) : file_(file), findings_(findings) {}
+  TreeBuilder(Places& places, Findings& findings) : places_(places), findings_(findings) {}
 
   [[nodiscard]] YamlNode take() { return std::move(root_); }
 
-  void OnDocumentStart(const YAML::Mark& mark) override {
-    root_ = YamlNode{.at = to_position(mark, file_), .items = {}, .entries = {}};
-    open_.clear();
-  }
-  void OnDocumentEnd() override {}
-
-  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    check_anchor(mark, anchor);
-    add(make(YamlNode::Kind::nothing, mark));
-  }
-  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
-    findings_.add(to_position(mark, file_), "aliases are not supported; write the value out");
-    add(make(YamlNode::Kind::scalar, mark));
-  }
-  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
-                const std::string& value) override {
-    check_anchor(mark, anchor);
-    check_tag(mark, tag);
-    YamlNode node = make(YamlNode::Kind::scalar, mark);
-    node.text = value;
-    add(std::move(node));
-  }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
-                       YAML::EmitterStyle::value) override {
-    start(YamlNode::Kind::sequence, mark, tag, anchor);
-  }
-  void OnSequenceEnd() override { finish(); }
-  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
-                  YAML::EmitterStyle::value) override {
-    start(YamlNode::Kind::map, mark, tag, anchor);
-  }
-  void OnMapEnd() override {
-    check_duplicates(open_.back().node);
-    finish();
+  /// False: the text takes more than any file of ours, and is not to be read on.
+  [[nodiscard]] bool take(const yaml_event_t& event) {
+    const Position at = places_.find(event.start_mark.index);
+    switch (event.type) {
+      case YAML_DOCUMENT_START_EVENT:
+        root_ = YamlNode{.at = at, .items = {}, .entries = {}};
+        return true;
+      case YAML_ALIAS_EVENT:
+        findings_.add(at, "aliases are not supported; write the value out");
+        add(make(YamlNode::Kind::scalar, at));
+        return is_within_bounds(at);
+      case YAML_SCALAR_EVENT:
+        add_scalar(event, at);
+        return is_within_bounds(at);
+      case YAML_SEQUENCE_START_EVENT:
+        check_properties(at, event.data.sequence_start.anchor, event.data.sequence_start.tag);
+        open_.push_back({make(YamlNode::Kind::sequence, at), std::nullopt});
+        return is_within_bounds(at);
+      case YAML_MAPPING_START_EVENT:
+        check_properties(at, event.data.mapping_start.anchor, event.data.mapping_start.tag);
+        open_.push_back({make(YamlNode::Kind::map, at), std::nullopt});
+        return is_within_bounds(at);
+      case YAML_MAPPING_END_EVENT:
+        check_duplicates(open_.back().node);
+        finish();
+        return true;
+      case YAML_SEQUENCE_END_EVENT:
+        finish();
+        return true;
+      default:
+        return true;
+    }
   }
 
  private:
@@ -91,36 +173,43 @@ class TreeBuilder : public YAML::EventHandler {
     std::optional<YamlNode> key;  ///< of a map whose value has not come yet
   };
 
-  [[nodiscard]] YamlNode make(YamlNode::Kind kind, const YAML::Mark& mark) const {
-    return YamlNode{.kind = kind, .at = to_position(mark, file_), .items = {}, .entries = {}};
+  [[nodiscard]] YamlNode make(YamlNode::Kind kind, const Position& at) {
+    ++values_;
+    return YamlNode{.kind = kind, .at = at, .items = {}, .entries = {}};
   }
 
-  void check_anchor(const YAML::Mark& mark, YAML::anchor_t anchor) {
-    if (anchor == YAML::NullAnchor) return;
-    findings_.add(to_position(mark, file_), "anchors are not supported; write the value out");
-  }
-
-  void check_tag(const YAML::Mark& mark, const std::string& tag) {
-    if (!is_explicit(tag)) return;
-    findings_.add(to_position(mark, file_), "tags are not supported");
-  }
-
-  void start(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag,
-             YAML::anchor_t anchor) {
-    check_anchor(mark, anchor);
-    check_tag(mark, tag);
-    if (open_.size() == deepest_nesting) {
-      findings_.add(to_position(mark, file_),
-                    fmt::format("nested more than {} levels deep", deepest_nesting));
+  [[nodiscard]] bool is_within_bounds(const Position& at) {
+    if (open_.size() > deepest_nesting) {
+      findings_.add(at, fmt::format("nested more than {} levels deep", deepest_nesting));
+      return false;
     }
-    open_.push_back({make(kind, mark), std::nullopt});
+    if (values_ > most_values) {
+      findings_.add(at,
+                    fmt::format("more than {} values; this is no file of spindle's", most_values));
+      return false;
+    }
+    return true;
+  }
+
+  void check_properties(const Position& at, const yaml_char_t* anchor, const yaml_char_t* tag) {
+    if (anchor != nullptr) findings_.add(at, "anchors are not supported; write the value out");
+    if (tag != nullptr) findings_.add(at, "tags are not supported");
+  }
+
+  void add_scalar(const yaml_event_t& event, const Position& at) {
+    const auto& scalar = event.data.scalar;
+    check_properties(at, scalar.anchor, scalar.tag);
+    const std::string_view text = to_view(scalar.value, scalar.length);
+    const bool plain = scalar.style == YAML_PLAIN_SCALAR_STYLE;
+    const bool nothing = plain && is_null_word(text);
+    YamlNode node = make(nothing ? YamlNode::Kind::nothing : YamlNode::Kind::scalar, at);
+    if (!nothing) node.text = text;
+    add(std::move(node));
   }
 
   void finish() {
     YamlNode node = std::move(open_.back().node);
     open_.pop_back();
-    // Dropping what is too deep bounds the tree; it was already reported.
-    if (open_.size() > deepest_nesting) node = YamlNode{.at = node.at, .items = {}, .entries = {}};
     add(std::move(node));
   }
 
@@ -156,55 +245,118 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  std::size_t file_;
+  Places& places_;
   Findings& findings_;
   YamlNode root_ = {};
   std::vector<Open> open_;
+  std::size_t values_ = 0;
 };
 
-/// What the parser complains about, in our words. Its own are matched by their beginning, because
-/// some go on with details.
-std::string_view cause_of(std::string_view complaint) {
+/// What stands where the parser gave up, when that says more than its own words.
+std::string_view cause_of(char here) {
+  switch (here) {
+    case ',':
+      return "a ',' outside of '[ ]' and '{ }'; quote the text";
+    case ']':
+    case '}':
+      return "a '}' or ']' that closes nothing";
+    case '\t':
+      return "a tab in the indentation; use spaces";
+    case '@':
+    case '`':
+    case '%':
+      return "a character that cannot begin a value; quote the text";
+    default:
+      return "";
+  }
+}
+
+/// What the parser complains about, in our words.
+std::string_view cause_of(std::string_view complaint, const Places& places) {
   struct Cause {
     std::string_view complaint;
     std::string_view text;
   };
-  static constexpr std::array causes = {
-      Cause{"end of map flow not found", "a '}' is missing"},
-      Cause{"end of map not found", "a line is indented differently from its neighbours"},
-      Cause{"end of sequence flow not found", "a ']' is missing"},
-      Cause{"end of sequence not found", "a line is indented differently from its neighbours"},
-      Cause{"illegal map value", "a ':' where no key is; quote texts that contain ': '"},
-      Cause{"illegal block entry", "a '-' where no list is"},
-      Cause{"illegal flow end", "a '}' or ']' that closes nothing"},
-      Cause{"illegal EOF in scalar", "a quoted text is never closed"},
-      Cause{"illegal tab when looking for indentation", "a tab in the indentation; use spaces"},
-      Cause{"illegal document indicator in scalar", "a quoted text is never closed"},
-      Cause{"unknown escape character", "an unknown escape behind '\\' in a quoted text"},
-      Cause{"bad character found while scanning", "a character that YAML does not allow"},
-      Cause{"unknown token", "a character that cannot begin a value; quote the text"},
+  static constexpr std::array ours = {
+      Cause{"did not find expected ',' or '}'", "a '}' is missing, or a ','"},
+      Cause{"did not find expected ',' or ']'", "a ']' is missing, or a ','"},
+      Cause{"found unexpected end of stream", "a quoted text is never closed"},
+      Cause{"found unexpected document indicator", "a quoted text is never closed"},
+      Cause{"found unknown escape character", "an unknown escape behind '\\' in a quoted text"},
+      Cause{"found invalid Unicode character escape code", "an escape that is no character"},
+      Cause{"did not find expected hexdecimal number", "an escape without its digits"},
+      Cause{"mapping values are not allowed",
+            "a ':' where no key is; quote texts that contain ': '"},
+      Cause{"mapping keys are not allowed", "a '?' where no key is"},
+      Cause{"block sequence entries are not allowed", "a '-' where no list is"},
+      Cause{"could not find expected ':'",
+            "a line that is neither 'key: value' nor part of a text"},
+      Cause{"found a tab character", "a tab in the indentation; use spaces"},
+      Cause{"control characters are not allowed", "a character that YAML does not allow"},
+      Cause{"found incompatible YAML document", "another version of YAML than 1.1 and 1.2"},
   };
-  for (const Cause& cause : causes) {
-    if (complaint.starts_with(cause.complaint)) return cause.text;
+  static constexpr std::array unless_seen = {
+      Cause{"did not find expected node content", "a value is missing"},
+      Cause{"found character that cannot start",
+            "a character that cannot begin a value; quote the text"},
+  };
+  const auto text_of = [&](const auto& causes) -> std::string_view {
+    for (const Cause& cause : causes) {
+      if (complaint.starts_with(cause.complaint)) return cause.text;
+    }
+    return "";
+  };
+  if (const std::string_view text = text_of(ours); !text.empty()) return text;
+  if (const std::string_view text = cause_of(places.here()); !text.empty()) return text;
+  if (const std::string_view text = text_of(unless_seen); !text.empty()) return text;
+  if (!complaint.starts_with("did not find expected")) return "the structure is broken";
+  return places.begins_line() ? "a line is indented differently from its neighbours"
+                              : "something behind a finished value; quote the whole text";
+}
+
+void add_complaint(const Parser& parser, std::size_t file, Places& places, Findings& findings) {
+  const yaml_parser_t& state = parser.state();
+  if (!parser.sound() || state.error == YAML_MEMORY_ERROR || state.problem == nullptr) {
+    findings.add({file, 1, 1}, "not valid YAML: the parser gave up");
+    return;
   }
-  return "the structure is broken";
+  const Position at = state.error == YAML_READER_ERROR ? places.find_byte(state.problem_offset)
+                                                       : places.find(state.problem_mark.index);
+  findings.add(at, fmt::format("not valid YAML here: {}", cause_of(state.problem, places)));
 }
 
 void parse_documents(std::string_view text, std::size_t file, Documents wanted, Findings& findings,
                      std::vector<YamlNode>& documents) {
-  std::istringstream stream(std::string(text).append(end_of_text));
-  YAML::Parser parser(stream);
-  TreeBuilder builder(file, findings);
-  while (parser.HandleNextDocument(builder)) {
-    documents.push_back(builder.take());
-    if (wanted == Documents::first) break;
+  Parser parser(text);
+  Places places(text, file);
+  TreeBuilder builder(places, findings);
+  const yaml_event_t* event = parser.next();
+  while (event != nullptr && event->type != YAML_STREAM_END_EVENT) {
+    const bool begins = event->type == YAML_DOCUMENT_START_EVENT;
+    // Only now it is clear that the first one ended where it should.
+    if (begins && wanted == Documents::first && !documents.empty()) break;
+    if (!builder.take(*event)) break;
+    if (event->type == YAML_DOCUMENT_END_EVENT) documents.push_back(builder.take());
+    event = parser.next();
   }
+  if (event == nullptr) add_complaint(parser, file, places, findings);
   while (!documents.empty() && documents.back().kind == YamlNode::Kind::nothing) {
     documents.pop_back();
   }
 }
 
-/// Checked before the parser sees the text, because it replaces what it does not understand.
+/// A text in which each line may declare a tag makes the parser compare each with all others.
+bool declares_tags(std::string_view text) {
+  constexpr std::string_view directive = "%TAG";
+  constexpr std::string_view line_begins = "\n\r\x85\xA8\xA9\xBF";  // last bytes of all breaks
+  for (std::size_t at = text.find(directive); at != std::string_view::npos;
+       at = text.find(directive, at + 1)) {
+    if (at == 0 || line_begins.find(text[at - 1]) != std::string_view::npos) return true;
+  }
+  return false;
+}
+
+/// Checked before the parser sees the text, so that what is wrong is told in our words.
 bool check_characters(std::string_view text, std::size_t file, Findings& findings) {
   Position at{file, 1, 1};
   for (std::size_t i = 0; i < text.size();) {
@@ -220,6 +372,10 @@ bool check_characters(std::string_view text, std::size_t file, Findings& finding
     at = text[i] == '\n' ? Position{file, at.line + 1, 1}
                          : Position{file, at.line, at.column + static_cast<int>(character.length)};
     i += character.length;
+  }
+  if (declares_tags(text)) {
+    findings.add({file, 1, 1}, "tags are not supported");
+    return false;
   }
   return true;
 }
@@ -249,6 +405,8 @@ std::size_t Findings::add_file(std::string path) {
 }
 
 void Findings::add(const Position& at, std::string message) {
+  ++told_;
+  if (entries_.size() == most_findings) return;
   auto place = std::lower_bound(
       entries_.begin(), entries_.end(), at,
       [](const Entry& entry, const Position& position) { return entry.at < position; });
@@ -259,9 +417,11 @@ void Findings::add(const Position& at, std::string message) {
 }
 
 void Findings::add_once(const Position& at, std::string message) {
-  const bool told = std::any_of(entries_.begin(), entries_.end(),
-                                [&](const Entry& entry) { return entry.at == at; });
-  if (!told) add(at, std::move(message));
+  const auto place = std::lower_bound(
+      entries_.begin(), entries_.end(), at,
+      [](const Entry& entry, const Position& position) { return entry.at < position; });
+  ++told_;
+  if (place == entries_.end() || place->at != at) add(at, std::move(message));
 }
 
 std::vector<Finding> Findings::list() const {
@@ -316,16 +476,12 @@ Result<std::string> read_text_file(const std::string& path) {
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
                                  Findings& findings) {
   std::vector<YamlNode> parsed;
-  if (!check_characters(text, file, findings)) return parsed;
-  try {
+  if (text.size() > largest_file) {
+    findings.add({file, 1, 1}, fmt::format("larger than {} bytes", largest_file));
+    return parsed;
+  }
+  if (check_characters(text, file, findings)) {
     parse_documents(text, file, documents, findings, parsed);
-  } catch (const YAML::DeepRecursion& problem) {
-    findings.add(to_position(problem.mark, file), "nested too deep");
-  } catch (const YAML::Exception& problem) {
-    findings.add(to_position(problem.mark, file),
-                 fmt::format("not valid YAML here: {}", cause_of(problem.msg)));
-  } catch (const std::exception&) {
-    findings.add({file, 1, 1}, "not valid YAML: the parser gave up");
   }
   return parsed;
 }

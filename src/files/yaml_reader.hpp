@@ -7,6 +7,7 @@
 
 #include "spindle/base/error.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/files/read_text.hpp"
 
 namespace spindle::files {
 
@@ -19,7 +20,7 @@ struct Position {
   friend auto operator<=>(const Position&, const Position&) = default;
 };
 
-/// Faults of several files, collected instead of stopping at the first.
+/// Faults of several files, collected instead of stopping at the first. Keeps the first thousand.
 class Findings {
  public:
   /// The number by which positions name this file.
@@ -31,6 +32,8 @@ class Findings {
   void add_once(const Position& at, std::string message);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
+  /// How often something was told so far: grows with every fault, also with one told before.
+  [[nodiscard]] std::size_t told() const { return told_; }
   /// Sorted by place.
   [[nodiscard]] std::vector<Finding> list() const;
   /// The first finding as `bad_file`, and how many there are. Requires at least one.
@@ -43,6 +46,7 @@ class Findings {
   };
   std::vector<std::string> files_;
   std::vector<Entry> entries_;  ///< sorted by place
+  std::size_t told_ = 0;
 };
 
 struct YamlEntry;
@@ -69,12 +73,10 @@ struct YamlEntry {
 /// Which documents of a file are wanted; the rest is not even scanned.
 enum class Documents : std::uint8_t { first, all };
 
-/// Reads a whole file. Error `bad_file` when it cannot be read or is larger than any file of ours.
-Result<std::string> read_text_file(const std::string& path);
-
 /// The documents of a YAML text. Strict: aliases, anchors, tags, duplicate keys, keys that are no
-/// plain text, deep nesting, NUL and invalid UTF-8 are findings. After a syntax error the documents
-/// before it are returned; empty ones at the end are dropped.
+/// plain text, NUL and invalid UTF-8 are findings. After a syntax error the documents before it are
+/// returned; empty ones at the end are dropped. Time and memory are bounded whatever the text is:
+/// one that is too large, nested too deep or has too many values is a finding and is not read on.
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
                                  Findings& findings);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace spindle::link {
@@ -40,10 +41,25 @@ void append_pieces(RegisterRange range, const ReadLimits& limits,
   pieces.push_back(range);
 }
 
-bool is_said_absent(const RegisterRange& range, const ReadLimits& limits) {
-  return std::any_of(limits.absent.begin(), limits.absent.end(), [&](const RegisterRange& area) {
-    return area.table == range.table && area.first < end_of(range) && range.first < end_of(area);
-  });
+/// The areas said to be absent that a range touches.
+std::vector<RegisterRange> holes_of(const RegisterRange& range, const ReadLimits& limits) {
+  std::vector<RegisterRange> holes;
+  std::copy_if(limits.absent.begin(), limits.absent.end(), std::back_inserter(holes),
+               [&](const RegisterRange& area) {
+                 return area.table == range.table && area.first < end_of(range) &&
+                        range.first < end_of(area);
+               });
+  return holes;
+}
+
+/// What is said to be absent shares a request with nothing but its own hole.
+bool may_share(const RegisterRange& a, const RegisterRange& b, const ReadLimits& limits) {
+  const auto holes = holes_of(a, limits);
+  if (holes != holes_of(b, limits)) return false;
+  const auto lies_within = [&](const RegisterRange& range) {
+    return holes.front().first <= range.first && end_of(range) <= end_of(holes.front());
+  };
+  return holes.empty() || (holes.size() == 1 && lies_within(a) && lies_within(b));
 }
 
 bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t to,
@@ -62,7 +78,7 @@ bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t t
 void add(std::vector<PlannedRead>& plan, const RegisterRange& piece, const ReadLimits& limits,
          const std::set<std::uint32_t>& absent) {
   const bool joins = !plan.empty() && plan.back().range.table == piece.table &&
-                     !is_said_absent(piece, limits) && !is_said_absent(plan.back().range, limits);
+                     may_share(plan.back().range, piece, limits);
   if (joins) {
     PlannedRead& last = plan.back();
     const std::uint32_t end = std::max(end_of(last.range), end_of(piece));
@@ -307,6 +323,13 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
     if (!is_missing_register(registers.error()) || part.wanted.size() == 1) {
       remember(part, registers.error(), image);
       settled(part);
+      continue;
+    }
+    if (!holes_of(part.range, limits_).empty()) {
+      // It is as was said, but some of them may be there all the same: each is asked for alone.
+      for (const RegisterRange& range : part.wanted) {
+        if (auto read = read_or_bisect({range, {range}}, image, settled); !read) return read;
+      }
       continue;
     }
     const auto [head, tail] = split_at(part, part.wanted.size() / 2);

@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "posix/descriptor.hpp"
+#include "posix/trusted_file.hpp"
 #include "posix/write_whole.hpp"
 #include "spindle/posix/world.hpp"
 
@@ -266,15 +267,18 @@ std::string user_name() {
 
 }  // namespace
 
-Disk local_disk() {
-  return {.exists = file_exists,
-          .absent = file_is_absent,
-          .read = read_file,
-          .write = write_file,
-          .append = append_line,
-          .make_folders = make_folders,
-          .user = user_name,
-          .process = [] { return static_cast<std::uint64_t>(::getpid()); }};
+Disk local_disk(std::string_view trusted) {
+  const Trust trust{.self = ::geteuid(), .others = trusted_users(trusted)};
+  return {
+      .exists = file_exists,
+      .absent = file_is_absent,
+      .read = read_file,
+      .write = write_file,
+      .append = append_line,
+      .make_folders = make_folders,
+      .user = user_name,
+      .process = [] { return static_cast<std::uint64_t>(::getpid()); },
+      .read_trusted = [trust](const std::string& path) { return read_trusted_file(path, trust); }};
 }
 
 }  // namespace spindle::posix

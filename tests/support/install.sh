@@ -5,7 +5,7 @@
 # shellcheck disable=SC2034
 build_packages=(
   g++ cmake ninja-build pkg-config ccache
-  libmodbus-dev libcli11-dev libfmt-dev libyaml-cpp-dev libexpected-dev nlohmann-json3-dev
+  libmodbus-dev libcli11-dev libfmt-dev libyaml-dev libexpected-dev nlohmann-json3-dev
 )
 # shellcheck disable=SC2034
 test_packages=(

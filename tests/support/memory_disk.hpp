@@ -5,6 +5,7 @@
 #include <string>
 
 #include "spindle/base/disk.hpp"
+#include "spindle/files/read_text.hpp"
 
 namespace spindle::test {
 
@@ -29,7 +30,9 @@ class MemoryDisk {
               return {};
             },
             .user = [] { return std::string("anna"); },
-            .process = [] { return std::uint64_t{4242}; }};
+            .process = [] { return std::uint64_t{4242}; },
+            // Profiles and tools files lie on the real disk, too.
+            .read_trusted = files::read_text_file};
   }
 
   void put(const std::string& path, std::string text) { files_[plain(path)] = std::move(text); }

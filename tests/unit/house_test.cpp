@@ -53,7 +53,7 @@ struct HomeOfHeader {
 
 const std::vector<HomeOfHeader> homes = {
     {"CLI/", {"cli"}},
-    {"yaml-cpp/", {"files"}},
+    {"yaml.h", {"files"}},
     {"nlohmann/", {"report", "files"}},
     {"modbus.h", {"posix"}},
     {"modbus/", {"posix"}},
@@ -437,8 +437,8 @@ TEST_CASE("a file that breaks the law is found") {
        "include/spindle/posix/a.hpp: a public header shows the private posix/wait.hpp"},
       {{"src/commands/a.cpp", "#include <CLI/CLI.hpp>\n"},
        "src/commands/a.cpp: CLI/CLI.hpp is not at home in commands"},
-      {{"src/catalogue/a.cpp", "#include <yaml-cpp/yaml.h>\n"},
-       "src/catalogue/a.cpp: yaml-cpp/yaml.h is not at home in catalogue"},
+      {{"src/catalogue/a.cpp", "#include <yaml.h>\n"},
+       "src/catalogue/a.cpp: yaml.h is not at home in catalogue"},
       {{"src/cli/a.cpp", "#include <nlohmann/json.hpp>\n"},
        "src/cli/a.cpp: nlohmann/json.hpp is not at home in cli"},
       {{"src/link/a.cpp", "#include <modbus/modbus.h>\n"},

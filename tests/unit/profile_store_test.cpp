@@ -181,6 +181,66 @@ TEST_CASE("several faults are all reported, in the order of the file") {
   CHECK(profile.error().hint == "'spindle profile check " + path + "' lists every fault");
 }
 
+TEST_CASE("rules are checked too where other entries could not be read, and find no false faults") {
+  const Folder folder;
+  const std::string path = folder.write(
+      "many.yaml",
+      "format: 1\n"
+      "id: other\n"
+      "title: Many\n"
+      "link: {framing: tcp, max-read: 200}\n"
+      "parameters:\n"
+      "  - {name: a, register: 5, encoding: u17, access: r, title: T, evidence: manual, source: "
+      "m}\n"
+      "  - {name: b, register: 1, encoding: u16, access: r, title: T, evidence: manual, source: "
+      "m}\n"
+      "  - {name: c, register: 1, encoding: u16, access: r, title: T, evidence: manual, source: "
+      "m}\n"
+      "  - {name: d, encoding: u16, access: r, title: T, evidence: manual, source: m}\n"
+      "  - {name: e, register: 0, encoding: u16, access: r, title: T, evidence: manual, source: "
+      "m}\n"
+      "actions:\n"
+      "  - {name: go, register: 9, value: 1, stop: 0, hazard: moves, evidence: manual, source: m, "
+      "confirm: a}\n"
+      "  - {name: to, register: 8, value: 1, hazard: locks, evidence: manual, source: m, confirm: "
+      "x}\n"
+      "  - {name: up, register: 8, value: 1, hazard: locks, evidence: hearsay, source: m}\n"
+      "watch: [a, b]\n"
+      "---\n"
+      "part: simulation\n"
+      "values: {a: 1}\n"
+      "---\n"
+      "part: nonsense\n");
+  const auto findings = shipped().check(path);
+  REQUIRE(findings.has_value());
+  std::vector<std::string> found;
+  for (const Finding& finding : *findings) found.push_back(without_file(finding));
+  CHECK(found ==
+        std::vector<std::string>{
+            "2:5: id 'other' differs from the file name 'many'",
+            "4:32: max-read must be 1 to 125",
+            "6:38: unknown encoding 'u17'; did you mean 'u16'?",
+            "8:25: c shares register 1 with b; write 'overlaps: true' if this is meant",
+            "9:5: key 'register' is missing",
+            "13:92: 'x' is no parameter of this profile; did you mean 'b'?",
+            "14:64: unknown evidence 'hearsay'; known: manual, transcribed, sibling, inferred",
+            "20:7: unknown part 'nonsense'; known: texts, simulation",
+        });
+}
+
+TEST_CASE("a base that is not found hides no fault of the file itself") {
+  const Folder folder;
+  const auto findings = shipped().check(
+      folder.write("mine.yaml",
+                   "format: 1\nid: other\ntitle: Mine\nextends: doga-bn\nlink: {port: 502}\n"
+                   "watch: [event.number]\n"));
+  REQUIRE(findings.has_value());
+  std::vector<std::string> found;
+  for (const Finding& finding : *findings) found.push_back(without_file(finding));
+  CHECK(found == std::vector<std::string>{"2:5: id 'other' differs from the file name 'mine'",
+                                          "4:10: base profile 'doga-bn' is not found"});
+}
+
 // ---- finding profiles ----
 
 TEST_CASE("list() names products, not bases, and the first folder wins") {

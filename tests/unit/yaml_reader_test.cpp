@@ -126,20 +126,72 @@ TEST_CASE("syntax errors are told in our words, at their place") {
       {"a: ]\n", "a '}' or ']' that closes nothing"},
       {"a: \"\\q\"\n", "an unknown escape"},
       {"a: %b\n", "a character that cannot begin a value"},
-      {"a:\n\t- b\n", "a '-' where no list is"},
+      {"a:\n\t- b\n", "a tab in the indentation"},
+      {"a: - b\n", "a '-' where no list is"},
+      {"a: \"x\" y\n", "something behind a finished value"},
+      {"a: b\nc\n", "a line that is neither 'key: value' nor part of a text"},
+      {"a: \"\\xZZ\"\n", "an escape without its digits"},
+      {"a: \"\\ud800\"\n", "an escape that is no character"},
+      {"a: \x01\n", "a character that YAML does not allow"},
+      {"a: @b\n", "a character that cannot begin a value"},
   };
   for (const Row& row : rows) {
-    CAPTURE(row.text);
+    CAPTURE(std::string(row.text));
     const Parsed parsed = parse(row.text);
     REQUIRE(parsed.findings.size() == 1);
+    CAPTURE(parsed.findings[0]);
     CHECK(parsed.findings[0].find("not valid YAML here: ") != std::string::npos);
     CHECK(parsed.findings[0].find(row.finding) != std::string::npos);
   }
 }
 
-TEST_CASE("nesting without end neither crashes nor hangs") {
-  CHECK_FALSE(parse(std::string(100'000, '[')).findings.empty());
-  CHECK_FALSE(parse(std::string(100'000, '{')).findings.empty());
+TEST_CASE("a comma behind a finished value ends the reading") {
+  constexpr const char* stray = "a ',' outside of '[ ]' and '{ }'; quote the text";
+  constexpr const char* closing = "a '}' or ']' that closes nothing";
+  const std::vector<std::pair<std::string, std::string>> rows = {
+      {" ,x]a,x]", "f:1:2: not valid YAML here: "s + stray},
+      {",", "f:1:1: not valid YAML here: "s + stray},
+      {"{\"a\": 1},\n", "f:1:9: not valid YAML here: "s + stray},
+      {"[1, 2],\n[3]\n", "f:1:7: not valid YAML here: "s + stray},
+      {"\"a\",\"b\"\n\"c\",\"d\"\n", "f:1:4: not valid YAML here: "s + stray},
+      {"a: \"b\", c\n", "f:1:7: not valid YAML here: "s + stray},
+      {"[1]]", "f:1:4: not valid YAML here: "s + closing},
+  };
+  for (const auto& [text, finding] : rows) {
+    CAPTURE(text);
+    for (const Documents wanted : {Documents::all, Documents::first}) {
+      CHECK(parse(text, wanted).findings == Texts{finding});
+    }
+  }
+  CHECK(parse("{\"a\": [1, 2,],}\n").findings.empty());
+}
+
+TEST_CASE("no text takes more than a bounded tree") {
+  const auto repeated = [](std::string_view part, std::size_t bytes) {
+    std::string text;
+    while (text.size() + part.size() <= bytes) text += part;
+    return text;
+  };
+  constexpr std::size_t most = std::size_t{1} << 20;
+  for (const std::string_view part :
+       {"[",    "{",        "- ",           "? ",           "[a,",   "{a: ",  "a,",    "- a\n",
+        "[]\n", "---\n",    "&a ",          "!a ",          "*a ",   "\"",    "'",     "|\n",
+        ">\n",  "a: b\n",   "%a\n",         "%TAG !a! b\n", "\n",    " ",     "\t",    "#",
+        ": ",   "\xC2\x85", "\xE2\x80\xA8", "\xEF\xBB\xBF", "a\n\n", "[a]: ", "\"\\\n"}) {
+    CAPTURE(part);
+    const Parsed parsed = parse(repeated(part, most));
+    CHECK(parsed.findings.size() <= 1000);
+    std::size_t nodes = parsed.documents.size();
+    for (const YamlNode& document : parsed.documents) {
+      nodes += document.items.size() + document.entries.size();
+    }
+    CHECK(nodes <= 200'000);
+  }
+  CHECK(parse(repeated("a", most + 1)).findings == Texts{"f:1:1: larger than 1048576 bytes"});
+  CHECK(parse("[" + repeated("a,", 300'000) + "]").findings ==
+        Texts{"f:1:200000: more than 100000 values; this is no file of spindle's"});
+  CHECK(parse("%TAG !a! b\n---\na: 1\n").findings == Texts{"f:1:1: tags are not supported"});
+  CHECK(parse("%YAML 1.2\n---\na: %TAG\n").documents.size() == 0);
 }
 
 TEST_CASE("findings: sorted by place, the same fault once") {

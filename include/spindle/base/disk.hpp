@@ -42,6 +42,9 @@ struct Disk {
   std::function<std::string()> user;
   /// The number by which the system tells this program from all others that run.
   std::function<std::uint64_t()> process;
+  /// A whole text that decides what is written to tools: refuses, beside what read() refuses, a
+  /// file of another user and one that other users can write (see check_trust()).
+  std::function<Result<std::string>(const std::string& path)> read_trusted;
 };
 
 }  // namespace spindle

@@ -36,6 +36,16 @@ std::int64_t highest(Kind kind);
 std::string_view to_text(Kind kind);  ///< "u16", as written in profiles and raw registers
 std::optional<Kind> parse_kind(std::string_view text);
 
+/// What a write may do beyond storing a value.
+enum class Hazard : std::uint8_t {
+  none,
+  moves,    ///< starts or changes a motion
+  locks,    ///< takes the tool away from its operator
+  unclear,  ///< the register's meaning is not certain: it may move or lock
+  erases,   ///< overwrites stored settings
+  link,     ///< erases settings without which the tool may no longer be reached
+};
+
 /// Meaning of one number of an enumeration.
 struct Label {
   std::int64_t number = 0;
@@ -99,12 +109,14 @@ struct Parameter {
   std::string risk = {};  ///< what a change may cost, told before it is written; may be empty
   /// How long a written value may take until it reads back; empty: as `LinkFacts::settle` says.
   std::optional<Duration> settle = std::nullopt;
+  Hazard hazard = Hazard::none;  ///< declared; danger_of() says what counts
 };
 
 /// The bit field with only the names that count while `bits_by` has this value; empty: not known,
 /// so only names that always count.
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value);
 
+std::string_view to_text(Hazard hazard);  ///< "moves", as written in profiles
 std::string_view to_text(Effect effect);  ///< "at-once", as written in profiles
 std::string_view to_text(Evidence evidence);
 std::optional<Evidence> parse_evidence(std::string_view text);

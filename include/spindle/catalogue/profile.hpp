@@ -133,15 +133,6 @@ struct NumberedFacts {
   std::string source;
 };
 
-enum class Hazard : std::uint8_t {
-  none,
-  moves,    ///< starts or changes a motion
-  locks,    ///< takes the tool away from its operator
-  unclear,  ///< the register's meaning is not certain: it may move or lock
-  erases,   ///< overwrites stored settings
-  link,     ///< erases settings without which the tool may no longer be reached
-};
-
 /// What an action does to a product that is run by a command word.
 enum class Motion : std::uint8_t { none, start, stop };
 
@@ -251,7 +242,8 @@ class Profile {
   std::string title;
   std::string maker;
   std::string series;
-  std::string path;  ///< file it came from
+  std::string path;                     ///< file it came from
+  std::vector<std::string> bases = {};  ///< ids of the profiles that it extends, the nearest first
   LinkFacts link;
   std::optional<IdentityFacts> identity;
   std::optional<EventFacts> events;
@@ -295,6 +287,23 @@ class Profile {
   /// by whatever name or number it is asked for.
   [[nodiscard]] Parameter with_secrecy(Parameter parameter) const;
 };
+
+/// What a tool's identity says of a profile that was named for it.
+enum class Judgement : std::uint8_t {
+  fits,           ///< nothing contradicts the profile
+  other_product,  ///< the tool is another product of the same maker and generation
+  later,          ///< its firmware has other registers
+  unknown,        ///< it is no product that the profile knows
+};
+
+/// The one judgement of all verbs. A product that is named by the identity contradicts a profile
+/// that is, or extends, another one of the products that the identity tells apart. Requires a
+/// profile with identity facts.
+Judgement judge(const Profile& profile, const Identity& identity);
+
+/// Why it does not fit, as half a sentence: "the serial number is that of a doga-bmt, not of a
+/// doga-bm". Requires a judgement other than `fits`.
+std::string misfit(const Profile& profile, const Identity& identity);
 
 /// Parses "@holding:2", "@input:3204/i16" (default u16), without any profile. Empty when the text
 /// does not begin with '@'.

@@ -53,6 +53,8 @@ struct Snapshot {
   std::optional<SnapshotIdentity> identity = std::nullopt;
   std::vector<SnapshotEntry> entries = {};  ///< in the order of stored_parameters()
   std::vector<MissingEntry> missing = {};
+  /// What an older version took for settings (see danger_of()); without values, never compared.
+  std::vector<Parameter> dangerous = {};
 
   [[nodiscard]] const SnapshotEntry* find(std::string_view name) const;
   [[nodiscard]] const MissingEntry* find_missing(std::string_view name) const;
@@ -61,7 +63,7 @@ struct Snapshot {
 /// Everything that a backup of such a tool holds, each register once. Where parameters are
 /// numbered: the whole numbered space by register, under its names where it has some, and named
 /// parameters elsewhere that can be written. Otherwise all holding registers that can be set, in
-/// the order of the catalogue. Never the word that commands a motor.
+/// the order of the catalogue. Nothing that danger_of() speaks of.
 std::vector<Parameter> stored_parameters(const Profile& profile);
 
 /// Tells two versions of a profile apart, as far as backups are concerned: 16 hexadecimal digits of
@@ -131,6 +133,7 @@ enum class Skip : std::uint8_t {
   read_only,   ///< it can not be written
   not_cloned,  ///< it belongs to one tool (`clone: never`)
   absent,      ///< the tool has no such register
+  dangerous,   ///< a write to it may do more than store a value
 };
 
 /// Whether a value may be written over one of another or an unknown unit.

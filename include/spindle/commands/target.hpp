@@ -67,8 +67,12 @@ bool names_group(std::string_view text);
 /// Whether a first argument is meant as a target rather than a parameter pattern.
 bool is_target(std::string_view text, const Context& context);
 
-/// Whether a command can do without knowing what the registers mean.
-enum class Need : std::uint8_t { named_registers, raw_registers };
+/// What a command has to know of the registers.
+enum class Need : std::uint8_t {
+  named_registers,  ///< that they are those of the profile
+  stop_word,        ///< the same, but a stop does not ask for the product
+  raw_registers,    ///< nothing
+};
 
 /// The target's profile, or an empty one where none is known before connecting.
 Result<catalogue::Profile> load_profile(const Target& target, const Context& context);
@@ -87,7 +91,8 @@ Result<device::Device> connect_device(
 Result<OpenTool> connect(const Target& target, catalogue::Profile profile, const Context& context);
 
 /// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
-/// other registers than the profile's is refused (`wrong_generation`).
+/// other registers than the profile's (`wrong_generation`), or one that is another product
+/// (`mismatch`), is refused.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Context& context);
 

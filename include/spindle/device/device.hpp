@@ -147,7 +147,8 @@ class Device {
 
   /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
   /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
-  /// 11h is refused): on such a tool only raw registers may be read.
+  /// 11h is refused), and with `mismatch` another product: on such a tool only raw registers may be
+  /// read.
   Result<void> require_known_registers();
 
   /// What the tool said of itself when its registers were last checked: "serial 1021100042,

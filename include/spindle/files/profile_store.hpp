@@ -8,6 +8,7 @@
 #include "spindle/base/error.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/files/finding.hpp"
+#include "spindle/files/read_text.hpp"
 
 namespace spindle::files {
 
@@ -20,10 +21,15 @@ struct ProfileEntry {
   std::string path;
 };
 
+/// Whether a profile is named by its file rather than by its id: it has a '/' or ends in ".yaml".
+bool names_profile_file(std::string_view text);
+
 /// Where profiles are found. The first folder that has ID.yaml wins.
 class ProfileStore {
  public:
-  explicit ProfileStore(std::vector<std::string> folders) : folders_(std::move(folders)) {}
+  /// Every file, bases included, is read by `read`.
+  explicit ProfileStore(std::vector<std::string> folders, ReadText read = read_text_file)
+      : folders_(std::move(folders)), read_(std::move(read)) {}
 
   /// By id, or by path when the text has a '/' or ends in ".yaml". Follows `extends`. Error
   /// `bad_file` (status 3) with the first finding as message and how many there are, or
@@ -57,6 +63,7 @@ class ProfileStore {
 
  private:
   std::vector<std::string> folders_;
+  ReadText read_;
 };
 
 }  // namespace spindle::files

@@ -3,10 +3,12 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
+#include "spindle/files/read_text.hpp"
 
 namespace spindle::files {
 
@@ -14,7 +16,9 @@ namespace spindle::files {
 struct Tool {
   std::string name;
   std::string url;
-  std::string profile = {};                ///< empty: not given
+  /// Empty: not given. A file whose path is relative is meant in the folder of the tools file, and
+  /// stands here with that folder.
+  std::string profile = {};
   std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
   Place url_at = {};
@@ -30,13 +34,16 @@ struct Tools {
   std::optional<Error> left_out = std::nullopt;
 };
 
+/// Whether a word may stand for tools of a tools file: it is a tool's name, or a group's.
+bool may_name_tools(std::string_view word);
+
 /// Strict: unknown and duplicate keys, unknown members of groups and torque units are `bad_file`
 /// with file:line:col.
-Result<Tools> load_tools(const std::string& path);
+Result<Tools> load_tools(const std::string& path, const ReadText& read = read_text_file);
 
 /// The same for who must not be sent away to mend the file first: what can be read of it, with
 /// names that are given twice as often as they are there.
-Tools salvage_tools(const std::string& path);
+Tools salvage_tools(const std::string& path, const ReadText& read = read_text_file);
 
 /// What could be read of a tools file, and everything that load_tools() would refuse in it.
 struct CheckedTools {
@@ -45,6 +52,6 @@ struct CheckedTools {
 };
 
 /// Error only when the file can not be read.
-Result<CheckedTools> check_tools(const std::string& path);
+Result<CheckedTools> check_tools(const std::string& path, const ReadText& read = read_text_file);
 
 }  // namespace spindle::files

@@ -32,8 +32,9 @@ struct ReadLimits {
   /// Areas in which registers that nobody asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
   Neighbours neighbours = Neighbours::contiguous;
-  /// Areas that are said not to exist. What is wanted there is asked for register by register, so
-  /// that no other answer is spoilt and a wrong saying loses nothing.
+  /// Areas that are said not to exist. What is wanted there shares a request with nothing else, so
+  /// that no other answer is spoilt; where it is refused, each register is asked for alone, so that
+  /// a wrong saying loses nothing.
   std::vector<RegisterRange> absent = {};
   /// Reads whose answers would look like a spontaneous frame; never issued.
   std::vector<RegisterRange> forbidden_shapes = {};  // table and count; `first` is ignored

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <string_view>
+
 #include "spindle/base/disk.hpp"
 
 namespace spindle::posix {
 
 /// The machine's own disk. A text is written to a temporary file beside its place, brought to the
-/// disk (fsync) and renamed, and so is the folder.
-Disk local_disk();
+/// disk (fsync) and renamed, and so is the folder. `trusted` names the users, beside root and the
+/// program's own, whose profiles and tools files are read: "anna,1001".
+Disk local_disk(std::string_view trusted = {});
 
 }  // namespace spindle::posix
