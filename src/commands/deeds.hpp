@@ -23,6 +23,9 @@ struct Deed {
 /// "ACTION" or "ACTION=VALUE" (a number or a label). Errors `unknown_name` and `bad_value`.
 Result<Deed> parse_deed(const std::string& text, const catalogue::Profile& profile);
 
+/// The deed as it would be typed: "start", "lock=locked", "select-preset=3".
+std::string words_of(const Deed& deed);
+
 /// The evidence rule: what may move or lock a tool is not sent on the word of another product,
 /// unless it is accepted or the tools file lists it as verified. Error `unverified` says how to
 /// check it.
