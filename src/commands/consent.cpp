@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace spindle::commands {
 
 bool can_ask(const Context& context) {
@@ -11,15 +13,17 @@ bool can_ask(const Context& context) {
 
 namespace {
 
+Error unanswerable(std::string_view what) {
+  return {.code = Errc::not_confirmed,
+          .message = fmt::format("{}: this has to be confirmed", what),
+          .hint = "add --yes when you are sure"};
+}
+
 /// What the user typed; empty: --yes answers.
 Result<std::optional<std::string>> ask(std::string_view what, std::string_view question,
                                        const Context& context) {
   if (context.common.consent == Consent::given) return std::nullopt;
-  if (!can_ask(context)) {
-    return tl::unexpected(Error{.code = Errc::not_confirmed,
-                                .message = fmt::format("{}: this has to be confirmed", what),
-                                .hint = "add --yes when you are sure"});
-  }
+  if (!can_ask(context)) return tl::unexpected(unanswerable(what));
   context.io.err(fmt::format("{}. {} ", what, question));
   const auto answer = context.io.read_line();
   if (answer) return *answer;
@@ -28,9 +32,11 @@ Result<std::optional<std::string>> ask(std::string_view what, std::string_view q
   return "";
 }
 
-Error refused(std::string_view what) {
+/// Without a hint the usual one names the answer to a question.
+Error refused(std::string_view what, std::string hint = {}) {
   return {.code = Errc::not_confirmed,
-          .message = fmt::format("{}: not confirmed, nothing was done", what)};
+          .message = fmt::format("{}: not confirmed, nothing was done", what),
+          .hint = std::move(hint)};
 }
 
 }  // namespace
@@ -47,7 +53,36 @@ Result<void> ask_typed_consent(std::string_view what, std::string_view word,
   const auto answer = ask(what, fmt::format("Type '{}' to go on:", word), context);
   if (!answer) return tl::unexpected(answer.error());
   if (!*answer || **answer == word) return {};
-  return tl::unexpected(refused(what));
+  return tl::unexpected(
+      refused(what, fmt::format("type '{}', or add --yes, when you are sure", word)));
+}
+
+Result<void> require_answer(std::string_view what, const Context& context) {
+  if (context.common.consent == Consent::given || can_ask(context)) return {};
+  return tl::unexpected(unanswerable(what));
+}
+
+Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context& context) {
+  const auto identity = tool.device.identity();
+  tool.device.hang_up();
+  if (auto agreed = ask_consent(what, context); !agreed) return agreed;
+  const Target known = known_target(tool);
+  auto profile = load_profile(known, context);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  auto again = open_tool(known, std::move(*profile), Need::named_registers, context);
+  if (!again) return tl::unexpected(std::move(again.error()));
+  const auto now = again->device.identity();
+  if (identity && now && identity->serial != now->serial) {
+    return tl::unexpected(tool.target.blamed(
+        {.code = Errc::mismatch,
+         .message = fmt::format("another tool answers now: serial {}, and it was {} before the "
+                                "question",
+                                now->serial, identity->serial),
+         .hint = "nothing was done"}));
+  }
+  again->target = tool.target;
+  tool = std::move(*again);
+  return {};
 }
 
 }  // namespace spindle::commands

@@ -69,6 +69,55 @@ device::ActionResult in_words_of_actions(device::StopResult result) {
   return device::ActionResult::not_confirmed;
 }
 
+/// What a value does to who works with the tool; empty where that is not known.
+std::string effect_of(const Deed& deed) {
+  for (const catalogue::Label& effect : deed.action.effects) {
+    if (effect.number == deed.value) return effect.text;
+  }
+  switch (deed.action.hazard) {
+    case Hazard::moves:
+      return "the tool may turn";
+    case Hazard::locks:
+      return "takes the tool from its operator, or gives it back";
+    default:
+      return {};
+  }
+}
+
+void add_once(std::string text, std::vector<std::string>& to) {
+  const bool is_new = !text.empty() && std::find(to.begin(), to.end(), text) == to.end();
+  if (is_new) to.push_back(std::move(text));
+}
+
+/// What is asked: each deed once, to however many tools it is done.
+class Question {
+ public:
+  void add(const Deed& deed) {
+    if (deed.action.hazard == Hazard::link) {
+      dangerous_.emplace(deed.action.name, deed.action.note);
+      return;
+    }
+    add_once(words_of(deed), deeds_);
+    add_once(effect_of(deed), effects_);
+  }
+
+  Result<void> ask(const std::string& tools, const Context& context) const {
+    for (const auto& [name, note] : dangerous_) {
+      const std::string what = fmt::format("{} on {}: {}", name, tools, note);
+      if (auto given = ask_typed_consent(what, name, context); !given) return given;
+    }
+    if (deeds_.empty()) return {};
+    std::string what = fmt::format("{} on {}", fmt::join(deeds_, ", "), tools);
+    if (!effects_.empty()) what += fmt::format(": {}", fmt::join(effects_, "; "));
+    return ask_consent(what, context);
+  }
+
+ private:
+  std::vector<std::string> deeds_ = {};
+  std::vector<std::string> effects_ = {};
+  std::map<std::string, std::string> dangerous_ = {};  ///< what a deed may cost, by its name
+};
+
 const std::array<Column, 3> columns = {
     {{"ACTION", "action"}, {"VALUE", "value", report::Align::right}, {"RESULT", "result"}}};
 
@@ -108,6 +157,17 @@ Result<Deed> parse_deed(const std::string& text, const Profile& profile) {
       });
 }
 
+std::string words_of(const Deed& deed) {
+  const Action& action = deed.action;
+  const bool fixed = action.value || action.motion != catalogue::Motion::none;
+  if (fixed || deed.secrecy == catalogue::Secrecy::secret) return action.name;
+  const auto label =
+      std::find_if(action.labels.begin(), action.labels.end(),
+                   [&](const catalogue::Label& one) { return one.number == deed.value; });
+  const bool labelled = label != action.labels.end();
+  return fmt::format("{}={}", action.name, labelled ? label->text : std::to_string(deed.value));
+}
+
 Result<void> check_evidence(const Action& action, const Target& target, Acceptance acceptance) {
   const bool moves_or_locks = action.hazard == Hazard::moves || action.hazard == Hazard::locks ||
                               action.hazard == Hazard::unclear;
@@ -129,35 +189,15 @@ Result<void> check_evidence(const Action& action, const Target& target, Acceptan
 
 Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
                              const Context& context) {
-  std::vector<std::string> hazardous;
+  Question question;
   for (const Deed& deed : deeds) {
-    if (deed.action.hazard == Hazard::link) {
-      const std::string what =
-          fmt::format("{} on {}: {}", deed.action.name, target.shown, deed.action.note);
-      if (auto given = ask_typed_consent(what, deed.action.name, context); !given) return given;
-    } else if (deed.action.hazard != Hazard::none || target.reach == Reach::everybody) {
-      hazardous.push_back(deed.action.name);
-    }
+    const bool is_asked = deed.action.hazard != Hazard::none || target.reach == Reach::everybody;
+    if (is_asked) question.add(deed);
   }
-  if (hazardous.empty()) return {};
-  return ask_consent(fmt::format("{} on {}", fmt::join(hazardous, ", "), target.shown), context);
+  return question.ask(target.shown, context);
 }
 
 namespace {
-
-/// What is asked of a group: each deed once, to whatever tool it is done.
-struct GroupQuestion {
-  std::vector<std::string> ordinary = {};
-  std::map<std::string, std::string> dangerous = {};  ///< what a deed may cost, by its name
-
-  void add(const Action& action) {
-    if (action.hazard == Hazard::link) {
-      dangerous.emplace(action.name, action.note);
-    } else if (std::find(ordinary.begin(), ordinary.end(), action.name) == ordinary.end()) {
-      ordinary.push_back(action.name);
-    }
-  }
-};
 
 /// Whether the question itself tells what the deed may cost.
 bool is_told_by_question(const Deed& deed, const Context& context) {
@@ -169,21 +209,16 @@ bool is_told_by_question(const Deed& deed, const Context& context) {
 Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
                            std::size_t of, const Context& context) {
   std::vector<std::string> names;
-  GroupQuestion question;
+  Question question;
   for (const Target& target : targets) {
     names.push_back(target.shown);
     for (const Deed& deed : deeds.at(target.shown)) {
       if (!is_told_by_question(deed, context)) tell_notes(deed, target, context);
-      question.add(deed.action);
+      question.add(deed);
     }
   }
   const std::string tools = tools_in_words(names, of);
-  for (const auto& [name, note] : question.dangerous) {
-    const std::string what = fmt::format("{} on {}: {}", name, tools, note);
-    if (auto given = ask_typed_consent(what, name, context); !given) return given;
-  }
-  if (question.ordinary.empty()) return {};
-  return ask_consent(fmt::format("{} on {}", fmt::join(question.ordinary, ", "), tools), context);
+  return question.ask(tools, context);
 }
 
 std::string_view to_text(device::ActionResult result) {

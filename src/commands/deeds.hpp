@@ -24,6 +24,9 @@ struct Deed {
 /// `usage` for an action that begins a motion without an end.
 Result<Deed> parse_deed(const std::string& text, const catalogue::Profile& profile);
 
+/// The deed as it would be typed: "start", "lock=locked", "select-preset=3".
+std::string words_of(const Deed& deed);
+
 /// The evidence rule: what may move or lock a tool is not sent on the word of another product,
 /// unless it is accepted or the tools file lists it as verified. Error `unverified` says how to
 /// check it.

@@ -1,12 +1,41 @@
 #include "guarded_run.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
 #include "records.hpp"
 
 namespace spindle::commands {
+
+namespace {
+
+std::string words_of(const std::vector<Left>& left) {
+  std::vector<std::string> words;
+  for (const auto& [name, set, before, trouble] : left) {
+    words.push_back(fmt::format("{}: set to {}, before it {}{}", name, set,
+                                before.empty() ? "is not known" : "was " + before,
+                                trouble.empty() ? "" : fmt::format(" ({})", trouble)));
+  }
+  return fmt::format("{}", fmt::join(words, "; "));
+}
+
+/// By name, what each was before.
+report::Cell cell_of(const std::vector<Left>& left) {
+  if (left.empty()) return {};
+  report::Pairs pairs;
+  for (const Left& one : left) pairs.emplace_back(one.name, one.before);
+  return pairs;
+}
+
+}  // namespace
+
+Error with_left(Error error, const std::vector<Left>& left) {
+  if (left.empty()) return error;
+  error.message = fmt::format("{}; not set back: {}", message_of(error), words_of(left));
+  return error;
+}
 
 std::string log_word(std::string_view result, const device::StopReport& stop) {
   if (stop.result == device::StopResult::unconfirmed) return "stop-not-confirmed";
@@ -68,10 +97,19 @@ Result<void> GuardedRun::tell_errors() {
   return told;
 }
 
+/// A tool that is not as it was found is no talk that --quiet leaves out.
+void GuardedRun::tell_left() const {
+  if (left_.empty()) return;
+  context_->io.err(
+      fmt::format("spindle: {}: not set back: {}\n", tool_->target.shown, words_of(left_)));
+}
+
 Result<void> GuardedRun::summarise(const device::StopReport& stop, const RunEnd& run_end) {
   const bool stopped = stop.result == device::StopResult::confirmed;
   return context_->renderer.summary(
-      summary_record({{"result", text_or_null(run_end.result)}, {"stop_confirmed", stopped}},
+      summary_record({{"result", text_or_null(run_end.result)},
+                      {"stop_confirmed", stopped},
+                      {"left", cell_of(left_)}},
                      outcome_.status(), tool_->target.shown, context_->clock),
       fmt::format("{} {}", run_end.subject,
                   stopped ? "stands still" : "may still run: the stop could not be confirmed"));
@@ -82,6 +120,7 @@ Result<Outcome> GuardedRun::end(Listing& listing, const device::StopReport& stop
   if (stop.result == device::StopResult::unconfirmed) fail(stop);
   const auto listed = listing.end();
   const auto told = tell_errors();
+  tell_left();
   if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
   if (!listed || !told) return outcome_;
   return summarise(stop, run_end).map([&] { return outcome_; });

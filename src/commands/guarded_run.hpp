@@ -19,6 +19,17 @@ struct RunEnd {
   std::string subject;  ///< begins the sentence on whether it stands still: "OK; the tool"
 };
 
+/// Something that a run set and that was not set back.
+struct Left {
+  std::string name;     ///< of the parameter or action
+  std::string set;      ///< what the run set it to
+  std::string before;   ///< what it was; empty: not known
+  std::string trouble;  ///< why it was not set back; may be empty
+};
+
+/// An error that ended a run before its start, with what was left behind.
+Error with_left(Error error, const std::vector<Left>& left);
+
 /// What the change log says of a run. That its stop could not be confirmed matters more than its
 /// result.
 std::string log_word(std::string_view result, const device::StopReport& stop);
@@ -56,6 +67,9 @@ class GuardedRun {
   /// What ended the following of a run. That nobody reads any more is no failure of the run.
   void fail_following(const Error& error);
 
+  /// Remembers what is left behind, to be told at the end.
+  void leave(std::vector<Left> left) { left_ = std::move(left); }
+
   [[nodiscard]] Outcome& outcome() { return outcome_; }
 
   /// Ends the list of what happened; then come the errors and the summary.
@@ -68,6 +82,7 @@ class GuardedRun {
   void fail(const device::StopReport& unconfirmed);
   /// Each on its own: they reach people even where nobody reads the records any more.
   Result<void> tell_errors();
+  void tell_left() const;
   Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
   OpenTool* tool_;
@@ -76,6 +91,7 @@ class GuardedRun {
   CalmLine calm_line_;
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
+  std::vector<Left> left_ = {};
 };
 
 }  // namespace spindle::commands

@@ -1,11 +1,14 @@
 #include "motor_setup.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "group.hpp"
 #include "guarded_run.hpp"
+#include "spindle/catalogue/value.hpp"
 
 namespace spindle::commands {
 
@@ -13,9 +16,34 @@ using catalogue::Parameter;
 using catalogue::RunFacts;
 using catalogue::Value;
 
+namespace {
+
+/// A neighbour that is switched off must not keep the user waiting.
+constexpr Duration neighbours_answer = std::chrono::milliseconds(150);
+
+/// The half of a 32-bit parameter that holds all of its value, as long as that is small: it is
+/// written by function 06, which the children of a group do not follow. A whole pair would be
+/// written into them as well.
+Parameter low_half(Parameter parameter) {
+  parameter.address = {static_cast<std::uint16_t>(parameter.address.value + 1)};
+  parameter.encoding.kind = catalogue::Kind::u16;
+  return parameter;
+}
+
+/// Whether the upper half of a pair is 0 with this value.
+bool is_small(const Parameter& parameter, const Value& value) {
+  const auto registers = catalogue::encode(parameter, value.number);
+  return registers && registers->size() == 2 && registers->front() == 0;
+}
+
+}  // namespace
+
+Result<void> MotorSetup::look() {
+  return read_settings().and_then([&] { return check_ready(); });
+}
+
 Result<void> MotorSetup::prepare() {
-  return read_settings()
-      .and_then([&] { return check_ready(); })
+  return look()
       .and_then([&] { return clear_word(); })
       .and_then([&] { return write_settings(); })
       .and_then([&] { return set_watchdog(); });
@@ -87,24 +115,26 @@ Result<void> MotorSetup::check_analog() const {
 /// A word that runs at speed 0 would start the motor when its speed is set.
 Result<void> MotorSetup::clear_word() {
   if ((found_.word & facts().starting) == 0) return {};
+  cleared_word_ = plan_->motor.runs(found_.word, found_.mode);
   return plan_->motor.command(tool_->device, facts().decelerate_always);
 }
 
-Result<void> MotorSetup::write_one(work::Changer& changer, const Parameter& parameter,
-                                   const Value& value) {
+Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& value) {
   const auto before = tool_->device.read_each({parameter}, device::Limits::skip);
   if (!before) return tl::unexpected(before.error());
   const device::Reading& reading = before->front();
   if (!reading.value) return tl::unexpected(reading.value.error());
   if (*reading.value == value) return {};
-  auto written = changer.make(parameter, *reading.value, value);
+  const bool halved =
+      !facts().group.empty() && is_small(parameter, *reading.value) && is_small(parameter, value);
+  auto written = changer_.make(halved ? low_half(parameter) : parameter, *reading.value, value);
   if (written.done()) return {};
   return tl::unexpected(std::move(*written.error));
 }
 
 Result<void> MotorSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
-    if (auto written = write_one(settings_, parameter, value); !written) {
+    if (auto written = write_one(parameter, value); !written) {
       return tl::unexpected(of_write(parameter.name, std::move(written.error())));
     }
     const bool is_stop =
@@ -120,7 +150,7 @@ Result<void> MotorSetup::write_settings() {
 Result<void> MotorSetup::set_watchdog() {
   const bool is_off = !found_.watchdog || found_.watchdog->number == Decimal(0);
   if (plan_->watchdog) {
-    return write_one(watchdog_change_, *plan_->watchdog_parameter, *plan_->watchdog);
+    return write_one(*plan_->watchdog_parameter, *plan_->watchdog);
   }
   if (is_off && plan_->watchdog_parameter) {
     context_->renderer.note(
@@ -131,21 +161,111 @@ Result<void> MotorSetup::set_watchdog() {
   return {};
 }
 
-void MotorSetup::restore_watchdog() {
-  if (watchdog_change_.sent().empty()) return;
+std::vector<Left> MotorSetup::put_back() {
+  std::vector<Left> left;
+  add_cleared_word(left);
+  if (changer_.sent().empty()) return left;
   if (context_->calm.stay_awake) context_->calm.stay_awake();
   device::Rollback rollback(
       tool_->device, [this](Duration patience) { return calm_line_.connect(patience); },
       context_->calm.clock);
-  const auto report = watchdog_change_.put_back(rollback).front();
-  const bool as_before =
-      report.result == device::PutBack::done || report.result == device::PutBack::kept;
-  if (as_before) return;
-  context_->renderer.note(
-      fmt::format("{}: {} could not be set back to {}: {}; the driver stops with an alarm when "
-                  "nobody asks it",
-                  tool_->target.shown, report.write.parameter.name, report.write.before.to_string(),
-                  report.trouble));
+  for (const device::PutBackReport& report : changer_.put_back(rollback)) {
+    const bool as_before =
+        report.result == device::PutBack::done || report.result == device::PutBack::kept;
+    if (!as_before) left.push_back(left_of(report.write, report.trouble));
+  }
+  return left;
+}
+
+std::vector<Left> MotorSetup::left() const {
+  std::vector<Left> left;
+  add_cleared_word(left);
+  for (const device::TriedWrite& write : changer_.sent()) {
+    left.push_back(left_of(write, "the motor may still run"));
+  }
+  return left;
+}
+
+Left MotorSetup::left_of(const device::TriedWrite& write, std::string trouble) const {
+  const Parameter& parameter = write.parameter;
+  const std::string unit = parameter.unit.empty() ? "" : " " + parameter.unit;
+  if (parameter.name == facts().watchdog) {
+    trouble += "; the driver stops with an alarm when nobody asks it";
+  }
+  return {.name = parameter.name,
+          .set = write.tried.to_string() + unit,
+          .before = write.before.to_string() + unit,
+          .trouble = std::move(trouble)};
+}
+
+/// A run bit is never set again: it would start the motor as soon as a speed is set.
+void MotorSetup::add_cleared_word(std::vector<Left>& left) const {
+  if (!cleared_word_) return;
+  left.push_back({.name = facts().command,
+                  .set = "no run bit",
+                  .before = fmt::format("{:02X}h", found_.word),
+                  .trouble = "its run bit would start the motor when a speed is set"});
+}
+
+// ---- groups ----
+
+Result<std::string> MotorSetup::group_in_words() {
+  if (facts().group.empty()) return std::string();
+  const auto parameter = tool_->profile->find(facts().group);
+  if (!parameter) return tl::unexpected(parameter.error());
+  device::Device& device = tool_->device;
+  link::Session& session = device.session();
+  const auto parent_of_present = [&]() -> Result<std::optional<std::int64_t>> {
+    const auto readings = device.read_each({*parameter}, device::Limits::skip);
+    if (!readings) return tl::unexpected(readings.error());
+    const auto& value = readings->front().value;
+    if (!value) return std::nullopt;
+    return value->number.mantissa();
+  };
+  const auto own_parent = parent_of_present();
+  if (!own_parent) return tl::unexpected(own_parent.error());
+  const modbus::UnitId unit = session.options().unit;
+  const Duration usual = session.options().answer_timeout;
+  std::vector<std::string> children;
+  if (*own_parent == unit.value) children.emplace_back("others");
+  session.set_answer_timeout(std::min(usual, neighbours_answer));
+  device.set_retries(0);
+  for (const Target& neighbour : neighbours()) {
+    session.set_unit(*neighbour.endpoint.unit);
+    const auto parent = parent_of_present();
+    if (parent && *parent == unit.value) children.push_back(neighbour.shown);
+  }
+  session.set_unit(unit);
+  session.set_answer_timeout(usual);
+  device.set_retries(context_->common.retries.value_or(tool_->profile->link.retries));
+  if (!children.empty()) {
+    return fmt::format(
+        "{} is the parent of a group ({}), of which only its own motor is set and "
+        "started",
+        tool_->target.shown, fmt::join(children, ", "));
+  }
+  const bool is_child = *own_parent && **own_parent > 0 && **own_parent != unit.value;
+  if (!is_child) return std::string();
+  return fmt::format("{} belongs to the group of unit {}, which is not started with it",
+                     tool_->target.shown, **own_parent);
+}
+
+/// The other drivers of the tools file on the same line.
+std::vector<Target> MotorSetup::neighbours() const {
+  std::vector<Target> found;
+  const std::string line = shared_line(tool_->target.endpoint);
+  if (line.empty()) return found;
+  for (const files::Tool& tool : context_->tools.tools) {
+    for (Target& other : resolve_each_target({tool.name}, *context_).targets) {
+      const auto& unit = other.endpoint.unit;
+      const bool is_other =
+          unit && unit->value != 0 && unit->value != tool_->device.session().options().unit.value;
+      const bool fits =
+          is_other && other.profile == tool_->profile->id && shared_line(other.endpoint) == line;
+      if (fits) found.push_back(std::move(other));
+    }
+  }
+  return found;
 }
 
 }  // namespace spindle::commands

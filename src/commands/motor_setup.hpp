@@ -2,9 +2,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "calm_line.hpp"
 #include "change_log.hpp"
+#include "guarded_run.hpp"
 #include "motor_plan.hpp"
 #include "spindle/device/rollback.hpp"
 
@@ -18,17 +21,26 @@ class MotorSetup {
       : plan_(&plan),
         tool_(&tool),
         context_(&context),
-        settings_(tool.device, log),
-        watchdog_change_(tool.device, log),
+        changer_(tool.device, log),
         calm_line_(tool, context) {}
 
-  /// Reads what the run depends on, and checks that the motor may be started; then writes the
-  /// operation data and the watchdog. The motor does not turn.
+  /// Reads what the run depends on, and checks that the motor may be started. Only reads.
+  Result<void> look();
+
+  /// What a group of drivers means for the run, as far as this driver and those of the tools file
+  /// on its line tell it; empty where it belongs to none. Only reads.
+  Result<std::string> group_in_words();
+
+  /// Looks, and then writes the operation data and the watchdog: by function 06, which the drivers
+  /// of a group do not hear. The motor does not turn.
   Result<void> prepare();
 
-  /// Of a motor that stands still, also after prepare() failed. Not ended by an interrupt, and
-  /// reopens a lost link.
-  void restore_watchdog();
+  /// Of a motor that stands still, also after prepare() failed: sets back what was written. Not
+  /// ended by an interrupt, and reopens a lost link. Returns what could not be set back.
+  std::vector<Left> put_back();
+
+  /// What was written and not set back, of a motor that may still run.
+  [[nodiscard]] std::vector<Left> left() const;
 
   /// By which the words of the run are chosen.
   [[nodiscard]] std::int64_t input_mode() const { return found_.mode; }
@@ -54,18 +66,20 @@ class MotorSetup {
   Result<void> check_ready();
   Result<void> check_analog() const;
   Result<void> clear_word();
-  Result<void> write_one(work::Changer& changer, const catalogue::Parameter& parameter,
-                         const catalogue::Value& value);
+  Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);
   Result<void> write_settings();
   Result<void> set_watchdog();
+  [[nodiscard]] std::vector<Target> neighbours() const;
+  [[nodiscard]] Left left_of(const device::TriedWrite& write, std::string trouble) const;
+  void add_cleared_word(std::vector<Left>& left) const;
 
   const MotorPlan* plan_;
   OpenTool* tool_;
   Context* context_;
-  work::Changer settings_;
-  work::Changer watchdog_change_;  ///< to be taken back
+  work::Changer changer_;
   CalmLine calm_line_;
   Found found_ = {};
+  bool cleared_word_ = false;  ///< it had a run bit, which stays cleared
 };
 
 }  // namespace spindle::commands

@@ -11,6 +11,7 @@
 #include "listing.hpp"
 #include "motor_records.hpp"
 #include "motor_setup.hpp"
+#include "spindle/base/duration.hpp"
 #include "spindle/device/motor_follower.hpp"
 
 namespace spindle::commands {
@@ -41,23 +42,26 @@ class MotorRun {
         guarded_(tool, context),
         log_(change_log("remote-start", tool, context)),
         setup_(plan, tool, context, log_),
-        stopper_(plan.motor, options.stop.value_or(catalogue::StopMode::decelerate)) {}
+        stopper_(plan.motor, options.stop.value_or(catalogue::StopMode::decelerate)),
+        tables_(context.profiles.load_code_tables(tool.profile->path)
+                    .value_or(catalogue::CodeTables())) {}
 
   Result<Outcome> run() {
     if (auto ready = setup_.prepare(); !ready) {
-      setup_.restore_watchdog();
-      return tl::unexpected(std::move(ready.error()));
+      return tl::unexpected(with_left(std::move(ready.error()), setup_.put_back()));
     }
     const std::uint16_t word = start_word();
     stopper_.started(word, setup_.input_mode(), setup_.stopping());
+    listing_.emplace(*context_, motor_columns(Tools::one));
     started_ = log_.begin({.name = "start", .new_value = Decimal(word)});
-    const auto [followed, stop] = guarded_.run(
+    auto [followed, stop] = guarded_.run(
         motion(word), [this] { return limit_run(); },
         [this](const device::MotorFollowOptions& limits) {
-          return device::follow_motor(tool_->device, plan_->motor, stopper_, limits, news_);
+          return device::follow_motor(tool_->device, plan_->motor, stopper_, limits);
         });
-    note_stop(stop);
-    if (stop.result == device::StopResult::confirmed) setup_.restore_watchdog();
+    const bool stands = stop.result == device::StopResult::confirmed;
+    if (stands) look_back(followed);
+    guarded_.leave(stands ? setup_.put_back() : setup_.left());
     return report(followed, stop);
   }
 
@@ -93,33 +97,45 @@ class MotorRun {
       if (read) guarded_.show_running(elapsed, fmt::format(", {} r/min", state.feedback_speed));
       return read;
     };
+    following.hear = [this](const device::MotorNews& news) { tell(news); };
     if (options_->limit) following.deadline = context_->clock.now() + *options_->limit;
     return following;
   }
 
-  /// A stop that was confirmed is the end of what the motor did.
-  void note_stop(const device::StopReport& stop) {
-    const bool stopped_already = std::any_of(
-        news_.begin(), news_.end(),
-        [](const device::MotorNews& news) { return news.event == device::MotorEvent::stopped; });
-    if (stop.result != device::StopResult::confirmed || news_.empty() || stopped_already) return;
-    device::MotorState state;
-    if (const auto now = plan_->motor.look(tool_->device)) state = *now;
-    news_.push_back({device::MotorEvent::stopped, state, context_->clock.wall()});
+  void tell(const device::MotorNews& news) {
+    news_.push_back(news);
+    listing_->add(motor_record(news, tool_->target, tables_));
+  }
+
+  [[nodiscard]] bool has_told(device::MotorEvent event) const {
+    return std::any_of(news_.begin(), news_.end(),
+                       [&](const device::MotorNews& news) { return news.event == event; });
+  }
+
+  /// Behind a confirmed stop. An alarm may have ended the run where nobody looked: by the driver's
+  /// own watchdog while this program was kept from asking it.
+  void look_back(Result<MotorEnding>& followed) {
+    auto state = plan_->motor.look(tool_->device);
+    if (!state) state = plan_->motor.look(tool_->device);
+    if (!state) {
+      if (followed == MotorEnding::elapsed) followed = tl::unexpected(std::move(state.error()));
+      state = device::MotorState();
+    }
+    const WallTime now = context_->clock.wall();
+    if (state->alarm != 0) {
+      if (!has_told(device::MotorEvent::alarm)) tell({device::MotorEvent::alarm, *state, now});
+      if (followed) followed = MotorEnding::alarm;
+    }
+    if (!news_.empty() && !has_told(device::MotorEvent::stopped)) {
+      tell({device::MotorEvent::stopped, *state, now});
+    }
   }
 
   Result<Outcome> report(const Result<MotorEnding>& followed, const device::StopReport& stop) {
-    const auto tables = context_->profiles.load_code_tables(tool_->profile->path);
-    const catalogue::CodeTables known = tables.value_or(catalogue::CodeTables());
-    const auto columns = motor_columns(Tools::one);
-    Listing listing(*context_, columns);
-    for (const device::MotorNews& news : news_) {
-      listing.add(motor_record(news, tool_->target, known));
-    }
     log_run(followed, stop);
-    judge(followed, known);
+    judge(followed);
     const std::string_view result = result_of(followed);
-    return guarded_.end(listing, stop,
+    return guarded_.end(*listing_, stop,
                         {.result = std::string(result),
                          .subject = result == "ran" ? "ran; the motor" : "the motor"});
   }
@@ -130,7 +146,7 @@ class MotorRun {
                         .result = log_word(result_of(followed), stop)});
   }
 
-  void judge(const Result<MotorEnding>& followed, const catalogue::CodeTables& tables) {
+  void judge(const Result<MotorEnding>& followed) {
     if (!followed) {
       guarded_.fail_following(followed.error());
       return;
@@ -140,8 +156,7 @@ class MotorRun {
         guarded_.outcome().succeed();
         return;
       case MotorEnding::alarm:
-        guarded_.fail(not_ready(tool_->target,
-                                fmt::format("alarm {} ended the run", alarm_words(tables)),
+        guarded_.fail(not_ready(tool_->target, fmt::format("alarm {} ended the run", alarm_words()),
                                 "'spindle alarms' shows what helps"));
         return;
       case MotorEnding::stopped:
@@ -169,12 +184,12 @@ class MotorRun {
     }
   }
 
-  [[nodiscard]] std::string alarm_words(const catalogue::CodeTables& tables) const {
+  [[nodiscard]] std::string alarm_words() const {
     std::int64_t code = 0;
     for (const device::MotorNews& news : news_) {
       if (news.event == device::MotorEvent::alarm) code = news.state.alarm;
     }
-    return code_words(code, tables.error);
+    return code_words(code, tables_.error);
   }
 
   static std::string_view result_of(const Result<MotorEnding>& followed) {
@@ -203,8 +218,36 @@ class MotorRun {
   std::string started_ = {};  ///< the record that the start was begun
   MotorSetup setup_;
   device::MotorStopper stopper_;
+  catalogue::CodeTables tables_;
+  std::optional<Listing> listing_ = std::nullopt;  ///< from just before the start
   std::vector<device::MotorNews> news_ = {};
 };
+
+/// As far as it is known before the driver is asked.
+std::string run_in_words(const MotorPlan& plan, const RemoteStartOptions& options,
+                         const Target& target) {
+  const std::string limit = options.limit ? fmt::format("for {}", spindle::to_text(*options.limit))
+                                          : std::string("until it is stopped");
+  return fmt::format("run the motor of {} at {} r/min {} {}: the motor will turn", target.shown,
+                     plan.speed(), words_of(options.direction_of_motor), limit);
+}
+
+/// Asks with what the driver itself says; what would keep it from running is told first.
+Result<void> ask_to_run(const MotorPlan& plan, const RemoteStartOptions& options, OpenTool& tool,
+                        Context& context) {
+  work::ChangeLog log = change_log("remote-start", tool, context);
+  MotorSetup setup(plan, tool, context, log);
+  const bool agreed = context.common.consent == Consent::given;
+  const auto group =
+      (agreed ? Result<void>() : setup.look()).and_then([&] { return setup.group_in_words(); });
+  if (!group) return tl::unexpected(group.error());
+  if (agreed) {
+    if (!group->empty()) context.renderer.note(*group);
+    return {};
+  }
+  const std::string what = run_in_words(plan, options, tool.target);
+  return ask_away_from(tool, group->empty() ? what : fmt::format("{}; {}", what, *group), context);
+}
 
 }  // namespace
 
@@ -212,13 +255,17 @@ Result<Outcome> run_motor(const RemoteStartOptions& options, const Target& targe
                           Context& context) {
   auto opened = open_prepared(target, Need::named_registers, context, [&](const Profile& profile) {
     return plan_motor(options, profile, target).and_then([&](MotorPlan plan) {
-      const std::string what = fmt::format("run the motor of {} at {} r/min {}", target.shown,
-                                           plan.speed(), words_of(options.direction_of_motor));
-      return ask_consent(what, context).map([&] { return std::move(plan); });
+      return require_answer(run_in_words(plan, options, target), context).map([&] {
+        return std::move(plan);
+      });
     });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  return MotorRun(options, opened->prepared, opened->tool, context).run();
+  auto& [tool, plan] = *opened;
+  if (auto agreed = ask_to_run(plan, options, tool, context); !agreed) {
+    return tl::unexpected(std::move(agreed.error()));
+  }
+  return MotorRun(options, plan, tool, context).run();
 }
 
 }  // namespace spindle::commands

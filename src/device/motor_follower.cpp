@@ -2,25 +2,45 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <optional>
+#include <utility>
 
 namespace spindle::device {
 namespace {
 
 /// How long a driver may take to begin to run.
 constexpr Duration start_grace = std::chrono::milliseconds(1000);
+/// A motor runs: one lost answer is forgiven, however often the user lets reads be repeated.
+constexpr unsigned retries_while_running = 1;
+/// Answer timeouts that a look takes whose first answer is lost: that one, the silence behind it,
+/// the proof of the line, and the repetition.
+constexpr int timeouts_of_lost_look = 4;
 
 class Follower {
  public:
   Follower(Device& device, const Motor& motor, MotorStopper& stopper,
-           const MotorFollowOptions& options, std::vector<MotorNews>& news)
-      : device_(&device), motor_(&motor), stopper_(&stopper), options_(&options), news_(&news) {}
+           const MotorFollowOptions& options)
+      : device_(&device),
+        motor_(&motor),
+        stopper_(&stopper),
+        options_(&options),
+        answer_timeout_(device.session().options().answer_timeout) {}
 
   Result<MotorEnding> follow() {
     const Clock& clock = device_->session().clock();
     const TimePoint began = clock.now();
+    device_->set_retries(retries_while_running);
+    std::optional<Error> last_silence;
     while (clock.now() < options_->deadline) {
+      const bool nearly_over = limit_look();
       const auto state = motor_->look(*device_);
+      const bool silent = !state && state.error().code == Errc::no_answer;
+      if (silent && nearly_over) {
+        last_silence = state.error();
+        continue;
+      }
       if (!state) return tl::unexpected(state.error());
+      seen_ = true;
       note(*state);
       if (const auto ending = judge(*state, clock.now() - began)) return *ending;
       if (options_->progress) {
@@ -30,13 +50,26 @@ class Follower {
       }
       if (auto paused = pause(); !paused) return tl::unexpected(std::move(paused.error()));
     }
+    if (!seen_ && last_silence) return tl::unexpected(std::move(*last_silence));
     return has_run_ ? MotorEnding::elapsed : MotorEnding::ignored;
   }
 
  private:
+  /// Lets no look last much longer than the time allowed; true where it is too late to repeat one.
+  bool limit_look() {
+    const Duration left = options_->deadline - device_->session().clock().now();
+    const Duration usual = device_->profile().link.answer;
+    const Duration timeout =
+        std::min(answer_timeout_, std::max(left / timeouts_of_lost_look, usual));
+    device_->session().set_answer_timeout(timeout);
+    const bool nearly_over = left < timeouts_of_lost_look * timeout;
+    if (nearly_over) device_->set_retries(0);
+    return nearly_over;
+  }
+
   void note(const MotorState& state) {
     for (const MotorEvent event : events_between(before_, state)) {
-      news_->push_back({event, state, device_->session().clock().wall()});
+      if (options_->hear) options_->hear({event, state, device_->session().clock().wall()});
     }
     before_ = state;
     if (!state.running) return;
@@ -62,16 +95,17 @@ class Follower {
   const Motor* motor_;
   MotorStopper* stopper_;
   const MotorFollowOptions* options_;
-  std::vector<MotorNews>* news_;
+  Duration answer_timeout_;  ///< the user's or the profile's
   MotorState before_ = {};
+  bool seen_ = false;  ///< the driver has answered
   bool has_run_ = false;
 };
 
 }  // namespace
 
 Result<MotorEnding> follow_motor(Device& device, const Motor& motor, MotorStopper& stopper,
-                                 const MotorFollowOptions& options, std::vector<MotorNews>& news) {
-  return Follower(device, motor, stopper, options, news).follow();
+                                 const MotorFollowOptions& options) {
+  return Follower(device, motor, stopper, options).follow();
 }
 
 }  // namespace spindle::device

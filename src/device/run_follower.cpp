@@ -24,10 +24,12 @@ bool is_result(std::optional<EventKind> kind) {
 
 }  // namespace
 
-RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& clock)
+RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& clock,
+                         HearEvent hear)
     : device_(&device),
       start_(&start),
       clock_(&clock),
+      hear_(std::move(hear)),
       layout_(device.profile()),
       answer_timeout_(device.session().options().answer_timeout) {}
 
@@ -45,8 +47,7 @@ Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
   device_->set_retries(retries_while_running);
   while (clock_->now() < options.deadline) {
     auto over = step(options.deadline);
-    const bool cut_short = !over && over.error().code == Errc::no_answer;
-    if (cut_short && clock_->now() >= options.deadline) break;
+    if (!over && is_cut_short(over.error(), options.deadline)) break;
     if (!over) return tl::unexpected(std::move(over.error()));
     if (*over) return std::move(**over);
     if (!options.progress) continue;
@@ -55,6 +56,12 @@ Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
     }
   }
   return FollowedRun{RunEnding::elapsed};
+}
+
+/// An answer that is not there, or not whole, when the time is over.
+bool RunFollower::is_cut_short(const Error& error, TimePoint deadline) const {
+  const bool unanswered = error.code == Errc::no_answer || error.code == Errc::incomplete_answer;
+  return unanswered && clock_->now() >= deadline;
 }
 
 /// Listens for a while, then looks; empty while the run goes on.
@@ -97,13 +104,15 @@ Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
 }
 
 Result<std::optional<EventNews>> RunFollower::next_result(TimePoint until) {
-  while (true) {
+  // Frames without end must not keep it; what is left of them is there for the next who listens.
+  do {
     auto frame = device_->session().next_spontaneous(until);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     if (!*frame) return std::nullopt;
     auto result = sift({EventSource::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
     if (result) return result;
-  }
+  } while (clock_->now() < until);
+  return std::nullopt;
 }
 
 Result<std::optional<EventNews>> RunFollower::fetch_result() {
@@ -116,9 +125,12 @@ Result<std::optional<EventNews>> RunFollower::fetch_result() {
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:
 /// loosening ends neither well nor badly.
 std::optional<EventNews> RunFollower::sift(EventNews event) {
-  const bool is_new = tracker_.track(layout_.number_of(event.block), event.block).is_new();
-  // A tool that was switched off and on has had no event at all.
-  if (!is_new || EventTracker::is_blank(event.block)) return std::nullopt;
+  const Tracked tracked = tracker_.track(layout_.number_of(event.block), event.block);
+  // A tool that was switched off and on has had no event at all, or one that it remembers: none
+  // that says how this run ended.
+  const bool restarted = tracked.novelty == Novelty::restart;
+  if (!tracked.is_new() || restarted || EventTracker::is_blank(event.block)) return std::nullopt;
+  if (hear_) hear_(event);
   const auto kind = layout_.kind_of(event.block);
   if (is_result(kind)) return event;
   if (kind == EventKind::other) other_ = std::move(event);

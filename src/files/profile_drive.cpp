@@ -147,6 +147,7 @@ class DriveRules {
       findings_.add_once(status, fmt::format("a status bit is 0 to {}", highest_bit));
     }
     require_optional(run.watchdog, draft_.run.of("watchdog"));
+    require_optional(run.group, draft_.run.of("group"));
     if (run.source.empty()) findings_.add_once(draft_.run.of("source"), "run has no source");
   }
 
@@ -333,6 +334,7 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   }
   assign(run.watchdog, map.text("watchdog"));
   assign(run.still_runs, map.text("still-runs"));
+  assign(run.group, map.text("group"));
   map.finish();
 }
 

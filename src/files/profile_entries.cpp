@@ -398,6 +398,10 @@ Action read_action(YamlMap& map) {
   assign(action.source, map.text("source", Need::required));
   assign(action.note, map.text("note"));
   assign(action.check, map.text("check"));
+  assign(action.tells, map.text("tells"));
+  if (const YamlNode* effects = map.get("effects")) {
+    action.effects = read_labels(*effects, map.findings());
+  }
   assign(action.confirm, map.text("confirm"));
   if (const auto confirmed = map.number<std::uint32_t>("confirm-value")) {
     action.confirm_value = *confirmed;

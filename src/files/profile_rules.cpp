@@ -338,6 +338,30 @@ void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
+void what_actions_tell_exists(const ProfileDraft& draft, Findings& findings) {
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    if (action.tells.empty()) return;
+    for (const std::uint16_t value : {action.minimum, action.maximum}) {
+      const std::string name = catalogue::numbered_name(action.tells, value);
+      if (parameter_named(draft, name) != nullptr) continue;
+      findings.add_once(origin.of("tells"), no_such_parameter(draft, name));
+    }
+  });
+}
+
+void effects_are_of_values(const ProfileDraft& draft, Findings& findings) {
+  for_each_action(draft, [&](const Action& action, const Origin& origin) {
+    for (const Label& effect : action.effects) {
+      const bool given = action.value
+                             ? effect.number == *action.value
+                             : effect.number >= action.minimum && effect.number <= action.maximum;
+      if (given) continue;
+      findings.add_once(origin.of("effects"),
+                        fmt::format("{}: {} is none of its values", action.name, effect.number));
+    }
+  });
+}
+
 // ---- sections ----
 
 void link_is_usable(const ProfileDraft& draft, Findings& findings) {
@@ -487,7 +511,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Findings& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 26> rules = {
+constexpr std::array<Rule, 28> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -506,6 +530,8 @@ constexpr std::array<Rule, 26> rules = {
     entries_have_a_source,
     actions_stay_off_parameters,
     confirmations_exist,
+    what_actions_tell_exists,
+    effects_are_of_values,
     link_is_usable,
     identity_slices_fit,
     event_block_is_legal,

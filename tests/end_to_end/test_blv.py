@@ -224,6 +224,33 @@ class EndingTest(MotorTest):
                 self.assertGreater(finished.seconds, 0.4)
                 self.assert_stopped(bus, finished)
 
+    def test_what_happens_is_told_while_it_runs(self):
+        for form in ("table", "json", "csv"):
+            with self.subTest(form), Bus() as bus, self.running(bus, "-o", form) as started:
+                while "started" not in started.line():
+                    pass
+                # Nothing but the signal ends this run, so it still goes on.
+                self.assertEqual([c for c in bus.commands() if not c & START_BITS], [])
+                started.send_signal(signal.SIGINT)
+                finished = started.finish()
+                self.assertEqual(finished.status, 130, finished)
+                self.assertIn("stopped", finished.stdout)
+                self.assertNotIn("started", finished.stdout)
+
+    def test_a_program_that_is_held_up_longer_than_the_watchdog_allows(self):
+        with Bus() as bus:
+            with self.running(bus, "--watchdog", "500ms", "--for", "1s", "--json") as started:
+                support.wait_until(bus.turns, "the motor turns")
+                os.kill(started.pid, signal.SIGSTOP)
+                time.sleep(2)  # the driver stops by itself, and the time allowed is over
+                os.kill(started.pid, signal.SIGCONT)
+                finished = started.finish()
+            self.assertEqual(finished.status, 1, finished)
+            self.assertIn("85h", finished.stderr)
+            self.assertEqual(finished.records()[-1]["result"], "alarm", finished)
+            self.assertIn("alarm", [event["kind"] for event in finished.records("event")])
+            self.assert_stopped(bus, finished)
+
     def test_a_signal_while_the_watchdog_is_set(self):
         """The motor was not started yet; the driver would stop with an alarm when nobody asks any more."""
         for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):

@@ -101,6 +101,10 @@ struct GuardedTool {
   std::optional<Duration> answer_timeout = std::nullopt;
   std::optional<unsigned> retries = std::nullopt;
   bool reachable = true;
+  /// Beside its answers the tool pushes an event each millisecond, without end.
+  bool floods = false;
+  std::uint16_t pushed_number = 1961;  ///< of these events
+  std::uint16_t pushed_step = 0;       ///< from one to the next
   /// Asked for every request; empty: all pass.
   std::function<Fate(const modbus::Pdu&)> fate = {};
   std::vector<Write> writes = {};          ///< that reached the wire, in order
@@ -157,14 +161,30 @@ class GuardedTool::Tap final : public link::Transport {
       return bytes.size();
     }
     while (true) {
-      auto count = inner_->receive(into, deadline);
-      if (!count || *count == 0 || !deaf_) return count;
+      auto count = inner_->receive(into, tool_->floods ? tool_->clock.now() : deadline);
+      const bool silent = count && *count == 0;
+      if (silent && tool_->floods) return push(into);
+      if (!count || silent || !deaf_) return count;
     }
   }
 
   void shield() override { inner_->shield(); }
 
  private:
+  /// Something that is no result, as a change of direction.
+  std::size_t push(std::span<std::uint8_t> into) {
+    tool_->clock.advance(std::chrono::milliseconds(1));
+    modbus::Adu event{.transaction = {1}, .unit = {}, .pdu = {.function = 4, .data = {28}}};
+    event.pdu.data.resize(29);
+    tool_->pushed_number = static_cast<std::uint16_t>(tool_->pushed_number + tool_->pushed_step);
+    event.pdu.data[1] = static_cast<std::uint8_t>(tool_->pushed_number >> 8U);
+    event.pdu.data[2] = static_cast<std::uint8_t>(tool_->pushed_number);
+    event.pdu.data[26] = 3;
+    const Bytes bytes = modbus::frame(modbus::Framing::tcp, event);
+    std::copy(bytes.begin(), bytes.end(), into.begin());
+    return bytes.size();
+  }
+
   void note(const modbus::Pdu& request) {
     tool_->requests.push_back(request);
     const auto parsed = modbus::parse_request(request);

@@ -15,6 +15,8 @@
 //   %wait DURATION        time passes
 //   %later DURATION URL UNIT REGISTER VALUE
 //                         so long from now somebody else writes a register
+//   %later DURATION alarm URL UNIT CODE
+//                         the same of an alarm
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
 //                         backups are kept on
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
@@ -211,6 +213,12 @@ class Stage {
   }
 
   void write_later(const std::vector<std::string>& words) {
+    if (words.at(1) == "alarm") {
+      clock_.at(clock_.now() + parse_duration(words.at(0)).value(), [=, this] {
+        happen("alarm", {words.begin() + 2, words.end()});
+      });
+      return;
+    }
     sim::BlvBus* bus =
         tools_.at(commands::shared_line(link::parse_endpoint(words.at(1)).value()))->bus;
     const modbus::UnitId unit{static_cast<std::uint8_t>(std::stoul(words.at(2)))};

@@ -206,9 +206,10 @@ TEST_CASE("following tells what happens, and why it is over") {
   MotorStopper stopper(motor, StopMode::decelerate);
   std::vector<device::MotorNews> news;
   device::MotorFollowOptions options{.deadline = bench.clock.now() + 3s, .fastest = 1000};
+  options.hear = [&](const device::MotorNews& one) { news.push_back(one); };
   SUBCASE("elapsed") {
     bench.write(command, 0x2A);
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::elapsed);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::elapsed);
     REQUIRE(news.size() == 2);
     CHECK(news[0].event == MotorEvent::started);
     CHECK(news[1].event == MotorEvent::at_speed);
@@ -217,22 +218,41 @@ TEST_CASE("following tells what happens, and why it is over") {
     bench.write(command, 0x2A);
     bench.clock.at(bench.clock.now() + 1s,
                    [&] { bench.bus->raise_alarm(1, 0x30, bench.clock.now()); });
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::alarm);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::alarm);
     CHECK(news.back().event == MotorEvent::alarm);
   }
   SUBCASE("stopped by somebody else") {
     bench.write(command, 0x2A);
     bench.clock.at(bench.clock.now() + 1s, [&] { bench.write(command, 0); });
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::stopped);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::stopped);
   }
   SUBCASE("ignored") {
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::ignored);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::ignored);
     options.deadline = bench.clock.now() + 200ms;
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::ignored);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::ignored);
   }
   SUBCASE("too fast") {
     options.fastest = 900;
     bench.write(command, 0x32);
-    CHECK(follow_motor(device, motor, stopper, options, news) == device::MotorEnding::too_fast);
+    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::too_fast);
   }
+}
+
+TEST_CASE("a driver that falls silent is hardly waited for beyond the time allowed") {
+  sim::FaultPlan faults;
+  for (std::uint32_t at = 20; at < 200; ++at) {
+    faults.push_back({.kind = sim::FaultKind::lost, .at = at});
+  }
+  BlvBench bench({}, faults);
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  device.session().set_answer_timeout(60s);  // a patient user
+  device.set_retries(9);
+  bench.write(command, 0x2A);
+  const TimePoint began = bench.clock.now();
+  device::MotorFollowOptions options{.deadline = began + 3s, .fastest = 1000};
+  const auto followed = follow_motor(device, motor, stopper, options);
+  CHECK(bench.clock.now() - began < 4s);
+  CHECK(bench.moves());
 }

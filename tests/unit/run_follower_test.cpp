@@ -46,7 +46,9 @@ struct Bench {
   GuardedTool& tool;
   Device device;
   catalogue::Action action = tool.start_action();
-  RunFollower follower = RunFollower(device, action, tool.clock);
+  std::vector<device::EventNews> heard = {};
+  RunFollower follower = RunFollower(device, action, tool.clock,
+                                     [this](const auto& event) { heard.push_back(event); });
   TimePoint began = {};
 };
 
@@ -70,6 +72,34 @@ TEST_CASE("the result of a run is its event") {
   CHECK(bench.took() < 1500ms);
   CHECK(tool.starts() == 1);
   CHECK(tool.stops() == 0);  // a follower starts and stops nothing
+}
+
+TEST_CASE("every event of a run is heard when it comes, and once") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  std::vector<Duration> times;
+  FollowOptions options;
+  const TimePoint began = tool.clock.now();
+  options.progress = [&](Duration elapsed) -> Result<void> {
+    if (bench.heard.size() > times.size()) times.push_back(elapsed);
+    return {};
+  };
+  options.deadline = began + 2s;
+  tool.pushed_step = 1;
+  bench.after(500ms, [&] { tool.floods = true; });
+  bench.after(505ms, [&] { tool.floods = false; });
+  const auto run = bench.follower.follow(options);
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::elapsed);
+  REQUIRE(bench.heard.size() >= 3);
+  for (std::size_t index = 0; index < bench.heard.size(); ++index) {
+    CHECK(bench.heard[index].block[number_at] == first_number + 1 + index);
+    CHECK(bench.heard[index].block[status_at] == 3);
+  }
+  REQUIRE_FALSE(times.empty());
+  CHECK(times.front() < 800ms);
 }
 
 TEST_CASE("a run that somebody else ends too early is NG") {
@@ -185,6 +215,40 @@ TEST_CASE("the time allowed is kept") {
   CHECK(bench.took() >= 700ms);
   CHECK(bench.took() < 750ms);
   CHECK(tool.runs());
+}
+
+TEST_CASE("the time allowed is kept however much the tool sends") {
+  GuardedTool tool;
+  slow_down(tool);
+  Bench bench(tool);
+  bench.start();
+  tool.floods = true;
+  const auto run = bench.follow(400ms);
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::elapsed);
+  CHECK(bench.took() >= 400ms);
+  CHECK(bench.took() < 450ms);
+  // So is that for the event of the stop, which is asked for in the end.
+  REQUIRE(bench.device.send_stop(bench.action));
+  const TimePoint asked = tool.clock.now();
+  const auto late = bench.follower.late_event();
+  CHECK(tool.clock.now() - asked < 600ms);
+  REQUIRE(late);
+  REQUIRE(*late);
+}
+
+TEST_CASE("what a tool remembers across its restart is no result of a run") {
+  GuardedTool tool;
+  Bench bench(tool);
+  bench.start();
+  // Its counter begins anew: the OK with a smaller number may be of any run.
+  bench.after(600ms, [&] {
+    tool.bm->reboot(tool.clock.now());
+    tool.write_past(4003, 1);
+  });
+  const auto run = bench.follow(5s);
+  REQUIRE(run);
+  CHECK_FALSE(run->event);
 }
 
 TEST_CASE("a patient user's tool that falls silent does not run on for minutes") {

@@ -164,8 +164,11 @@ struct Action {
   Evidence evidence = Evidence::inferred;
   std::string source;
   std::string note = {};  ///< what a user should know before sending it; may be empty
-  std::string check;      ///< how to verify the assignment on the tool; one sentence
-  std::string confirm;    ///< parameter whose reading proves the effect; empty: nothing can
+  /// Parameter that says what a value stands for, with {n} in place of the value; may be empty.
+  std::string tells = {};
+  std::vector<Label> effects = {};  ///< what a value does to whoever works with the tool, in words
+  std::string check;                ///< how to verify the assignment on the tool; one sentence
+  std::string confirm;  ///< parameter whose reading proves the effect; empty: nothing can
   /// Reading that proves it; empty: the value written.
   std::optional<std::int64_t> confirm_value = std::nullopt;
 };

@@ -60,6 +60,9 @@ struct RunFacts {
   std::string watchdog = {};        ///< time without a query after which the driver stops; 0: never
   /// What to look at when a stop is not confirmed, as one sentence; may be empty.
   std::string still_runs = {};
+  /// Parameter with the address of the driver whose group this one belongs to; may be empty. Writes
+  /// of several registers to that driver reach this one too, and writes of one do not.
+  std::string group = {};
   Evidence evidence = Evidence::inferred;
   std::string source = {};
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <vector>
 
 #include "spindle/device/motor.hpp"
 
@@ -29,11 +28,15 @@ struct MotorFollowOptions {
   std::int64_t fastest = 0;                            ///< command speed that is asked for
   /// Hears how long it has run and how, several times a second; an error ends the following.
   std::function<Result<void>(Duration elapsed, const MotorState&)> progress = {};
+  /// Hears what happens when it is seen; must not use the device.
+  std::function<void(const MotorNews&)> hear = {};
 };
 
-/// Follows a motor from just behind its start. Starts and stops nothing. What happens is appended
-/// to `news`. Errors: interrupts and link trouble.
+/// Follows a motor from just behind its start. Starts and stops nothing. Errors: interrupts and
+/// link trouble. A driver that falls silent is hardly waited for beyond the deadline, however
+/// patient the user is with answers; the answer timeout and the retries of the device are then
+/// those of a running motor.
 Result<MotorEnding> follow_motor(Device& device, const Motor& motor, MotorStopper& stopper,
-                                 const MotorFollowOptions& options, std::vector<MotorNews>& news);
+                                 const MotorFollowOptions& options);
 
 }  // namespace spindle::device

@@ -29,11 +29,16 @@ struct FollowOptions {
   std::function<Result<void>(Duration elapsed)> progress = {};
 };
 
+/// Hears every new event of a run when it becomes known, the result among them.
+using HearEvent = std::function<void(const EventNews&)>;
+
 /// Follows one run of a tool with events, from just before the start until its result: listens,
-/// keeps the output armed and reads the running state. Starts and stops nothing.
+/// keeps the output armed and reads the running state. Starts and stops nothing. Its time limits
+/// hold however many frames the tool sends.
 class RunFollower {
  public:
-  RunFollower(Device& device, const catalogue::Action& start, Clock& clock);
+  /// `start` must outlive it. `hear` may be empty, and must not use the device.
+  RunFollower(Device& device, const catalogue::Action& start, Clock& clock, HearEvent hear = {});
 
   /// Remembers the last event and arms the output. Call before the start.
   Result<void> prepare();
@@ -53,12 +58,14 @@ class RunFollower {
   Result<std::optional<EventNews>> next_result(TimePoint until);
   Result<std::optional<EventNews>> fetch_result();
   std::optional<EventNews> sift(EventNews event);
+  [[nodiscard]] bool is_cut_short(const Error& error, TimePoint deadline) const;
   Result<std::optional<RunEnding>> look_at_tool();
   Result<void> keep_armed();
 
   Device* device_;
   const catalogue::Action* start_;
   Clock* clock_;
+  HearEvent hear_;
   catalogue::EventLayout layout_;
   EventTracker tracker_ = {};
   Duration answer_timeout_ = {};  ///< the user's or the profile's

@@ -1,0 +1,210 @@
+#include "tool_setup.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "records.hpp"
+#include "spindle/commands/commands.hpp"
+#include "stops.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Action;
+using catalogue::Profile;
+
+constexpr std::string_view select_preset = "select-preset";
+constexpr std::string_view direction = "direction";
+
+/// Whether the action can be sent with this value.
+bool takes(const Action& action, std::int64_t value) {
+  const bool ranged = action.labels.empty() || action.has_range;
+  if (ranged && value >= action.minimum && value <= action.maximum) return true;
+  return std::any_of(action.labels.begin(), action.labels.end(),
+                     [&](const catalogue::Label& label) { return label.number == value; });
+}
+
+/// "3", "loosening".
+std::string value_words(const Action& action, std::int64_t value) {
+  const std::string words = words_of({.action = action, .value = value});
+  return words.substr(words.find('=') + 1);
+}
+
+/// "preset.2.target-torque" is "target torque" where the preset was named already.
+std::string last_words(const std::string& name) {
+  std::string words = name.substr(name.rfind('.') + 1);
+  std::replace(words.begin(), words.end(), '-', ' ');
+  return words;
+}
+
+}  // namespace
+
+Result<ToolPlan> plan_tool(const RemoteStartOptions& options, const Profile& profile,
+                           const Target& target) {
+  auto start = find_start(profile);
+  if (!start) return tl::unexpected(std::move(start.error()));
+  if (!profile.events || start->confirm.empty()) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "a run of this product can not be followed",
+                                .hint = "its profile lacks 'events', or 'confirm' of its start",
+                                .name = profile.id});
+  }
+  auto alarm_reset = profile.find_action("alarm-reset");
+  if (!alarm_reset) return tl::unexpected(std::move(alarm_reset.error()));
+  ToolPlan plan{.selections = {}, .start = *start, .alarm_reset = std::move(*alarm_reset)};
+  for (const auto& [name, value] :
+       {std::pair(select_preset, &options.preset), std::pair(direction, &options.direction)}) {
+    if (value->empty()) continue;
+    auto deed = parse_deed(fmt::format("{}={}", name, *value), profile);
+    if (!deed) return tl::unexpected(std::move(deed.error()));
+    auto allowed = check_evidence(deed->action, target, options.acceptance);
+    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    plan.selections.push_back(std::move(*deed));
+  }
+  return check_evidence(plan.start, target, options.acceptance).map([&] {
+    return std::move(plan);
+  });
+}
+
+Result<void> ToolSetup::look() {
+  device::Device& device = tool_->device;
+  const Action& reset = plan_->alarm_reset;
+  const auto alarm_free = device.shows(reset.confirm, reset.confirm_value.value_or(0));
+  if (!alarm_free) return tl::unexpected(alarm_free.error());
+  if (*alarm_free == device::Shown::no) {
+    return tl::unexpected(not_ready(tool_->target, "the tool has an alarm, so it was not started",
+                                    "'spindle alarms' shows it"));
+  }
+  const auto still = device.shows(plan_->start.confirm, *plan_->start.stop_value);
+  if (!still) return tl::unexpected(still.error());
+  if (*still == device::Shown::no) {
+    return tl::unexpected(
+        not_ready(tool_->target, "the tool runs already, so it was not started",
+                  "wait until it stands still, or stop it with 'spindle remote-stop'"));
+  }
+  selected_.clear();
+  for (const Deed& deed : plan_->selections) {
+    const auto before = shown_by(deed.action);
+    if (!before) return tl::unexpected(before.error());
+    selected_.push_back({deed, std::nullopt});
+    if (*before) selected_.back().before = (*before)->number.mantissa();
+  }
+  return {};
+}
+
+/// Empty where the tool does not say.
+Result<std::optional<catalogue::Value>> ToolSetup::shown_by(const Action& action) {
+  if (action.confirm.empty()) return std::nullopt;
+  const auto parameter = tool_->profile->find(action.confirm);
+  if (!parameter) return tl::unexpected(parameter.error());
+  const auto readings = tool_->device.read_each({*parameter}, device::Limits::skip);
+  if (!readings) return tl::unexpected(readings.error());
+  if (!readings->front().value) return std::nullopt;
+  return *readings->front().value;
+}
+
+Result<std::string> ToolSetup::describe() {
+  std::vector<std::string> words;
+  for (const std::string_view action : {select_preset, direction}) {
+    auto described = describe(action);
+    if (!described) return tl::unexpected(std::move(described.error()));
+    if (*described) words.push_back(std::move(**described));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+/// What was asked for of it, else what the tool shows; empty where it has no such action.
+Result<std::optional<std::string>> ToolSetup::describe(std::string_view name) {
+  const auto known = tool_->profile->find_action(name);
+  if (!known) return std::nullopt;
+  const auto selected = std::find_if(plan_->selections.begin(), plan_->selections.end(),
+                                     [&](const Deed& deed) { return deed.action.name == name; });
+  if (selected != plan_->selections.end()) return describe_value(*selected);
+  const auto shown = shown_by(*known);
+  if (!shown) return tl::unexpected(shown.error());
+  if (!*shown) return fmt::format("{} not known", last_words(known->confirm));
+  return describe_value({.action = *known, .value = (*shown)->number.mantissa()});
+}
+
+Result<std::string> ToolSetup::describe_value(const Deed& deed) {
+  const std::string value = value_words(deed.action, deed.value);
+  std::string words = deed.action.labels.empty()
+                          ? fmt::format("{} {}", last_words(deed.action.confirm), value)
+                          : value;
+  if (deed.action.tells.empty() || deed.value < 0) return words;
+  const auto parameter = tool_->profile->find(
+      catalogue::numbered_name(deed.action.tells, static_cast<std::uint16_t>(deed.value)));
+  if (!parameter) return words;
+  const auto readings = tool_->device.read_each({*parameter}, device::Limits::skip);
+  if (!readings) return tl::unexpected(readings.error());
+  const auto& told = readings->front().value;
+  const std::string unit = unit_of(*parameter, tool_->target);
+  const bool unit_lacks = unit.empty() && !parameter->unit.empty();
+  return fmt::format("{} ({} {}{}{})", words, last_words(parameter->name),
+                     told ? told->to_string() : "not readable", unit.empty() ? "" : " ",
+                     unit_lacks ? ", unit not known" : unit);
+}
+
+Result<void> ToolSetup::select() {
+  for (Selected& selected : selected_) {
+    const Deed& deed = selected.deed;
+    selected.tried = true;
+    const auto result = perform_recorded(deed, *tool_, *log_, *context_);
+    if (!result) return tl::unexpected(result.error());
+    if (result == device::ActionResult::not_confirmed) {
+      return tl::unexpected(not_confirmed(deed, tool_->target));
+    }
+  }
+  return {};
+}
+
+std::vector<Left> ToolSetup::put_back() {
+  std::vector<Left> left;
+  for (auto selected = selected_.rbegin(); selected != selected_.rend(); ++selected) {
+    const auto& [deed, before, tried] = *selected;
+    if (!tried || before == deed.value) continue;
+    if (!before || !takes(deed.action, *before)) {
+      left.push_back(left_of(*selected, before ? "no command selects that" : ""));
+      continue;
+    }
+    if (context_->calm.stay_awake) context_->calm.stay_awake();
+    work::LoggedChange change{.name = deed.action.name,
+                              .register_address = deed.action.address.value,
+                              .old_value = Decimal(deed.value),
+                              .new_value = Decimal(*before)};
+    const std::string id = log_->begin(change);
+    const auto report = device::undo(
+        {deed.action, deed.value, *before}, tool_->device,
+        [this](Duration patience) { return calm_line_.connect(patience); }, context_->calm.clock);
+    if (report.found) change.old_value = Decimal(*report.found);
+    const bool done =
+        report.result == device::PutBack::done || report.result == device::PutBack::kept;
+    change.result = done ? "rolled-back" : "not-rolled-back";
+    log_->end(id, change);
+    if (!done) left.push_back(left_of(*selected, report.trouble));
+  }
+  selected_.clear();
+  return left;
+}
+
+std::vector<Left> ToolSetup::left() const {
+  std::vector<Left> left;
+  for (const Selected& selected : selected_) {
+    if (!selected.tried || selected.before == selected.deed.value) continue;
+    left.push_back(left_of(selected, "the tool may still run"));
+  }
+  return left;
+}
+
+Left ToolSetup::left_of(const Selected& selected, std::string trouble) {
+  const Action& action = selected.deed.action;
+  return {.name = action.name,
+          .set = value_words(action, selected.deed.value),
+          .before = selected.before ? value_words(action, *selected.before) : std::string(),
+          .trouble = std::move(trouble)};
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calm_line.hpp"
+#include "change_log.hpp"
+#include "deeds.hpp"
+#include "guarded_run.hpp"
+#include "spindle/device/action_undo.hpp"
+
+namespace spindle::commands {
+
+/// Everything about the run of a tool with events that is decided before it is touched.
+struct ToolPlan {
+  std::vector<Deed> selections;  ///< preset and direction, as far as they were given
+  catalogue::Action start;
+  catalogue::Action alarm_reset;  ///< its confirming parameter tells whether there is an alarm
+};
+
+/// Errors name the option or the action that is wrong, or what the product lacks.
+Result<ToolPlan> plan_tool(const RemoteStartOptions& options, const catalogue::Profile& profile,
+                           const Target& target);
+
+/// What a tool is set to before it is started, and what of it is set back afterwards.
+class ToolSetup {
+ public:
+  /// All must outlive it.
+  ToolSetup(const ToolPlan& plan, OpenTool& tool, Context& context, work::ChangeLog& log)
+      : plan_(&plan), tool_(&tool), context_(&context), log_(&log), calm_line_(tool, context) {}
+
+  /// Checks that the tool has no alarm and stands still (whether it is locked can not be read on
+  /// every product), and reads what is going to be changed. Only reads.
+  Result<void> look();
+
+  /// With what the tool would be started now, for the question: "preset 2 (target torque 1.20 N.m),
+  /// forward". Only reads.
+  Result<std::string> describe();
+
+  /// Selects what was asked for, each proven by reading back.
+  Result<void> select();
+
+  /// Of a tool that stands still, also after select() failed: sets back what was selected. Not
+  /// ended by an interrupt, and reopens a lost link. Returns what could not be set back.
+  std::vector<Left> put_back();
+
+  /// What was selected and not set back, of a tool that may still run.
+  [[nodiscard]] std::vector<Left> left() const;
+
+ private:
+  /// A selection and what the tool showed before it.
+  struct Selected {
+    Deed deed;
+    std::optional<std::int64_t> before;  ///< empty: it can not be read
+    bool tried = false;
+  };
+
+  Result<std::optional<catalogue::Value>> shown_by(const catalogue::Action& action);
+  Result<std::optional<std::string>> describe(std::string_view action);
+  Result<std::string> describe_value(const Deed& deed);
+  [[nodiscard]] static Left left_of(const Selected& selected, std::string trouble);
+
+  const ToolPlan* plan_;
+  OpenTool* tool_;
+  Context* context_;
+  work::ChangeLog* log_;
+  CalmLine calm_line_;
+  std::vector<Selected> selected_ = {};
+};
+
+}  // namespace spindle::commands
