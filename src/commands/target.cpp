@@ -96,7 +96,8 @@ device::LinkOptions link_options(const Target& target, const catalogue::Profile&
       .connect_timeout = context.common.connect_timeout,
       .retries = context.common.retries,
       .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link), context),
-      .shown = target.shown};
+      .shown = target.shown,
+      .reopening = target.reopening};
 }
 
 SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
@@ -223,6 +224,11 @@ Error Target::blamed(Error error) const {
   error.target = shown;
   if (endpoint.text != shown) error.endpoint = endpoint.text;
   return error;
+}
+
+Target reopening(Target target) {
+  target.reopening = link::Reopening::once;
+  return target;
 }
 
 std::string shared_line(const link::Endpoint& endpoint) {

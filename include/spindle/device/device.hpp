@@ -11,6 +11,7 @@
 #include "spindle/catalogue/value.hpp"
 #include "spindle/link/client.hpp"
 #include "spindle/link/endpoint.hpp"
+#include "spindle/link/reopening_transport.hpp"
 #include "spindle/link/session.hpp"
 
 namespace spindle::device {
@@ -30,6 +31,8 @@ struct LinkOptions {
   link::Trace trace = {};
   std::string shown = {};  ///< how errors name the tool; empty: by its endpoint's text
   link::SessionOptions::Past past = link::SessionOptions::Past::clean;
+  /// TCP only. What the opener refers to must then outlive the device.
+  link::Reopening reopening = link::Reopening::never;
 };
 
 /// One parameter as read. `registers` and `value` hold the same error when it could not be.
