@@ -12,9 +12,7 @@ int main(int count, char** arguments) {
   SteadyClock clock(signals.interrupt());
   CalmTime calm;
   spindle::cli::World world{
-      .io = {write_out, write_err, line_reader(clock, signals.interrupt()), is_terminal(Std::in),
-             is_terminal(Std::out), is_terminal(Std::err), out_is_open, err_is_ready, err_columns,
-             out_ends_within_line},
+      .io = standard_streams<spindle::report::Streams>(clock, signals.interrupt()),
       .clock = clock,
       .interrupt = signals.interrupt(),
       .open = line_opener(clock, signals.interrupt()),

@@ -649,7 +649,7 @@ void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
            "time between two polls (default 200ms)");
     command->add_flag("--all", watch.all, "every polled sample instead of changes");
     command->add_flag("--initial", watch.initial, "also the first value of everything polled");
-    option(command, "--count", watch.count, "N", "end after so many events and changes");
+    option(command, "--count", watch.count, "N", "end after so many events, changes and samples");
     option(command, "--duration", watch.duration, "DURATION", "end after this time");
     option(command, "--idle-timeout", watch.idle_timeout, "DURATION",
            "end when nothing came for this time; status 1 if nothing came at all");

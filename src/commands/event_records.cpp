@@ -54,6 +54,8 @@ std::string_view to_text(device::EventSource source) {
 
 std::string_view to_text(device::LinkState state) {
   switch (state) {
+    case device::LinkState::connecting:
+      return "connecting";
     case device::LinkState::connected:
       return "connected";
     case device::LinkState::lost:
@@ -97,7 +99,7 @@ std::string NewsRecords::error_text(std::int64_t code) const {
 Record NewsRecords::event(const device::EventNews& news) const {
   Record record = blank("event", news.time);
   const EventKind kind = kind_of(news.block);
-  record.fields.reserve(keys_.size() + 6);
+  record.fields.reserve(keys_.size() + 7);
   record.fields.push_back({"kind", std::string(catalogue::to_text(kind))});
   record.fields.push_back({"source", std::string(to_text(news.source))});
   std::string text;
@@ -116,14 +118,21 @@ Record NewsRecords::event(const device::EventNews& news) const {
   }
   record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
   record.fields.push_back({"raw", news.block});
-  record.fields.push_back(result_of(kind));
+  if (news.standing == device::Standing::remembered) {
+    record.fields.push_back({"remembered", true});
+    text = fmt::format("{}{}remembered by a restarted tool, so perhaps an old result", text,
+                       text.empty() ? "" : "; ");
+  } else {
+    record.fields.push_back(result_of(kind));
+  }
   record.fields.push_back(only_shown("text", std::move(text)));
   return record;
 }
 
-Record NewsRecords::change(const device::ValueNews& news, WallTime time) const {
+Record NewsRecords::value(const device::ValueNews& news, const std::string& type,
+                          WallTime time) const {
   const catalogue::Parameter& parameter = *news.parameter;
-  Record record = blank("change", time);
+  Record record = blank(type, time);
   const std::string unit = unit_of(parameter, *target_);
   record.fields = {{"name", parameter.name},
                    {"table", std::string(catalogue::to_text(parameter.table))},
@@ -133,8 +142,9 @@ Record NewsRecords::change(const device::ValueNews& news, WallTime time) const {
                    {"label", text_or_null(news.value.label)},
                    {"unit", text_or_null(unit)},
                    {"previous", news.previous ? Cell(news.previous->number) : Cell()}};
-  const std::string before = news.previous ? news.previous->to_string() + " -> " : "";
-  record.fields.push_back(only_shown("kind", "change"));
+  const bool differs = news.previous && !(*news.previous == news.value);
+  const std::string before = differs ? news.previous->to_string() + " -> " : "";
+  record.fields.push_back(only_shown("kind", type));
   record.fields.push_back(
       only_shown("text", fmt::format("{}: {}{}{}{}", parameter.name, before, news.value.to_string(),
                                      unit.empty() ? "" : " ", unit)));
@@ -155,14 +165,30 @@ Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {
   return record;
 }
 
+Record NewsRecords::lag(const device::LagNews& news, WallTime time) const {
+  const auto text_of = [](Duration duration) {
+    return fmt::format("{} ms", std::chrono::round<std::chrono::milliseconds>(duration).count());
+  };
+  Record record = blank("lag", time);
+  record.fields = {{"missed", number(news.missed)},
+                   {"interval_ms", milliseconds(news.interval)},
+                   {"achieved_ms", milliseconds(news.achieved)},
+                   only_shown("kind", "lag", Tone::bad),
+                   only_shown("text", fmt::format("{} of {} missed: one poll in {}",
+                                                  counted(news.missed, "interval"),
+                                                  text_of(news.interval), text_of(news.achieved)))};
+  return record;
+}
+
 Record NewsRecords::link(const device::LinkNews& news, WallTime time) const {
   Record record = blank("link", time);
   const Tone tone = news.state == device::LinkState::lost ? Tone::bad : Tone::plain;
   std::string text = news.state == device::LinkState::connected
                          ? news.message
                          : fmt::format("{}: {}", to_text(news.state), news.message);
-  if (news.state == device::LinkState::reconnecting) {
-    text = fmt::format("reconnecting, attempt {}: {}", news.attempt, news.message);
+  if (news.state == device::LinkState::reconnecting ||
+      news.state == device::LinkState::connecting) {
+    text = fmt::format("{}, attempt {}: {}", to_text(news.state), news.attempt, news.message);
   }
   record.fields = {{"state", std::string(to_text(news.state))},
                    {"attempt", number(news.attempt)},
@@ -182,6 +208,7 @@ std::vector<report::Column> news_columns(Tools tools) {
                                  {"TORQUE", "torque", Align::right, 7},
                                  {"ANGLE", "a3", Align::right, 6},
                                  {"RESULT", "result", Align::left, 6},
+                                 {"SOURCE", "source", Align::left, 8},
                                  {"TEXT", "text", Align::left, 1}});
   return columns;
 }

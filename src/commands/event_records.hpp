@@ -21,9 +21,12 @@ class NewsRecords {
               catalogue::CodeTables tables);
 
   [[nodiscard]] report::Record event(const device::EventNews& news) const;
-  [[nodiscard]] report::Record change(const device::ValueNews& news, WallTime time) const;
+  /// `type` is "change" or "sample".
+  [[nodiscard]] report::Record value(const device::ValueNews& news, const std::string& type,
+                                     WallTime time) const;
   [[nodiscard]] report::Record motor(const device::MotorNews& news) const;
   [[nodiscard]] report::Record gap(const device::GapNews& news, WallTime time) const;
+  [[nodiscard]] report::Record lag(const device::LagNews& news, WallTime time) const;
   [[nodiscard]] report::Record link(const device::LinkNews& news, WallTime time) const;
 
   /// What an event says; `other` where the profile does not know.

@@ -15,7 +15,7 @@ Result<Outcome> get_one(const Target& target, const GetOptions& options, Context
   const bool raw_only =
       !options.names.empty() && std::all_of(options.names.begin(), options.names.end(), is_raw);
   auto opened = open_prepared(
-      target, raw_only ? Need::raw_registers : Need::named_registers, context,
+      reopening(target), raw_only ? Need::raw_registers : Need::named_registers, context,
       [&](const catalogue::Profile& profile) { return profile.select(options.names); });
   if (!opened) return tl::unexpected(std::move(opened.error()));
   const auto readings = opened->tool.device.read_each(opened->prepared, options.limits);

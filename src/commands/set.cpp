@@ -43,14 +43,15 @@ Result<Outcome> end_dry_run(const std::vector<SetStep>& steps, const Target& tar
 }
 
 Result<Outcome> set_one(const Target& target, const SetOptions& options, Context& context) {
-  auto opened = open_prepared(target, Need::named_registers, context, [&](const Profile& profile) {
+  const auto prepare = [&](const Profile& profile) {
     return parse_assignments(options.assignments, profile)
         .and_then([&](std::vector<Assignment> assignments) {
           return ask_first(options, profile, target, context).map([&] {
             return std::move(assignments);
           });
         });
-  });
+  };
+  auto opened = open_prepared(reopening(target), Need::named_registers, context, prepare);
   if (!opened) return tl::unexpected(std::move(opened.error()));
   OpenTool& tool = opened->tool;
   const bool everybody = options.reach == Reach::everybody;

@@ -50,7 +50,7 @@ Result<std::vector<Assignment>> understand(const SetOptions& options, const Prof
 
 Result<Planned<ToolPlan>> plan_tool(const Target& target, const SetOptions& options,
                                     const Context& context) {
-  auto opened = open_prepared(target, Need::named_registers, context,
+  auto opened = open_prepared(reopening(target), Need::named_registers, context,
                               [&](const Profile& profile) { return understand(options, profile); });
   if (!opened) return tl::unexpected(std::move(opened.error()));
   OpenTool& tool = opened->tool;
@@ -180,7 +180,7 @@ Result<SetResult> write_tool(const ToolPlan& plan, const Target& target, Storing
   if (!plan.changes() && storing == Storing::no) return keep(plan, target, context);
   auto profile = load_profile(target, context);
   if (!profile) return give_up(plan, target, profile.error(), context);
-  auto tool = open_tool(target, std::move(*profile), Need::named_registers, context);
+  auto tool = open_tool(reopening(target), std::move(*profile), Need::named_registers, context);
   if (!tool) return give_up(plan, target, tool.error(), context);
   const auto steps = check_against_tool(plan.assignments(), tool->device);
   if (!steps) return give_up(plan, target, steps.error(), context);

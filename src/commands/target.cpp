@@ -108,7 +108,8 @@ device::LinkOptions link_options(const Target& target, const catalogue::Profile&
       .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link), context),
       .shown = target.shown,
       .unasked =
-          profile.id.empty() ? unasked_shapes(context) : std::vector<link::SpontaneousShape>()};
+          profile.id.empty() ? unasked_shapes(context) : std::vector<link::SpontaneousShape>(),
+      .reopening = target.reopening};
 }
 
 SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
@@ -225,6 +226,11 @@ Error Target::blamed(Error error) const {
   error.target = shown;
   if (endpoint.text != shown) error.endpoint = endpoint.text;
   return error;
+}
+
+Target reopening(Target target) {
+  target.reopening = link::Reopening::once;
+  return target;
 }
 
 std::string shared_line(const link::Endpoint& endpoint) {

@@ -10,6 +10,7 @@
 #include "event_records.hpp"
 #include "listing.hpp"
 #include "motor_records.hpp"
+#include "patient_out.hpp"
 #include "progress.hpp"
 #include "records.hpp"
 #include "shared_lines.hpp"
@@ -23,6 +24,18 @@ namespace {
 
 using device::Heed;
 
+/// What was not told of one tool, because nobody took what was told before.
+struct Dropped {
+  std::size_t records = 0;
+  std::optional<std::uint32_t> events = 0;  ///< among them, and in gaps; empty: unknown
+};
+
+/// What one tool tells, and how.
+struct Voice {
+  std::optional<NewsRecords> records = std::nullopt;
+  Dropped dropped = {};
+};
+
 /// What all tools of one watch share: the stream of records, its counts, and when it ends. The only
 /// thing that several threads touch.
 class Stage {
@@ -33,32 +46,44 @@ class Stage {
         context_(&context),
         tools_(tools),
         status_(context),
+        out_(context.io, context.interrupt),
         listing_(context, columns),
         started_(context.clock.now()),
         last_event_(started_) {}
 
-  Heed tell(const device::News& news, const NewsRecords& records) {
+  Heed tell(const device::News& news, Voice& voice) {
     const std::lock_guard lock(mutex_);
     if (ended_) return Heed::stop;
+    if (out_.is_full()) {
+      drop(news, voice.dropped);
+      return Heed::go_on;
+    }
     status_.clear();
-    listing_.add(std::visit([&](const auto& one) { return record_of(one, records); }, news));
+    tell_dropped(voice);
+    listing_.add(std::visit([&](const auto& one) { return record_of(one, *voice.records); }, news));
     show_status();
-    const bool counted = options_->count > 0 && events_ + changes_ >= options_->count;
+    const bool counted = options_->count > 0 && heard_ >= options_->count;
     if (counted || !listing_.open()) end();
     return ended_ ? Heed::stop : Heed::go_on;
   }
 
-  /// How the watch of one tool ended.
-  void leave(const Result<void>& watched) {
+  /// How the watch of one tool ended. `unreached` says why there never was a link to it.
+  void leave(const Result<void>& watched, const std::optional<Error>& unreached, Voice& voice) {
     const std::lock_guard lock(mutex_);
-    if (watched || ended_) {  // once the whole ends, it is we who interrupt the others
-      outcome_.succeed();
-      return;
-    }
-    outcome_.fail(watched.error());
-    const ExitStatus status = watched.error().status();
-    const bool asked_to_end = status == ExitStatus::interrupted || status == ExitStatus::terminated;
     status_.clear();
+    tell_dropped(voice);
+    // Once the whole ends, it is we who interrupt the others.
+    const bool ends_well = watched || ended_;
+    const bool asked_to_end = !ends_well && (watched.error().status() == ExitStatus::interrupted ||
+                                             watched.error().status() == ExitStatus::terminated);
+    if (unreached && !closed_ && (ends_well || asked_to_end)) {
+      outcome_.fail(*unreached);
+      listing_.add(*unreached);
+    } else if (ends_well) {
+      outcome_.succeed();
+    }
+    if (ends_well) return;
+    outcome_.fail(watched.error());
     if (!asked_to_end) listing_.add(watched.error());
   }
 
@@ -82,47 +107,98 @@ class Stage {
     if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
     const bool idle =
         options_->idle_timeout && context_->clock.now() >= last_event_ + *options_->idle_timeout;
-    if (idle && events_ + changes_ == 0) outcome_.negate();
-    return summarise().map([&] { return outcome_; });
+    if (idle && heard_ == 0) outcome_.negate();
+    const auto left = out_.drain();
+    if (!left) return tl::unexpected(left.error());
+    if (*left > 0) return give_up(*left);
+    if (auto told = summarise(); !told) return tl::unexpected(std::move(told.error()));
+    return out_.drain().map([&](std::size_t) { return outcome_; });
   }
 
  private:
   report::Record record_of(const device::EventNews& news, const NewsRecords& records) {
     report::Record record = records.event(news);
+    if (news.standing == device::Standing::remembered) {
+      ++remembered_;
+      return record;
+    }
+    if (news.source == device::EventSource::catch_up) ++caught_up_;
     const catalogue::EventKind kind = records.kind_of(news.block);
     ++events_;
     if (kind == catalogue::EventKind::fastening_ok) ++ok_;
     if (kind == catalogue::EventKind::fastening_ng) ++ng_;
-    last_event_ = context_->clock.now();
+    hear();
     return record;
   }
   report::Record record_of(const device::MotorNews& news, const NewsRecords& records) {
     ++events_;
-    last_event_ = context_->clock.now();
+    hear();
     return records.motor(news);
   }
   report::Record record_of(const device::ValueNews& news, const NewsRecords& records) {
-    ++changes_;
-    last_event_ = context_->clock.now();
-    return records.change(news, context_->clock.wall());
+    const bool sample = options_->samples == device::Samples::all;
+    ++(sample ? samples_ : changes_);
+    hear();
+    return records.value(news, sample ? "sample" : "change", context_->clock.wall());
   }
   report::Record record_of(const device::GapNews& news, const NewsRecords& records) {
     ++gaps_;
     return records.gap(news, context_->clock.wall());
   }
+  report::Record record_of(const device::LagNews& news, const NewsRecords& records) {
+    missed_intervals_ += news.missed;
+    return records.lag(news, context_->clock.wall());
+  }
   report::Record record_of(const device::LinkNews& news, const NewsRecords& records) {
+    note_link(news);
+    return records.link(news, context_->clock.wall());
+  }
+
+  void note_link(const device::LinkNews& news) {
     if (news.state == device::LinkState::lost) {
       ++losses_;
       --connected_;
     }
     if (news.state == device::LinkState::connected) ++connected_;
-    return records.link(news, context_->clock.wall());
+  }
+
+  /// Something came, as --count and --idle-timeout mean it.
+  void hear() {
+    ++heard_;
+    last_event_ = context_->clock.now();
+  }
+
+  void drop(const device::News& news, Dropped& dropped) {
+    ++dropped.records;
+    if (const auto* link = std::get_if<device::LinkNews>(&news)) note_link(*link);
+    std::optional<std::uint32_t> events = 0;
+    if (std::holds_alternative<device::EventNews>(news) ||
+        std::holds_alternative<device::MotorNews>(news)) {
+      events = 1;
+    }
+    if (const auto* gap = std::get_if<device::GapNews>(&news)) events = gap->missed;
+    if (!events) dropped.events.reset();
+    if (dropped.events) *dropped.events += *events;
+  }
+
+  /// In the place of what was not told.
+  void tell_dropped(Voice& voice) {
+    if (voice.dropped.records == 0) return;
+    const Dropped dropped = std::exchange(voice.dropped, {});
+    ++gaps_;
+    report::Record record = voice.records->gap(
+        {dropped.events, fmt::format("{} not told, because nobody took what was told before",
+                                     counted(dropped.records, "record"))},
+        context_->clock.wall());
+    record.fields.push_back({"dropped", count(dropped.records)});
+    listing_.add(record);
   }
 
   /// Under the stream, where both are one terminal.
   void show_status() {
     const bool alone = context_->common.verbosity == Verbosity::normal;
     if (!context_->io.out_is_terminal || !alone) return;
+    out_.settle();
     status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),
                              counted(ok_ + ng_, "result"), ng_));
   }
@@ -133,18 +209,42 @@ class Stage {
     ended_ = true;
   }
 
+  /// A signal came, and nobody takes what there is to tell.
+  Result<Outcome> give_up(std::size_t left) {
+    outcome_.fail(context_->interrupt.error());
+    if (!context_->io.err_is_ready || context_->io.err_is_ready()) {
+      context_->renderer.note(
+          fmt::format("{} could not be written: nobody took them from standard output",
+                      counted(left, "record")));
+    }
+    return outcome_;
+  }
+
+  [[nodiscard]] std::string sentence() const {
+    std::string text = counted(events_, "event");
+    if (caught_up_ > 0) text += fmt::format(" ({} caught up)", caught_up_);
+    text += fmt::format(", {} OK, {} NG, {}, ", ok_, ng_, counted(changes_, "change"));
+    if (samples_ > 0) text += counted(samples_, "sample") + ", ";
+    if (remembered_ > 0) text += fmt::format("{} remembered by a restarted tool, ", remembered_);
+    text += fmt::format("{}, {}", counted(gaps_, "gap"), counted(losses_, "reconnect"));
+    if (missed_intervals_ > 0) text += ", " + counted(missed_intervals_, "interval") + " missed";
+    return text;
+  }
+
   Result<void> summarise() {
     return context_->renderer.summary(
         summary_record({{"events", count(events_)},
                         {"ok", count(ok_)},
                         {"ng", count(ng_)},
+                        {"caught_up", count(caught_up_)},
+                        {"remembered", count(remembered_)},
                         {"changes", count(changes_)},
+                        {"samples", count(samples_)},
                         {"gaps", count(gaps_)},
-                        {"reconnects", count(losses_)}},
+                        {"reconnects", count(losses_)},
+                        {"missed_intervals", count(missed_intervals_)}},
                        outcome_.status(), {}, context_->clock),
-        fmt::format("{}, {} OK, {} NG, {}, {}, {}", counted(events_, "event"), ok_, ng_,
-                    counted(changes_, "change"), counted(gaps_, "gap"),
-                    counted(losses_, "reconnect")));
+        sentence());
   }
 
   const WatchOptions* options_;
@@ -152,16 +252,22 @@ class Stage {
   std::size_t tools_;
   std::mutex mutex_;
   ProgressLine status_;
+  PatientOut out_;
   Listing listing_;
   Outcome outcome_ = {};
   TimePoint started_;
   TimePoint last_event_;
+  std::size_t heard_ = 0;
   std::size_t events_ = 0;
   std::size_t ok_ = 0;
   std::size_t ng_ = 0;
+  std::size_t caught_up_ = 0;
+  std::size_t remembered_ = 0;
   std::size_t changes_ = 0;
+  std::size_t samples_ = 0;
   std::size_t gaps_ = 0;
   std::size_t losses_ = 0;
+  std::size_t missed_intervals_ = 0;
   std::size_t connected_ = 0;
   bool ended_ = false;
   bool closed_ = false;
@@ -235,29 +341,51 @@ std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools,
   return motors ? motor_columns(shown) : news_columns(shown);
 }
 
-Result<void> watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, Stage& stage,
-                       const WatchOptions& options, const Context& context) {
+/// Whether the error is one of the tool or its link that does not say yet whose it is.
+bool is_about_tool(const Error& error) {
+  switch (error.status()) {
+    case ExitStatus::unreachable:
+    case ExitStatus::no_answer:
+    case ExitStatus::refused:
+    case ExitStatus::malformed:
+    case ExitStatus::mismatch:
+      return error.target.empty();
+    default:
+      return false;
+  }
+}
+
+void watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, Stage& stage,
+               const WatchOptions& options, const Context& context) {
   const catalogue::Profile unknown;
-  std::optional<NewsRecords> records;
-  records.emplace(tool.target(), unknown, catalogue::CodeTables());
+  Voice voice;
+  voice.records.emplace(tool.target(), unknown, catalogue::CodeTables());
   const auto open = [&] {
     const TimePoint until = stage.until();
     const TimePoint now = context.clock.now();
     auto link = tool.open(until > now ? until - now : Duration::zero(), open_transport);
-    if (link) records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
+    if (link) voice.records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
     return link;
   };
   const auto plan = [&](const catalogue::Profile& profile) { return plan_of(options, profile); };
   device::Watcher watcher(open, plan, options.reconnection, context.clock,
-                          [&](const device::News& news) { return stage.tell(news, *records); });
-  return watcher.run([&] { return stage.until(); });
+                          [&](const device::News& news) { return stage.tell(news, voice); });
+  const auto of_tool = [&](Error error) {
+    if (is_about_tool(error)) return tool.target().blamed(std::move(error));
+    error.asked_of = tool.target().shown;
+    return error;
+  };
+  auto watched = watcher.run([&] { return stage.until(); }).map_error(of_tool);
+  auto unreached = watcher.unreached();
+  if (unreached) unreached = of_tool(std::move(*unreached));
+  stage.leave(watched, unreached, voice);
 }
 
 }  // namespace
 
 Result<Outcome> watch(const WatchOptions& options, Context& context) {
   ProfileShelf shelf(context.profiles);
-  auto tools = prepare_tools(options.targets, shelf, context);
+  auto tools = prepare_tools(options.targets, options.names, shelf, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   for (const WatchedTool& tool : *tools) {
     if (auto checked = check(options, tool, shelf, context); !checked) {
@@ -270,11 +398,8 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
   Stage stage(options, tools->size(), columns_for(*tools, options), context);
-  for_each_side_by_side(*tools, [&](WatchedTool& tool) {
-    auto watched = watch_one(tool, open_transport, stage, options, context);
-    if (!watched) watched.error().asked_of = tool.target().shown;
-    stage.leave(watched);
-  });
+  for_each_side_by_side(
+      *tools, [&](WatchedTool& tool) { watch_one(tool, open_transport, stage, options, context); });
   return stage.finish();
 }
 

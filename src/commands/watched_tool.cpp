@@ -23,8 +23,9 @@ Result<const KnownProfile*> ProfileShelf::take(const std::string& id) {
   return place.get();
 }
 
-Result<WatchedTool> WatchedTool::make(Target target, ProfileShelf& shelf, const Context& context) {
-  WatchedTool tool(std::move(target), shelf, context);
+Result<WatchedTool> WatchedTool::make(Target target, const std::vector<std::string>& names,
+                                      ProfileShelf& shelf, const Context& context) {
+  WatchedTool tool(std::move(target), names, shelf, context);
   if (tool.target_.profile.empty()) return tool;
   return tool.learn(tool.target_.profile).map([&] { return std::move(tool); });
 }
@@ -35,10 +36,32 @@ Result<void> WatchedTool::learn(const std::string& profile) {
 
 Result<void> WatchedTool::find_profile(const Context& context) {
   auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (!tool) return do_without_profile(std::move(tool.error()), context);
   target_ = tool->target;
   target_.profile = tool->profile->id;
   return learn(target_.profile);
+}
+
+/// Raw registers can be read of a tool that says nothing of itself. One that did not even answer is
+/// asked for them first: it may be asleep, and a known one when it wakes up.
+Result<void> WatchedTool::do_without_profile(Error why, const Context& context) {
+  const bool raw = !names_->empty() && std::all_of(names_->begin(), names_->end(), [](auto& name) {
+    return name.starts_with('@');
+  });
+  const ExitStatus status = why.status();
+  const bool may_pass = status == ExitStatus::no_answer || status == ExitStatus::malformed;
+  const bool nameless =
+      raw && (may_pass || status == ExitStatus::mismatch || status == ExitStatus::usage);
+  if (!nameless) return tl::unexpected(std::move(why));
+  if (may_pass) {
+    const auto wanted = shelf_->nameless()->profile.select(*names_);
+    auto device = connect_device(target_, shelf_->nameless()->profile, context);
+    if (!wanted || !device || !device->read_each(*wanted, device::Limits::skip)) {
+      return tl::unexpected(std::move(why));
+    }
+  }
+  known_ = shelf_->nameless();
+  return {};
 }
 
 Result<device::Watcher::Link> WatchedTool::open(Duration patience,
@@ -68,6 +91,7 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
 }
 
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+                                               const std::vector<std::string>& names,
                                                ProfileShelf& shelf, const Context& context) {
   auto resolved = resolve_targets(targets, context);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
@@ -75,7 +99,7 @@ Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& t
   std::vector<catalogue::LinkFacts> facts;
   tools.reserve(resolved->size());
   for (const Target& target : *resolved) {
-    auto tool = WatchedTool::make(target, shelf, context);
+    auto tool = WatchedTool::make(target, names, shelf, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     const KnownProfile* known = tool->known();
     facts.push_back(known == nullptr ? catalogue::LinkFacts() : known->profile.link);

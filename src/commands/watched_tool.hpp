@@ -26,18 +26,24 @@ class ProfileShelf {
   /// Stays valid as long as the shelf.
   Result<const KnownProfile*> take(const std::string& id);
 
+  /// What is known of a tool that says nothing of itself: registers without names.
+  [[nodiscard]] const KnownProfile* nameless() const { return &nameless_; }
+
  private:
   const files::ProfileStore* store_;
   std::mutex mutex_;
   std::map<std::string, std::unique_ptr<const KnownProfile>> profiles_;
+  const KnownProfile nameless_ = {};
 };
 
 /// A tool that is opened again and again. Where its profile is not known, it is asked at the first
 /// time, so that a tool that is not there keeps nobody from the others.
 class WatchedTool {
  public:
-  /// Loads the profile of a target that names one. `shelf` and `context` must outlive it.
-  static Result<WatchedTool> make(Target target, ProfileShelf& shelf, const Context& context);
+  /// Loads the profile of a target that names one. `names` are the values that are wanted: raw
+  /// registers alone need no profile. `names`, `shelf` and `context` must outlive it.
+  static Result<WatchedTool> make(Target target, const std::vector<std::string>& names,
+                                  ProfileShelf& shelf, const Context& context);
 
   [[nodiscard]] const Target& target() const { return target_; }
   /// Null until the tool has said what it is.
@@ -49,21 +55,26 @@ class WatchedTool {
                                      const device::OpenTransport& open_transport);
 
  private:
-  WatchedTool(Target target, ProfileShelf& shelf, const Context& context)
-      : target_(std::move(target)), shelf_(&shelf), context_(&context) {}
+  WatchedTool(Target target, const std::vector<std::string>& names, ProfileShelf& shelf,
+              const Context& context)
+      : target_(std::move(target)), names_(&names), shelf_(&shelf), context_(&context) {}
 
   Result<void> find_profile(const Context& context);
+  Result<void> do_without_profile(Error why, const Context& context);
   Result<void> learn(const std::string& profile);
 
   Target target_;
+  const std::vector<std::string>* names_;
   ProfileShelf* shelf_;
   const Context* context_;
   const KnownProfile* known_ = nullptr;
   link::SessionOptions::Past past_ = link::SessionOptions::Past::clean;
 };
 
-/// Resolves targets, asking none of them. Those of one line have the same settings.
+/// Resolves targets, asking none of them. Those of one line have the same settings. All but
+/// `targets` must outlive the tools.
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+                                               const std::vector<std::string>& names,
                                                ProfileShelf& shelf, const Context& context);
 
 /// Calls `handle` for every tool, each in a thread of its own when there are several, and returns

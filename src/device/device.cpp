@@ -303,6 +303,13 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
     error.endpoint = endpoint_beside(endpoint, options);
     return tl::unexpected(std::move(error));
   }
+  if (options.reopening == link::Reopening::once && endpoint.medium == link::Medium::tcp) {
+    const auto open = [=, facts = profile.link] {
+      return open_transport(endpoint, facts, connect_timeout);
+    };
+    *transport = std::make_unique<link::ReopeningTransport>(std::move(*transport), open, clock,
+                                                            options.trace);
+  }
   auto session = std::make_unique<link::Session>(
       std::move(*transport), clock, session_options(profile, endpoint, options, clock.now()),
       options.trace);

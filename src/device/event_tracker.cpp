@@ -14,31 +14,49 @@ constexpr std::uint32_t wrap_reach = 1024;
 
 constexpr std::uint32_t numbers = 65536;
 
+/// How far a tool that began to count anew can have come: soon so far, and then no faster than
+/// this. Generous, because a doubt too many costs a line, and one too few hides lost results.
+constexpr std::int64_t soon_reached = 256;
+constexpr Duration fastest_event = std::chrono::milliseconds(100);
+
+bool are_equal(RegisterView one, RegisterView other) {
+  return std::equal(one.begin(), one.end(), other.begin(), other.end());
+}
+
 }  // namespace
 
 bool EventTracker::is_blank(RegisterView block) {
   return std::all_of(block.begin(), block.end(), [](std::uint16_t word) { return word == 0; });
 }
 
+bool EventTracker::may_be_counted_anew(std::uint16_t number) const {
+  return unseen_ && number <= soon_reached + *unseen_ / fastest_event;
+}
+
 Tracked EventTracker::judge(std::uint16_t number, RegisterView block) const {
   if (!last_) return {Novelty::baseline};
   const std::uint32_t step = (number + numbers - *last_) % numbers;
-  if (step == 0) return {Novelty::repeat};
-  if (number > *last_) {
-    return step == 1 ? Tracked{Novelty::next} : Tracked{Novelty::jump, step - 1};
+  if (step == 0) {
+    const bool other = last_block_ && !are_equal(*last_block_, block);
+    return {other ? Novelty::restart : Novelty::repeat};
   }
-  if (step <= wrap_reach && !is_blank(block)) return {Novelty::wrap, step - 1};
-  return {Novelty::restart};
+  const bool wrapped = number < *last_;
+  if (wrapped && (step > wrap_reach || is_blank(block))) return {Novelty::restart};
+  if (may_be_counted_anew(number)) return {Novelty::doubtful};
+  if (wrapped) return {Novelty::wrap, step - 1};
+  return step == 1 ? Tracked{Novelty::next} : Tracked{Novelty::jump, step - 1};
 }
 
 Tracked EventTracker::track(std::uint16_t number, RegisterView block) {
   const bool known = std::any_of(recent_.begin(), recent_.end(), [&](const Registers& earlier) {
-    return std::equal(earlier.begin(), earlier.end(), block.begin(), block.end());
+    return are_equal(earlier, block);
   });
   if (known) return {Novelty::repeat};
   const Tracked tracked = judge(number, block);
+  unseen_.reset();
   last_ = number;
-  recent_.emplace_back(block.begin(), block.end());
+  last_block_.emplace(block.begin(), block.end());
+  recent_.push_back(*last_block_);
   if (recent_.size() > remembered) recent_.pop_front();
   return tracked;
 }

@@ -14,6 +14,19 @@ namespace {
 constexpr Duration first_back_off = std::chrono::milliseconds(250);
 constexpr Duration last_back_off = std::chrono::seconds(10);
 
+/// A link that has served for so long has lasted: a little less than a second, which is how often a
+/// tool is kept alive, or polled by who asks for that.
+constexpr Duration long_enough = std::chrono::milliseconds(900);
+
+/// What is read between the values may cost them a tenth of their pace.
+constexpr std::uint64_t requests_for_a_look = 10;
+
+/// How often the meaning of bits is read instead of what the motor does.
+constexpr unsigned looks_for_meanings = 8;
+
+/// A line that is too slow for what is asked is told at once, then this often.
+constexpr Duration lag_told_every = std::chrono::minutes(1);
+
 /// How long a wait may be before it is asked anew when to end.
 constexpr Duration longest_pause = std::chrono::seconds(1);
 
@@ -70,6 +83,10 @@ std::optional<GapNews> gap_of(const Tracked& tracked, EventSource source) {
   switch (tracked.novelty) {
     case Novelty::restart:
       return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
+    case Novelty::doubtful:
+      return GapNews{std::nullopt,
+                     "the tool may have been restarted while nobody was connected, and count its "
+                     "events anew"};
     case Novelty::wrap:
       return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
     case Novelty::jump:
@@ -102,7 +119,14 @@ Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, 
 Result<void> Watcher::run(const Until& until) {
   auto watched = watch(until);
   leave();
+  if (beat_.missed > 0) tell_lag(clock_->now());
   return watched;
+}
+
+std::optional<Error> Watcher::unreached() const {
+  if (reached_) return std::nullopt;
+  return trouble_.value_or(
+      Error{.code = Errc::connect_timeout, .message = "no connection before the watch ended"});
 }
 
 bool Watcher::goes_on(const Until& until) const { return !stopped_ && clock_->now() < until(); }
@@ -136,28 +160,38 @@ Result<void> Watcher::pause(const Until& until) {
   return {};
 }
 
-/// At once after a link that served; else a quarter of a second, doubling up to ten seconds. Up to
+/// At once where nothing failed yet; else a quarter of a second, doubling up to ten seconds. Up to
 /// a fifth less, so that many watchers of one access point do not come back all at once.
-Duration Watcher::back_off() const {
-  if (failures_ == 0) return Duration::zero();
-  const unsigned doublings = std::min(failures_ - 1, 10U);
+Duration Watcher::back_off(unsigned failures) const {
+  if (failures == 0) return Duration::zero();
+  const unsigned doublings = std::min(failures - 1, 10U);
   const Duration even = std::min(last_back_off, first_back_off * (std::int64_t{1} << doublings));
   constexpr std::int64_t whole = 1000;
   constexpr std::int64_t steps = 201;
   return even * (whole - clock_->now().time_since_epoch().count() % steps) / whole;
 }
 
-/// Says what became of the link, and when it is tried again.
+/// Says what became of the link, and when it is tried again: at once where it has lasted, or is the
+/// first one that served and did not.
 void Watcher::tell_trouble(const Error& error) {
+  const TimePoint now = clock_->now();
+  trouble_ = error;
   if (link_) {
     hear_waiting();  // what had arrived before the line broke is still true
     tell(LinkNews{LinkState::lost, 0, message_of(error)});
-  } else if (reconnection_ == Reconnection::forever) {
-    tell(LinkNews{LinkState::reconnecting, failures_ + 1, message_of(error)});
+    attempts_ = 0;
+  } else {
+    ++attempts_;
+    if (reconnection_ == Reconnection::forever) {
+      const LinkState state = reached_ ? LinkState::reconnecting : LinkState::connecting;
+      tell(LinkNews{state, attempts_, message_of(error)});
+    }
   }
-  failures_ = served_ ? 0 : failures_ + 1;
+  const bool lasted = link_ && served_ && now - connected_at_ >= long_enough;
+  short_lived_ = lasted ? 0 : short_lived_ + 1;
+  const unsigned forgiven = served_ && !lasted ? 1 : 0;
   served_ = false;
-  retry_at_ = clock_->now() + back_off();
+  retry_at_ = now + back_off(short_lived_ - forgiven);
 }
 
 Result<void> Watcher::greet(Link link) {
@@ -165,6 +199,8 @@ Result<void> Watcher::greet(Link link) {
     if (auto learned = learn(link.device.profile()); !learned) return learned;
   }
   link_ = std::move(link);
+  connected_at_ = clock_->now();
+  reached_ = true;
   compare_identity(link_->identity);
   return begin();
 }
@@ -174,7 +210,9 @@ Result<void> Watcher::learn(const catalogue::Profile& profile) {
   if (!plan) return tl::unexpected(std::move(plan.error()));
   plan_ = std::move(*plan);
   previous_.assign(plan_.values.size(), std::nullopt);
+  polled_ = plan_.values;
   motor_.reset();
+  if (plan_.motor) motor_.emplace(*plan_.motor, plan_.values);
   profile_ = &profile;
   layout_.reset();
   if (profile.events) layout_.emplace(profile);
@@ -190,7 +228,7 @@ void Watcher::compare_identity(const std::string& identity) {
     message += ": " + identity;
   }
   known_identity_ = identity;
-  tell(LinkNews{LinkState::connected, failures_, message});
+  tell(LinkNews{LinkState::connected, attempts_, message});
   if (!other) return;
   if (plan_.events != EventMode::none) {
     tell(GapNews{std::nullopt, "what the tool of before did after its link was lost is not known"});
@@ -204,10 +242,13 @@ void Watcher::compare_identity(const std::string& identity) {
 Result<void> Watcher::begin() {
   const TimePoint now = clock_->now();
   keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
-  poll_due_ = now;
+  poll_due_ = std::max(now, poll_due_);
+  beat_ = {.since = poll_due_, .missed = beat_.missed};
+  meanings_known_ = false;
   if (plan_.events == EventMode::none) return {};
-  tracker_.forget_blocks();
-  if (!tracker_.last()) {
+  if (tracker_.last()) {
+    tracker_.look_again(now - seen_at_);
+  } else {
     const auto number = link_->device.event_number();
     if (!number) return tl::unexpected(number.error());
     tracker_.set_baseline(*number);
@@ -218,7 +259,7 @@ Result<void> Watcher::begin() {
     if (!armed) return armed;
     arm_due_ = now + with_margin(profile_->events->arm_every);
   }
-  return fetch_last(EventSource::catch_up).map([](Fetched) {});
+  return fetch_last(EventSource::catch_up).map([this](Fetched) { seen_at_ = clock_->now(); });
 }
 
 // ---- serving ----
@@ -240,7 +281,7 @@ TimePoint Watcher::next_due() const {
   TimePoint due = clock_->now() + longest_pause;
   if (profile_->link.keep_alive > Duration::zero()) due = std::min(due, keep_alive_due_);
   if (plan_.events == EventMode::push) due = std::min(due, arm_due_);
-  if (plan_.events == EventMode::poll || polls_values()) due = std::min(due, poll_due_);
+  if (polls()) due = std::min(due, poll_due_);
   return due;
 }
 
@@ -256,14 +297,37 @@ Result<void> Watcher::run_due() {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
     if (auto alive = keep_alive(); !alive) return alive;
   }
-  if (now < poll_due_) return {};
-  poll_due_ = now + plan_.interval;
-  return poll();
+  if (!polls() || now < poll_due_) return {};
+  const TimePoint due = poll_due_;
+  keep_beat(now);
+  auto polled = poll();
+  if (!polled) poll_due_ = due;  // what was not read is read as soon as it can be
+  return polled;
+}
+
+/// The next poll is due on the beat; a beat that is over has been missed.
+void Watcher::keep_beat(TimePoint now) {
+  const auto skipped = (now - poll_due_) / plan_.interval;
+  poll_due_ += (skipped + 1) * plan_.interval;
+  beat_.missed += static_cast<std::uint32_t>(skipped);
+  const bool silent = lag_told_at_ && now < *lag_told_at_ + lag_told_every;
+  if (beat_.missed > 0 && !silent) tell_lag(now);
+  ++beat_.polls;
+}
+
+void Watcher::tell_lag(TimePoint now) {
+  const Duration achieved = beat_.polls == 0
+                                ? plan_.interval
+                                : (now - beat_.since) / std::max<std::int64_t>(beat_.polls, 1);
+  tell(LagNews{beat_.missed, plan_.interval, achieved});
+  beat_ = {.since = now};
+  lag_told_at_ = now;
 }
 
 Result<void> Watcher::keep_alive() {
   return ask([&] { return link_->device.ping().map([](Duration) {}); }).map([&] {
     served_ = true;
+    seen_at_ = clock_->now();
   });
 }
 
@@ -284,9 +348,13 @@ Result<void> Watcher::poll() {
     if (*number != tracker_.last()) {
       if (auto fetched = fetch_polled(*number); !fetched) return fetched;
     }
+    seen_at_ = clock_->now();
   }
   if (!polls_values()) return {};
-  return poll_values().map([&] { served_ = true; });
+  return poll_values().map([&] {
+    served_ = true;
+    seen_at_ = clock_->now();
+  });
 }
 
 /// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
@@ -300,19 +368,25 @@ Result<void> Watcher::fetch_polled(std::uint16_t number) {
   return {};
 }
 
+/// The values on every beat; what else has to be known between them.
 Result<void> Watcher::poll_values() {
-  std::vector<catalogue::Parameter> wanted = plan_.values;
-  if (plan_.motor) {
-    const auto& more = plan_.motor->parameters();
-    wanted.insert(wanted.end(), more.begin(), more.end());
+  if (!meanings_known_) {
+    if (auto learned = learn_meanings(); !learned) return learned;
   }
-  auto readings = link_->device.read_each(wanted, Limits::skip);
+  const std::uint64_t before = requests();
+  if (auto read = read_values(); !read || stopped_) return read;
+  requests_owed_ += requests() - before;
+  return look_between();
+}
+
+Result<void> Watcher::read_values() {
+  if (polled_.empty()) return {};
+  auto readings = link_->device.read_each(polled_, Limits::skip);
   if (!readings) return tl::unexpected(std::move(readings.error()));
-  if (plan_.motor) {
-    const auto state = std::span<const Reading>(*readings).subspan(plan_.values.size());
-    if (auto judged = judge_motor(state); !judged) return judged;
+  if (motor_) {
+    if (auto told = tell_motor(motor_->take(link_->device, *readings)); !told) return told;
   }
-  for (std::size_t index = 0; index < plan_.values.size() && !stopped_; ++index) {
+  for (std::size_t index = 0; index < polled_.size() && !stopped_; ++index) {
     Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(std::move(reading.value.error()));
     tell_reading(index, reading);
@@ -320,15 +394,48 @@ Result<void> Watcher::poll_values() {
   return {};
 }
 
-/// What happened to the motor since it was last looked at. At first there is nothing to compare.
-Result<void> Watcher::judge_motor(std::span<const Reading> readings) {
-  const auto state = Motor::state_of(readings, plan_.motor->facts());
-  if (!state) return tl::unexpected(state.error());
-  const auto before = std::exchange(motor_, *state);
-  if (!before) return {};
-  for (const MotorEvent event : events_between(*before, *state)) {
-    tell(MotorNews{event, *state, clock_->wall()});
+/// Which names of bits count is decided by another parameter, which hardly ever changes.
+Result<void> Watcher::learn_meanings() {
+  std::vector<catalogue::Parameter> open;
+  for (const catalogue::Parameter& parameter : plan_.values) {
+    if (!parameter.bits_by.empty()) open.push_back(parameter);
   }
+  meanings_known_ = true;
+  if (open.empty()) return {};
+  auto readings = link_->device.read_each(open, Limits::skip);
+  if (!readings) return tl::unexpected(std::move(readings.error()));
+  for (Reading& reading : *readings) {
+    for (catalogue::Parameter& parameter : polled_) {
+      if (parameter.name == reading.parameter.name) parameter = reading.parameter;
+    }
+  }
+  return {};
+}
+
+/// One piece at a time, where there is time for it before the next beat, or where its turn has come
+/// although there is none.
+Result<void> Watcher::look_between() {
+  const bool has_meanings = std::any_of(plan_.values.begin(), plan_.values.end(),
+                                        [](const auto& each) { return !each.bits_by.empty(); });
+  if (!has_meanings && !(motor_ && motor_->needs_turns())) return {};
+  const TimePoint began = clock_->now();
+  const std::uint64_t before = requests();
+  const bool has_time = began + last_look_ + last_look_ / 2 <= poll_due_;
+  if (!has_time && requests_owed_ < requests_for_a_look) return {};
+  requests_owed_ = 0;
+  const bool of_meaning = has_meanings && ++looks_between_ % looks_for_meanings == 0;
+  if (of_meaning) return learn_meanings();
+  if (!motor_ || !motor_->needs_turns()) return {};
+  auto told = tell_motor(motor_->take_turn(link_->device));
+  // What happened may have been looked at more closely.
+  const auto made = static_cast<std::int64_t>(requests() - before);
+  last_look_ = (clock_->now() - began) / std::max<std::int64_t>(made, 1);
+  return told;
+}
+
+Result<void> Watcher::tell_motor(Result<std::vector<MotorNews>> news) {
+  if (!news) return tl::unexpected(std::move(news.error()));
+  for (const MotorNews& one : *news) tell(one);
   return {};
 }
 
@@ -387,6 +494,7 @@ void Watcher::hear_waiting() {
 
 void Watcher::hear(const link::Spontaneous& frame) {
   if (plan_.events == EventMode::none) return;
+  seen_at_ = clock_->now();
   judge(EventSource::push, modbus::registers_of(frame.pdu), frame.wall);
 }
 
@@ -399,7 +507,8 @@ void Watcher::judge(EventSource source, const Registers& block, WallTime time) {
                            (source != EventSource::push || EventTracker::is_blank(block));
   if (nothing_yet) return;
   served_ = true;
-  tell(EventNews{source, block, time});
+  const bool remembered = tracked.novelty == Novelty::restart && source != EventSource::push;
+  tell(EventNews{source, block, time, remembered ? Standing::remembered : Standing::result});
 }
 
 void Watcher::tell(const News& news) {

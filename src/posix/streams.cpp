@@ -3,9 +3,11 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <climits>
 #include <system_error>
 
 #include "posix/wait.hpp"
@@ -23,14 +25,39 @@ bool hold_standard_descriptors() {
   return true;
 }
 
-Result<void> write_out(std::string_view text) {
-  const int failure = write_whole(STDOUT_FILENO, text, WhenFull::wait);
+namespace {
+
+Result<void> out_result(int failure) {
   if (failure == 0) return {};
   if (failure == EPIPE) return tl::unexpected(Error{.code = Errc::closed_pipe});
   return tl::unexpected(Error{
       .code = Errc::storage,
       .message = "standard output cannot be written: " + std::generic_category().message(failure),
   });
+}
+
+bool out_is_file() {
+  struct stat about = {};
+  return ::fstat(STDOUT_FILENO, &about) == 0 && S_ISREG(about.st_mode);
+}
+
+}  // namespace
+
+Result<void> write_out(std::string_view text) {
+  return out_result(write_whole(STDOUT_FILENO, text, WhenFull::wait));
+}
+
+Result<std::size_t> write_out_for(std::string_view text, Duration patience) {
+  if (out_is_file()) return write_out(text).map([&] { return text.size(); });
+  pollfd room = {STDOUT_FILENO, POLLOUT, 0};
+  const timespec longest = to_timespec(patience);
+  if (::ppoll(&room, 1, &longest, nullptr) <= 0) return 0;
+  // A pipe that has room takes so much at once.
+  const std::string_view piece = text.substr(0, PIPE_BUF);
+  const ssize_t written = ::write(STDOUT_FILENO, piece.data(), piece.size());
+  if (written >= 0) return static_cast<std::size_t>(written);
+  if (errno == EAGAIN || errno == EINTR) return 0;
+  return out_result(errno).map([] { return std::size_t{0}; });
 }
 
 void write_err(std::string_view text) { write_whole(STDERR_FILENO, text, WhenFull::wait); }

@@ -52,6 +52,7 @@ Progress::Progress(Streams& streams, const Clock& clock, Showing showing)
   if (!is_shown_) return;
   out_ = std::move(streams.out);
   err_ = std::move(streams.err);
+  out_for_ = std::move(streams.out_for);
   streams.out = [this](std::string_view text) {
     const std::lock_guard lock(mutex_);
     if (streams_->out_is_terminal) wipe();
@@ -62,6 +63,12 @@ Progress::Progress(Streams& streams, const Clock& clock, Showing showing)
     wipe();
     err_(text);
   };
+  if (!out_for_) return;
+  streams.out_for = [this](std::string_view text, Duration patience) {
+    const std::lock_guard lock(mutex_);
+    if (streams_->out_is_terminal) wipe();
+    return out_for_(text, patience);
+  };
 }
 
 Progress::~Progress() {
@@ -69,6 +76,7 @@ Progress::~Progress() {
   clear();
   streams_->out = std::move(out_);
   streams_->err = std::move(err_);
+  streams_->out_for = std::move(out_for_);
 }
 
 void Progress::advance(const Step& step) {

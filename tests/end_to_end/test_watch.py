@@ -11,13 +11,14 @@ import math
 import os
 import pty
 import signal
+import struct
 import threading
 import time
 import unittest
 
 import support
 from event_server import ARM_REGISTER, NUMBERS, Chance, EventServer
-from hostile_server import EVENT_FIRST
+from hostile_server import EVENT_FIRST, frame
 
 LONG = os.environ.get("SPINDLE_LONG") == "1"
 EVENTS, RATE = (10000, 200) if LONG else (2000, 1000)
@@ -151,6 +152,52 @@ class CompletenessTest(unittest.TestCase):
             )
             self.assertEqual([gap["missed"] for gap in watching.records("gap")], [2])
 
+    def test_counter_that_comes_to_the_last_number_again(self):
+        """Twenty events happen behind a restart; the number that is found hides them."""
+        for since, kind in ((20, 2), (21, 1), (30, 1)):
+            with self.subTest(since), EventServer(first=20) as server:
+                with Watching(server.url, *JSON) as watching:
+                    support.wait_until(lambda: server.caught_up, "it is watched")
+                    with server._lock:
+                        server.cut()
+                        server.number = 0
+                        for _ in range(since - 1):
+                            server.event()
+                        server.event(kind)
+                    support.wait_until(lambda: watching.numbers(), "the last event is told")
+                    watching.end()
+                self.assertEqual([gap["missed"] for gap in watching.records("gap")], [None])
+                self.assertEqual([event["source"] for event in watching.records("event")], ["catch-up"])
+
+    def test_what_a_restarted_tool_remembers_is_no_result(self):
+        for also in ((), ("--output", "csv"), ("--output", "table")):
+            with self.subTest(also), EventServer() as server:
+                arguments = ("watch", server.url, *JSON, *also, "--count", 1)
+                with support.Running(*arguments) as running:
+                    support.wait_until(lambda: server.caught_up, "it is watched")
+                    with server._lock:
+                        server.cut()
+                        server.number = 1900
+                        server._store(1)
+                    support.wait_until(lambda: server.cuts and server.caught_up, "it is watched again")
+                    server.event()  # the only one that counts
+                    finished = running.finish()
+                self.assertEqual(finished.status, 0, finished)
+                if not also:
+                    old, new = finished.records("event")
+                    self.assertEqual((old["source"], old.get("remembered")), ("catch-up", True))
+                    self.assertEqual((new["source"], new.get("remembered")), ("push", None))
+                    summary = finished.records()[-1]
+                    counts = [summary[key] for key in ("events", "ok", "caught_up", "remembered")]
+                    self.assertEqual(counts, [1, 1, 0, 1])
+                else:
+                    old, new = [line for line in finished.stdout.splitlines() if "fastening-ok" in line]
+                    self.assertIn("catch-up", old)
+                    self.assertNotRegex(old, r"\bOK\b")
+                    self.assertIn("push", new)
+                    self.assertRegex(new, r"\bOK\b")
+                    self.assertIn("1 event, 1 OK", finished.stderr)
+
     def test_polling_without_arming(self):
         with EventServer() as server:
             arguments = (server.url, *JSON, "--no-push", "--interval", "20ms", "--count", 3)
@@ -248,7 +295,7 @@ class EndingTest(unittest.TestCase):
             server.event(2, 335)
             self.assertTrue(running.line().startswith("TIME"))
             self.assertIn("connected", running.line())
-            self.assertRegex(running.line(), r"fastening-ng +1962 .* NG +E335 \w+")
+            self.assertRegex(running.line(), r"fastening-ng +1962 .* NG +push +E335 \w+")
             running.send_signal(signal.SIGINT)
             finished = running.finish()
             self.assertEqual(finished.status, 130, finished)
@@ -325,6 +372,65 @@ class EndingTest(unittest.TestCase):
             finished = support.run("watch", url, *JSON, "--no-reconnect")
             self.assertEqual(finished.status, 4, finished)
             self.assertEqual(finished.records("link"), [])
+
+
+class Unread(Watching):
+    """A watch whose output nobody reads for a while."""
+
+    def __init__(self, *arguments):
+        self.reading = threading.Event()
+        super().__init__(*arguments)
+
+    def __exit__(self, *_):
+        self.reading.set()
+        super().__exit__()
+
+    def _read(self):
+        self.reading.wait()
+        super()._read()
+
+
+class UnreadOutputTest(unittest.TestCase):
+    def test_tool_is_kept_alive_and_what_was_not_told_is_a_gap(self):
+        with EventServer(expires=ARM_EXPIRES) as server:
+            first = server.number + 1
+            with Unread(server.url, *JSON) as watching:
+                support.wait_until(lambda: server.caught_up, "it is watched")
+                server.run(6000, 1000)
+                self.assertTrue(server.armed)
+                self.assertEqual(server.cuts, 0)
+                self.assertGreaterEqual(len(server.asked(support.REPORT_SERVER_ID)), 5)
+                self.assertGreaterEqual(len(server.asked(support.WRITE_SINGLE, ARM_REGISTER, 1)), 2)
+                watching.reading.set()
+                support.wait_until(lambda: len(watching.numbers()) > 1000, "what waited is told")
+                support.wait_until(
+                    lambda: server.event() or watching.numbers()[-1:] == [server.number],
+                    "events are told again",
+                )
+                last = server.number
+                status, _, _ = watching.end()
+            self.assertEqual(status, 143)
+            gaps = watching.records("gap")
+            self.assertEqual(len(gaps), 1, gaps)
+            self.assertEqual(gaps[0]["missed"], gaps[0]["dropped"])
+            self.assertEqual(unaccounted(watching.records(), first, last), "")
+            assert_disarmed(server)
+
+    def test_first_signal_ends_it_with_the_tool_disarmed(self):
+        for number, expected in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            with self.subTest(number), EventServer() as server:
+                with support.Running("watch", server.url, *JSON) as running:
+                    support.wait_until(lambda: server.caught_up, "it is watched")
+                    server.run(400, 1000)  # more than a pipe holds
+                    running.send_signal(number)
+                    status = support.wait_for_end(running.process)
+                    text = running.process.stdout.read().decode()
+                    stderr = running.process.stderr.read().decode()
+                self.assertEqual(status, expected)
+                self.assertIn("could not be written", stderr)
+                told = text.split("\n")[:-1]  # the last line may be cut off: nobody took its end
+                self.assertGreater(len([support.parse_json(line) for line in told]), 50)
+                assert_disarmed(server)
 
 
 class TerminalTest(unittest.TestCase):
@@ -437,7 +543,7 @@ class ReconnectingTest(unittest.TestCase):
 
         with HangingUp() as server:
             finished = support.run("watch", server.url, *JSON, "--duration", "2s")
-        self.assertEqual(finished.status, 0, finished)
+        self.assertEqual(finished.status, 5, finished)
         self.assertIn(len(accepted), range(2, 6))  # at 0, 0.25, 0.75, 1.75 s and a fifth less, or later
 
     def test_a_dead_tool_does_not_delay_another(self):
@@ -463,6 +569,136 @@ class ReconnectingTest(unittest.TestCase):
             finished = support.run("watch", server.url, later.url, *JSON, "--duration", "2s")
             self.assertEqual(finished.status, 9, finished)
             self.assertEqual([error["target"] for error in finished.records("error")], [later.url])
+
+
+FAR = """
+format: 1
+id: far
+title: "Two registers that are far apart"
+link: {framing: tcp, port: 502, unit: 1, transaction: echoed, max-read: 16, max-write: 16, pairs: any,
+       answer: 2s, connect: 5s, retries: 1}
+parameters:
+  - {name: a, register: 5000, encoding: u16, access: rw, evidence: manual, source: x, title: A}
+  - {name: b, register: 5010, encoding: u16, access: rw, evidence: manual, source: x, title: B}
+"""
+
+
+class HangingUpServer(support.Port):
+    """Registers 5000 and 5010, and nothing else: FC 11h is refused. Hangs up behind every answer, if asked."""
+
+    def __init__(self, hangs_up=True):
+        super().__init__()
+        self.holding = {5000: 273, 5010: 4}
+        self.accepted, self.hangs_up = 0, hangs_up
+
+    def _serve(self, client):
+        self.accepted += 1
+        buffer = bytearray()
+        with contextlib.suppress(OSError), client:
+            while chunk := client.recv(4096):
+                buffer += chunk
+                for request in support.take_requests(buffer):
+                    client.sendall(frame(request.transaction, *self._answer(request), unit=1))
+                    if self.hangs_up:
+                        return
+
+    def _answer(self, request):
+        if request.function == support.READ_HOLDING and request.words[1] == 1:
+            return request.function, struct.pack(">BH", 2, self.holding[request.words[0]])
+        if request.function == support.WRITE_SINGLE:
+            self.holding[request.words[0]] = request.words[1]
+            return request.function, request.data
+        return request.function | 0x80, b"\x01"
+
+
+class ToolThatHangsUpTest(unittest.TestCase):
+    def setUp(self):
+        self.profile = support.home().path / "far.yaml"
+        self.profile.write_text(FAR)
+
+    def test_interval_is_kept(self):
+        with HangingUpServer() as server:
+            finished = support.run(
+                *("watch", server.url, "--profile", self.profile, "a", "--json"),
+                *("--interval", "5s", "--duration", "3s"),
+            )
+        self.assertEqual(finished.status, 0, finished)
+        self.assertIn(server.accepted, (1, 2, 3))
+
+    def test_pauses_grow(self):
+        with HangingUpServer() as server:
+            finished = support.run(
+                *("watch", server.url, "--profile", self.profile, "a", "--json"),
+                *("--interval", "20ms", "--duration", "3s"),
+            )
+        self.assertEqual(finished.status, 0, finished)
+        self.assertIn(server.accepted, range(3, 8))  # at 0, 0, 0.25, 0.75, 1.75 s, or a fifth sooner
+
+    def test_get_and_set(self):
+        with HangingUpServer() as server:
+            for value in range(1, 21):
+                arguments = (server.url, "--profile", self.profile, "--json")
+                finished = support.run("set", *arguments, f"a={value}", f"b={value + 1}")
+                self.assertEqual(finished.status, 0, finished)
+                self.assertEqual(server.holding, {5000: value, 5010: value + 1})
+                finished = support.run("get", *arguments)
+                self.assertEqual(finished.status, 0, finished)
+                self.assertEqual([v["value"] for v in finished.records("value")], [value, value + 1])
+
+    def test_error_without_reconnection_names_the_tool(self):
+        with HangingUpServer() as server:
+            finished = support.run("watch", server.url, "--profile", self.profile, "a", "--no-reconnect")
+        self.assertEqual(finished.status, 5, finished)
+        self.assertIn(f"spindle: {server.url}: the tool closed the connection", finished.stderr)
+
+
+class UnknownToolTest(unittest.TestCase):
+    def test_raw_registers_need_no_profile(self):
+        for hangs_up in (False, True):
+            with self.subTest(hangs_up), HangingUpServer(hangs_up) as server:
+                finished = support.run(
+                    *("watch", server.url, "@holding:5000", "--json"),
+                    *("--interval", "1s", "--all", "--count", 2),
+                )
+                self.assertEqual(finished.status, 0, finished)
+                samples = finished.records("sample")
+                self.assertEqual([(s["name"], s["value"]) for s in samples], [("@holding:5000", 273)] * 2)
+
+    def test_names_still_need_one(self):
+        with HangingUpServer(hangs_up=False) as server:
+            finished = support.run("watch", server.url, "@holding:5000", "status.ready", "--json")
+        self.assertEqual(finished.status, 8, finished)
+
+    def test_tool_never_reached(self):
+        class Silent(support.Port):
+            def _serve(self, client):
+                with contextlib.suppress(OSError), client:
+                    while client.recv(4096):
+                        pass
+
+        ends = (("--duration", "700ms"), ("--idle-timeout", "700ms"))
+        for end in ends:
+            with self.subTest(end), support.refusing_port() as url:
+                finished = support.run("watch", url, *JSON, *end)
+                self.assertEqual(finished.status, 4, finished)
+                states = {link["state"] for link in finished.records("link")}
+                self.assertEqual(states, {"connecting"})
+                errors = finished.records("error")
+                self.assertEqual([(e["target"], e["exit_status"]) for e in errors], [(url, 4)])
+            with self.subTest(end), Silent() as server:
+                finished = support.run("watch", server.url, *JSON, *end, "--timeout", "100ms")
+                self.assertEqual(finished.status, 5, finished)
+                self.assertEqual(finished.records()[-1]["exit_status"], 5)
+
+    def test_one_of_two_never_reached(self):
+        with EventServer() as server, support.refusing_port() as url:
+            with Watching(server.url, url, *JSON, "--count", 1) as watching:
+                support.wait_until(lambda: server.armed, "the other one is watched")
+                support.wait_until(lambda: "connecting" in watching.links(), "it is tried")
+                server.event()
+                status, _, _ = watching.end(None)
+            self.assertEqual(status, 9)
+            self.assertEqual([error["target"] for error in watching.records("error")], [url])
 
 
 class UsageTest(unittest.TestCase):
@@ -514,7 +750,10 @@ class ValuesTest(unittest.TestCase):
             finished = support.run(
                 "watch", server.url, "status.ready", *JSON, "--interval", "10ms", "--count", 5, "--all"
             )
-            self.assertEqual([c["value"] for c in finished.records("change")], [1] * 5)
+            self.assertEqual([c["value"] for c in finished.records("sample")], [1] * 5)
+            self.assertEqual(finished.records("change"), [])
+            summary = finished.records()[-1]
+            self.assertEqual((summary["changes"], summary["samples"]), (0, 5))
 
     def test_refused_value_ends_with_that_error(self):
         with EventServer() as server:

@@ -8,6 +8,7 @@ using namespace spindle;
 using device::EventTracker;
 using device::Novelty;
 using device::Tracked;
+using namespace std::chrono_literals;
 
 namespace {
 
@@ -88,7 +89,7 @@ TEST_CASE("a late repeat of an older event is no restart") {
     CHECK(track(tracker, 110, 8).novelty == Novelty::restart);
   }
   SUBCASE("a new connection brings nothing late") {
-    tracker.forget_blocks();
+    tracker.look_again(1s);
     CHECK(track(tracker, 110).novelty == Novelty::restart);
     CHECK(track(tracker, 111).novelty == Novelty::next);
   }
@@ -103,11 +104,50 @@ TEST_CASE("a late repeat of the event before the first is no restart") {
   CHECK(track(tracker, 1963).novelty == Novelty::next);
 }
 
-TEST_CASE("the number decides: the last one with other registers is still a repeat") {
+TEST_CASE("the last number with other registers is another event: the tool counts anew") {
   EventTracker tracker;
   tracker.set_baseline(1962);
+  CHECK(track(tracker, 1962, 8).novelty == Novelty::repeat);  // whose registers were not known yet
   CHECK(track(tracker, 1962, 8).novelty == Novelty::repeat);
-  CHECK(track(tracker, 1963, 8).novelty == Novelty::next);
+  SUBCASE("on the same connection") {}
+  SUBCASE("on another one") { tracker.look_again(1s); }
+  CHECK(track(tracker, 1962, 9).novelty == Novelty::restart);
+  CHECK(track(tracker, 1963, 9).novelty == Novelty::next);
+}
+
+TEST_CASE("a number that a tool can have counted anew to while nobody looked is doubtful") {
+  struct Unseen {
+    const char* what;
+    std::uint16_t last;
+    Duration time;
+    std::uint16_t number;
+    Novelty novelty;
+    std::uint32_t missed;
+  };
+  const std::vector<Unseen> rows = {
+      {"just past the last, soon after power-on", 20, 1s, 21, Novelty::doubtful, 0},
+      {"farther past it", 20, 1s, 30, Novelty::doubtful, 0},
+      {"nothing happened", 20, 1s, 20, Novelty::repeat, 0},
+      {"a number that takes a day to count to", 1961, 20s, 1962, Novelty::next, 0},
+      {"the same after a night", 1961, 12h, 1962, Novelty::doubtful, 0},
+      {"a count of what was missed", 1961, 20s, 1965, Novelty::jump, 3},
+      {"as far as a tool is believed to come", 10, 10s, 356, Novelty::doubtful, 0},
+      {"farther than that", 10, 10s, 357, Novelty::jump, 346},
+      {"over the end of the counter, or anew", 65530, 1s, 3, Novelty::doubtful, 0},
+      {"smaller: anew for certain", 1961, 1s, 4, Novelty::restart, 0},
+  };
+  for (const Unseen& row : rows) {
+    CAPTURE(row.what);
+    EventTracker tracker;
+    track(tracker, row.last);
+    tracker.look_again(row.time);
+    const Tracked tracked = track(tracker, row.number);
+    CHECK(tracked.novelty == row.novelty);
+    CHECK(tracked.missed == row.missed);
+    CHECK(tracked.is_new() == (row.novelty != Novelty::repeat));
+    // What comes behind it was pushed as it happened.
+    CHECK(track(tracker, static_cast<std::uint16_t>(row.number + 1)).novelty == Novelty::next);
+  }
 }
 
 TEST_CASE(

@@ -20,11 +20,13 @@ using device::EventNews;
 using device::EventSource;
 using device::GapNews;
 using device::Heed;
+using device::LagNews;
 using device::LinkNews;
 using device::LinkState;
 using device::News;
 using device::Reconnection;
 using device::Samples;
+using device::Standing;
 using device::ValueNews;
 using device::Watcher;
 using device::WatchPlan;
@@ -68,7 +70,9 @@ class Workshop {
     Watcher watcher([this] { return open(); },
                     [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
                     reconnection, clock, [this](const News& one) { return hear(one); });
-    return watcher.run([end] { return end; });
+    auto watched = watcher.run([end] { return end; });
+    unreached = watcher.unreached();
+    return watched;
   }
 
   template <typename Kind>
@@ -113,6 +117,7 @@ class Workshop {
   std::vector<Asked> asked;
   std::vector<News> news;
   std::vector<TimePoint> event_heard;
+  std::optional<Error> unreached;
   std::function<void(const modbus::Pdu&)> on_request = {};  ///< just before the tool gets it
   std::size_t wanted = 1'000'000;                           ///< news, then stop
   unsigned generation = 0;  ///< of connections; older ones are broken
@@ -328,9 +333,11 @@ TEST_CASE("attempts come at once, then after 0.25 s, doubling up to 10 s, a fift
     CHECK(pause >= even * 4 / 5);
     jitters = jitters || pause != even;
     CHECK(links[at].attempt == at + 1);
-    CHECK(links[at].state == LinkState::reconnecting);
+    CHECK(links[at].state == LinkState::connecting);
   }
   CHECK(jitters);
+  CHECK(shop.unreached);
+  CHECK(shop.unreached->code == Errc::connection_refused);
 }
 
 TEST_CASE("after a lost link the missed events are a gap and the last one is fetched") {
@@ -434,6 +441,64 @@ TEST_CASE("a restarted tool is said, and what stands in its registers is no even
   CHECK(std::count(numbers.begin(), numbers.end(), 0) == 0);
   CHECK(std::count(numbers.begin(), numbers.end(), 1) == 1);
   CHECK(std::count(numbers.begin(), numbers.end(), 2) == 1);
+}
+
+TEST_CASE("a counter that comes to the last number, or just past it, hides no events") {
+  Workshop shop;
+  shop.tool->reboot(shop.clock.now());
+  const auto happen = [&](std::uint16_t code, int times) {
+    for (int time = 0; time < times; ++time) shop.tool->raise_alarm(code, shop.clock.now());
+  };
+  happen(115, 20);
+  int since = 0;
+  SUBCASE("to it") { since = 20; }
+  SUBCASE("just past it") { since = 21; }
+  SUBCASE("farther") { since = 30; }
+  shop.clock.at(shop.clock.now() + 5s, [&] {
+    shop.lose_line();
+    shop.tool->reboot(shop.clock.now());
+    happen(116, since);
+  });
+  REQUIRE(shop.watch(10s));
+  const auto gaps = shop.told<GapNews>();
+  REQUIRE(gaps.size() == 1);
+  CHECK_FALSE(gaps.front().missed);
+  const auto events = shop.told<EventNews>();
+  REQUIRE(events.size() == 1);
+  CHECK(events.front().block.front() == since);
+  CHECK(events.front().source == EventSource::catch_up);
+}
+
+TEST_CASE("what a restarted tool remembers is told as such, and what it pushes is a result") {
+  Workshop shop;
+  shop.clock.at(shop.clock.now() + 5s, [&] {
+    shop.lose_line();
+    shop.tool->reboot(shop.clock.now());
+    shop.happen();
+  });
+  shop.clock.at(shop.clock.now() + 8s, [&] { shop.happen(); });
+  REQUIRE(shop.watch(10s));
+  const auto events = shop.told<EventNews>();
+  REQUIRE(events.size() == 2);
+  CHECK(events[0].block.front() == 1);
+  CHECK(events[0].standing == Standing::remembered);
+  CHECK(events[1].block.front() == 2);
+  CHECK(events[1].source == EventSource::push);
+  CHECK(events[1].standing == Standing::result);
+}
+
+TEST_CASE("an event that was missed for a moment is a result, and no doubt about its number") {
+  Workshop shop;
+  shop.clock.at(shop.clock.now() + 5s, [&] {
+    shop.lose_line();
+    shop.happen();
+  });
+  REQUIRE(shop.watch(10s));
+  const auto events = shop.told<EventNews>();
+  REQUIRE(events.size() == 1);
+  CHECK(events.front().source == EventSource::catch_up);
+  CHECK(events.front().standing == Standing::result);
+  CHECK(shop.told<GapNews>().empty());
 }
 
 TEST_CASE("another tool or firmware behind the address is said, and its old event is no result") {
@@ -576,6 +641,76 @@ TEST_CASE("values are told when they change, first, or always") {
   SUBCASE("all") { CHECK(watched(Samples::all).size() == 50); }
   CHECK(shop.numbers().empty());
   CHECK(shop.times(write_single).empty());
+}
+
+namespace {
+
+/// A tool of which only values are read, and which hangs up behind every answer.
+struct HangingUp : Workshop {
+  HangingUp() {
+    profile.link.keep_alive = Duration::zero();
+    profile.identity.reset();
+    profile.events.reset();
+    plan.events = EventMode::none;
+    plan.samples = Samples::all;
+    plan.values = {profile.find("status.running").value()};
+    faults = {sim::parse_fault("close-after@every:1").value()};
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a tool that hangs up behind every answer is connected on the beat of the interval") {
+  HangingUp shop;
+  shop.plan.interval = 5s;
+  REQUIRE(shop.watch(60s));
+  const auto polled = shop.times(read_input);
+  REQUIRE(polled.size() >= 12);
+  REQUIRE(polled.size() <= 13);
+  for (std::size_t at = 1; at < polled.size(); ++at) {
+    CHECK(polled[at] - polled[at - 1] > 4990ms);
+    CHECK(polled[at] - polled[at - 1] < 5010ms);
+  }
+  CHECK(shop.attempts.size() <= polled.size() + 1);
+}
+
+TEST_CASE("pauses grow until a connection has lasted") {
+  HangingUp shop;
+  shop.plan.interval = 200ms;
+  REQUIRE(shop.watch(60s));
+  // At 0, 0, 0.25, 0.75, 1.75, 3.75, 7.75, 15.75 s and then every ten seconds, or a fifth sooner.
+  CHECK(shop.attempts.size() > 8);
+  CHECK(shop.attempts.size() < 18);
+  CHECK(longest_pause(shop.attempts) > 7s);
+  CHECK(longest_pause(shop.attempts) <= 10100ms);
+}
+
+TEST_CASE("a beat that was missed is told, at once and then once a minute") {
+  Workshop shop;
+  shop.plan.events = EventMode::none;
+  shop.plan.samples = Samples::all;
+  shop.plan.values = {shop.profile.find("status.running").value()};
+  shop.plan.interval = 10ms;
+  SUBCASE("a tool that is quick enough") {
+    REQUIRE(shop.watch(10s));
+    CHECK(shop.told<LagNews>().empty());
+    CHECK(shop.told<ValueNews>().size() == 1000);
+  }
+  SUBCASE("one that needs 25 ms") {
+    shop.faults = {sim::parse_fault("latency=25ms").value()};
+    REQUIRE(shop.watch(90s));
+    const auto lags = shop.told<LagNews>();
+    REQUIRE(lags.size() == 3);  // at once, after a minute, and at the end
+    CHECK(lags[1].interval == 10ms);
+    CHECK(lags[1].achieved > 24ms);
+    CHECK(lags[1].achieved < 31ms);
+    std::uint64_t missed = 0;
+    for (const LagNews& lag : lags) missed += lag.missed;
+    const std::uint64_t told = shop.told<ValueNews>().size();
+    CHECK(told > 2900);  // one behind the other, without pauses
+    CHECK(missed + told > 8980);
+    CHECK(missed + told < 9020);
+  }
 }
 
 TEST_CASE("whole blocks of event and status are polled in parts while output is armed") {

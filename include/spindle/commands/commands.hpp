@@ -82,7 +82,7 @@ struct WatchOptions {
   device::Samples samples = device::Samples::changes;
   device::Reconnection reconnection = device::Reconnection::forever;
   std::optional<Duration> interval;  ///< between two polls; empty: as usual
-  std::size_t count = 0;             ///< end after so many events and changes; 0: never
+  std::size_t count = 0;             ///< end after so many events, changes and samples; 0: never
   std::optional<Duration> duration;
   std::optional<Duration> idle_timeout;
 };

@@ -20,10 +20,15 @@ struct Target {
   std::string torque_unit = {};  ///< of the tools file; empty: unknown
   std::vector<std::string> verified = {};
   Reach reach = Reach::one;
+  link::Reopening reopening = link::Reopening::never;
 
   /// The error as one of this tool, with its address beside its name.
   [[nodiscard]] Error blamed(Error error) const;
 };
+
+/// The same target, whose connection is opened once more where the tool closes it: for commands
+/// that ask for one thing and end, while the context lives.
+Target reopening(Target target);
 
 /// A target that was connected.
 struct OpenTool {

@@ -11,6 +11,7 @@
 #include "spindle/catalogue/value.hpp"
 #include "spindle/link/client.hpp"
 #include "spindle/link/endpoint.hpp"
+#include "spindle/link/reopening_transport.hpp"
 #include "spindle/link/session.hpp"
 
 namespace spindle::device {
@@ -36,6 +37,8 @@ struct LinkOptions {
   /// Of a product that is not known: what it may send unasked. Nothing is asked whose answer could
   /// look like that.
   std::vector<link::SpontaneousShape> unasked = {};
+  /// TCP only. What the opener refers to must then outlive the device.
+  link::Reopening reopening = link::Reopening::never;
 };
 
 /// One parameter as read. `registers` and `value` hold the same error when it could not be.

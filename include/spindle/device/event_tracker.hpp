@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "spindle/base/bytes.hpp"
+#include "spindle/base/clock.hpp"
 
 namespace spindle::device {
 
@@ -16,8 +17,10 @@ enum class Novelty : std::uint8_t {
   next,      ///< one more than the last
   jump,      ///< more than one more: `missed` events were not seen
   wrap,      ///< the 16-bit counter began again behind 65535; `missed` may be 0
-  restart,   ///< smaller, and not by wrapping: the tool began to count anew; what was missed is
-             ///< unknown
+  restart,   ///< the tool began to count anew: smaller and not by wrapping, or another event with
+             ///< the last number; what was missed is unknown
+  doubtful,  ///< behind the last number, but the tool may have begun to count anew while nobody
+             ///< looked, and come to it: what was missed is unknown
 };
 
 struct Tracked {
@@ -30,19 +33,28 @@ struct Tracked {
   }
 };
 
-/// Decides by event numbers alone what is new: nothing lost silently, nothing told twice. Numbers
-/// are 16-bit counters that go up by one per event. A block that equals one of the last few in
-/// every register is a repeat even when its number is not the last one. Pure.
+/// Decides what is new: nothing lost silently, nothing told twice. Numbers are 16-bit counters that
+/// go up by one per event, and may begin anew when the tool is switched off. A block that equals
+/// one of the last few in every register is a repeat even when its number is not the last one.
+/// Pure.
 class EventTracker {
  public:
   /// `block` is the whole event block; `number` its counter.
   Tracked track(std::uint16_t number, RegisterView block);
 
   /// A number that was read without its block: the next event is judged against it.
-  void set_baseline(std::uint16_t number) { last_ = number; }
+  void set_baseline(std::uint16_t number) {
+    last_ = number;
+    last_block_.reset();
+  }
 
-  /// On a new connection nothing comes late, and a tool that was restarted may have equal events.
-  void forget_blocks() { recent_.clear(); }
+  /// The connection is a new one, and nobody looked for so long. Nothing comes late on it, a tool
+  /// that was restarted may have equal events, and the next number is doubtful when a tool that
+  /// began to count anew in that time can have come to it.
+  void look_again(Duration unseen) {
+    recent_.clear();
+    unseen_ = unseen;
+  }
 
   [[nodiscard]] std::optional<std::uint16_t> last() const { return last_; }
 
@@ -51,9 +63,12 @@ class EventTracker {
 
  private:
   [[nodiscard]] Tracked judge(std::uint16_t number, RegisterView block) const;
+  [[nodiscard]] bool may_be_counted_anew(std::uint16_t number) const;
 
   std::optional<std::uint16_t> last_ = std::nullopt;
+  std::optional<Registers> last_block_ = std::nullopt;  ///< of the last number, where it was seen
   std::deque<Registers> recent_ = {};
+  std::optional<Duration> unseen_ = std::nullopt;  ///< until the first event behind it
 };
 
 }  // namespace spindle::device

@@ -12,6 +12,7 @@
 #include "spindle/device/device.hpp"
 #include "spindle/device/event_tracker.hpp"
 #include "spindle/device/motor_follower.hpp"
+#include "spindle/device/motor_watch.hpp"
 
 namespace spindle::device {
 
@@ -22,11 +23,18 @@ enum class EventSource : std::uint8_t {
   catch_up,  ///< it was fetched after (re)connecting
 };
 
+/// What an event is worth.
+enum class Standing : std::uint8_t {
+  result,      ///< it happened, and was not told before
+  remembered,  ///< the tool held it when its counter was found restarted: it may be an old one
+};
+
 /// A new event. `block` are the registers of the profile's event block.
 struct EventNews {
   EventSource source;
   Registers block;
   WallTime time;
+  Standing standing = Standing::result;
 };
 
 /// A polled value: its first reading, one that differs, or every sample.
@@ -43,15 +51,27 @@ struct GapNews {
   std::string reason;
 };
 
-enum class LinkState : std::uint8_t { connected, lost, reconnecting };
+/// Polls that could not be made in time, since the last time that this was told.
+struct LagNews {
+  std::uint32_t missed;  ///< intervals in which nothing was read
+  Duration interval;     ///< as asked for
+  Duration achieved;     ///< from one poll to the next, on average
+};
+
+enum class LinkState : std::uint8_t {
+  connecting,  ///< an attempt failed, and none had success before
+  connected,
+  lost,
+  reconnecting,  ///< an attempt failed after the link was lost
+};
 
 struct LinkNews {
   LinkState state;
-  unsigned attempt;  ///< of the present reconnection, from 1; 0 when none is under way
+  unsigned attempt;  ///< how many came to nothing, this one included, since there was a link
   std::string message;
 };
 
-using News = std::variant<EventNews, ValueNews, GapNews, LinkNews, MotorNews>;
+using News = std::variant<EventNews, ValueNews, GapNews, LagNews, LinkNews, MotorNews>;
 
 /// How events are learned of.
 enum class EventMode : std::uint8_t {
@@ -65,8 +85,8 @@ enum class Reconnection : std::uint8_t { forever, never };
 struct WatchPlan {
   EventMode events = EventMode::push;
   std::vector<catalogue::Parameter> values = {};
-  std::optional<Motor> motor = std::nullopt;  ///< polled along with the values for what it does
-  Duration interval = std::chrono::milliseconds(200);  ///< between two polls
+  std::optional<Motor> motor = std::nullopt;  ///< looked at between the values for what it does
+  Duration interval = std::chrono::milliseconds(200);  ///< from one poll to the next, above zero
   Samples samples = Samples::changes;
 };
 
@@ -75,6 +95,9 @@ enum class Heed : std::uint8_t { go_on, stop };
 
 /// Watches one tool: pushed and polled events as one stream, values by polling, keep-alive,
 /// re-arming, reconnection with back-off. Every loss of knowledge is in the stream. One thread.
+///
+/// The values are polled on the beat of the interval, also across reconnections; a beat that was
+/// missed is told. Pauses between connections grow until one has lasted.
 class Watcher {
  public:
   /// An open tool whose registers are known. Its profile outlives the watcher and may only be found
@@ -99,6 +122,9 @@ class Watcher {
   /// trouble.
   Result<void> run(const Until& until);
 
+  /// Why the tool was never reached; empty once it was. To be asked after run().
+  [[nodiscard]] std::optional<Error> unreached() const;
+
  private:
   enum class Fetched : std::uint8_t { yes, too_fast };
 
@@ -114,9 +140,16 @@ class Watcher {
   Result<void> keep_alive();
   Result<void> ask(const std::function<Result<void>()>& request);
   Result<void> poll();
+  void keep_beat(TimePoint now);
+  void tell_lag(TimePoint now);
   Result<void> poll_values();
-  Result<void> judge_motor(std::span<const Reading> readings);
-  [[nodiscard]] bool polls_values() const { return !plan_.values.empty() || plan_.motor; }
+  Result<void> read_values();
+  Result<void> learn_meanings();
+  Result<void> look_between();
+  Result<void> tell_motor(Result<std::vector<MotorNews>> news);
+  [[nodiscard]] std::uint64_t requests() { return link_->device.session().counters().requests; }
+  [[nodiscard]] bool polls_values() const { return !plan_.values.empty() || motor_; }
+  [[nodiscard]] bool polls() const { return plan_.events == EventMode::poll || polls_values(); }
   void tell_reading(std::size_t index, Reading& reading);
   Result<Fetched> fetch_last(EventSource source);
   Result<void> fetch_polled(std::uint16_t number);
@@ -132,7 +165,7 @@ class Watcher {
     return layout_->number_of(block);
   }
   [[nodiscard]] TimePoint next_due() const;
-  [[nodiscard]] Duration back_off() const;
+  [[nodiscard]] Duration back_off(unsigned failures) const;
 
   Open open_;
   Plan make_plan_;
@@ -146,14 +179,33 @@ class Watcher {
   std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
   EventTracker tracker_ = {};
   std::vector<std::optional<catalogue::Value>> previous_ = {};
-  std::optional<MotorState> motor_ = std::nullopt;  ///< as seen last
+  /// The values to poll, with the names of bits that count now.
+  std::vector<catalogue::Parameter> polled_ = {};
+  bool meanings_known_ = false;  ///< on this link
+  std::optional<MotorWatch> motor_ = std::nullopt;
+  std::uint64_t requests_owed_ = 0;  ///< for values, since something was read between them
+  unsigned looks_between_ = 0;
+  Duration last_look_ = {};  ///< what one request between the values took
   TimePoint arm_due_ = {};
   TimePoint keep_alive_due_ = {};
   TimePoint poll_due_ = {};
   TimePoint retry_at_ = {};
-  unsigned failures_ = 0;  ///< attempts that came to nothing since the last link that served
-  bool served_ = false;    ///< this link has kept the tool alive, or brought an event
+  TimePoint connected_at_ = {};
+  TimePoint seen_at_ = {};    ///< when the tool last said something
+  unsigned attempts_ = 0;     ///< that came to nothing since there was a link
+  unsigned short_lived_ = 0;  ///< attempts and links one after the other that did not last
+  bool served_ = false;       ///< this link has kept the tool alive, or brought an event
+  bool reached_ = false;      ///< there was a link
   bool stopped_ = false;
+  std::optional<Error> trouble_ = std::nullopt;  ///< the last one
+  /// Since a lag was told, or since the link began.
+  struct Beat {
+    TimePoint since = {};
+    std::int64_t polls = 0;
+    std::uint32_t missed = 0;
+  };
+  Beat beat_ = {};
+  std::optional<TimePoint> lag_told_at_ = std::nullopt;
 };
 
 }  // namespace spindle::device

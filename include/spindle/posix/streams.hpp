@@ -22,6 +22,11 @@ bool hold_standard_descriptors();
 /// for a slow reader, and restarts after signals.
 Result<void> write_out(std::string_view text);
 
+/// Writes what the reader of standard output takes within `patience`, at most 4096 bytes at a time,
+/// and returns how many bytes; 0 when it takes nothing. A file takes all of it, as ever. Fails as
+/// write_out() does. Never waits longer, as long as nobody else writes to the same pipe.
+Result<std::size_t> write_out_for(std::string_view text, Duration patience);
+
 /// Writes everything to standard error; failures are ignored, there is nobody left to tell.
 void write_err(std::string_view text);
 
@@ -47,5 +52,21 @@ std::size_t err_columns();
 /// The standard streams.
 enum class Std : std::uint8_t { in, out, err };
 bool is_terminal(Std stream);
+
+/// All of them, as the aggregate that its user has for them.
+template <typename Streams>
+Streams standard_streams(const Clock& clock, const Interrupt& interrupt) {
+  return {.out = write_out,
+          .err = write_err,
+          .read_line = line_reader(clock, interrupt),
+          .in_is_terminal = is_terminal(Std::in),
+          .out_is_terminal = is_terminal(Std::out),
+          .err_is_terminal = is_terminal(Std::err),
+          .out_is_open = out_is_open,
+          .err_is_ready = err_is_ready,
+          .err_columns = err_columns,
+          .out_ends_within_line = out_ends_within_line,
+          .out_for = write_out_for};
+}
 
 }  // namespace spindle::posix

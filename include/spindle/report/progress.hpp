@@ -71,6 +71,7 @@ class Progress {
   bool is_shown_;
   std::function<Result<void>(std::string_view)> out_ = {};
   std::function<void(std::string_view)> err_ = {};
+  std::function<Result<std::size_t>(std::string_view, Duration)> out_for_ = {};
   std::mutex mutex_ = {};
   Work work_ = {};
   TimePoint drawn_at_ = {};

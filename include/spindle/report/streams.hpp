@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
 
 namespace spindle::report {
@@ -32,6 +33,9 @@ struct Streams {
   std::function<std::size_t()> err_columns = {};
   /// Whether out() writes to a file that ends within a line; may be empty, which means no.
   std::function<bool()> out_ends_within_line = {};
+  /// Writes what is taken of the text within this time, and returns how many bytes; fails as out()
+  /// does. For who must not be held up by a reader; may be empty, where out() never waits long.
+  std::function<Result<std::size_t>(std::string_view, Duration)> out_for = {};
   Color color = Color::off;
 };
 

@@ -1,0 +1,132 @@
+#include "spindle/device/motor_watch.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace spindle::device {
+namespace {
+
+using catalogue::Parameter;
+
+bool has_bit(std::int64_t word, unsigned bit) {
+  return ((static_cast<std::uint64_t>(word) >> bit) & 1U) != 0;
+}
+
+std::uint32_t end_of(const Parameter& parameter) {
+  return parameter.address.value + catalogue::register_count(parameter.encoding.kind);
+}
+
+bool joins(const std::vector<Parameter>& piece, const Parameter& parameter) {
+  return piece.back().table == parameter.table && end_of(piece.back()) == parameter.address.value;
+}
+
+/// What says that something happened, as pieces of registers that stand side by side.
+std::vector<std::vector<Parameter>> pieces_of(const Motor& motor,
+                                              const std::vector<Parameter>& polled) {
+  const catalogue::RunFacts& facts = motor.facts();
+  std::vector<Parameter> telling;
+  for (const Parameter& parameter : motor.parameters()) {
+    const bool tells = parameter.name == facts.status || parameter.name == facts.alarm ||
+                       parameter.name == facts.warning;
+    const bool read_anyhow = std::any_of(polled.begin(), polled.end(), [&](const Parameter& other) {
+      return other.name == parameter.name;
+    });
+    if (tells && !read_anyhow) telling.push_back(parameter);
+  }
+  std::sort(telling.begin(), telling.end(), [](const Parameter& one, const Parameter& other) {
+    return std::pair(one.table, one.address.value) < std::pair(other.table, other.address.value);
+  });
+  std::vector<std::vector<Parameter>> pieces;
+  for (Parameter& parameter : telling) {
+    if (pieces.empty() || !joins(pieces.back(), parameter)) pieces.emplace_back();
+    pieces.back().push_back(std::move(parameter));
+  }
+  const auto first = std::find_if(pieces.begin(), pieces.end(), [&](const auto& piece) {
+    return std::any_of(piece.begin(), piece.end(),
+                       [&](const Parameter& each) { return each.name == facts.alarm; });
+  });
+  if (first != pieces.end()) std::iter_swap(pieces.begin(), first);
+  return pieces;
+}
+
+bool says_the_same(const MotorState& one, const MotorState& other) {
+  return one.running == other.running && one.at_speed == other.at_speed &&
+         one.alarm == other.alarm && one.warning == other.warning;
+}
+
+}  // namespace
+
+MotorWatch::MotorWatch(Motor motor, const std::vector<Parameter>& polled)
+    : motor_(std::move(motor)), pieces_(pieces_of(motor_, polled)) {}
+
+/// The first piece three times of four: an alarm is what has to be known soonest.
+const std::vector<Parameter>& MotorWatch::next_piece() {
+  constexpr std::size_t round = 4;
+  const std::size_t turn = turn_++;
+  if (pieces_.size() == 1 || turn % round != 1) return pieces_.front();
+  return pieces_[1 + turn / round % (pieces_.size() - 1)];
+}
+
+Result<std::vector<MotorNews>> MotorWatch::take_turn(Device& device) {
+  if (pieces_.empty()) return std::vector<MotorNews>();
+  const auto readings = device.read_each(next_piece(), Limits::skip);
+  if (!readings) return tl::unexpected(readings.error());
+  return take(device, *readings);
+}
+
+/// The state as seen last, with what these readings say. What was never read before is taken for
+/// what it always was.
+Result<MotorState> MotorWatch::with(std::span<const Reading> readings) {
+  const catalogue::RunFacts& facts = motor_.facts();
+  MotorState now = state_;
+  for (const Reading& reading : readings) {
+    const std::string& name = reading.parameter.name;
+    if (name != facts.status && name != facts.alarm && name != facts.warning) continue;
+    if (!reading.value) return tl::unexpected(reading.value.error());
+    const std::int64_t number = reading.value->number.mantissa();
+    const auto note = [&](MotorState& state) {
+      if (name == facts.alarm) state.alarm = number;
+      if (name == facts.warning) state.warning = number;
+      if (name != facts.status) return;
+      state.running = has_bit(number, facts.running);
+      state.at_speed = has_bit(number, facts.at_speed);
+      state.busy = has_bit(number, facts.busy);
+    };
+    note(now);
+    if (seen_.insert(name).second) note(state_);
+  }
+  return now;
+}
+
+/// What happened is told with the speed and load that are read at once; they may say already what
+/// happened behind it.
+Result<std::vector<MotorNews>> MotorWatch::take(Device& device, std::span<const Reading> readings) {
+  const auto now = with(readings);
+  if (!now) return tl::unexpected(now.error());
+  std::vector<MotorNews> news;
+  if (says_the_same(state_, *now)) return news;
+  const Clock& clock = device.session().clock();
+  const WallTime time = clock.wall();
+  auto later = motor_.look(device);
+  if (!later) return tl::unexpected(std::move(later.error()));  // told when it can be read again
+  // What was never read by its turn is not judged by chance.
+  if (!seen_.contains(motor_.facts().status)) {
+    later->running = state_.running;
+    later->at_speed = state_.at_speed;
+  }
+  if (!seen_.contains(motor_.facts().warning)) later->warning = state_.warning;
+  if (!seen_.contains(motor_.facts().alarm)) later->alarm = state_.alarm;
+  MotorState shown = *later;
+  shown.running = now->running;
+  shown.at_speed = now->at_speed;
+  shown.alarm = now->alarm;
+  shown.warning = now->warning;
+  for (const MotorEvent event : events_between(state_, *now)) news.push_back({event, shown, time});
+  for (const MotorEvent event : events_between(*now, *later)) {
+    news.push_back({event, *later, clock.wall()});
+  }
+  state_ = *later;
+  return news;
+}
+
+}  // namespace spindle::device

@@ -1,0 +1,146 @@
+#include "spindle/device/motor_watch.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "spindle/device/watcher.hpp"
+#include "support/blv_bench.hpp"
+
+using namespace spindle;
+using namespace std::chrono_literals;
+using device::EventMode;
+using device::Heed;
+using device::Motor;
+using device::MotorEvent;
+using device::MotorNews;
+using device::News;
+using device::Reconnection;
+using device::Samples;
+using device::ValueNews;
+using device::Watcher;
+using device::WatchPlan;
+
+namespace {
+
+constexpr std::uint16_t command_register = 0x007D;
+constexpr std::uint16_t run_forward = 0x002A;
+constexpr std::uint16_t status_register = 0x007E;
+constexpr std::uint16_t warning_register = 150;
+
+/// A watch of unit 1, with every request counted by its first register.
+struct Line {
+  Result<Watcher::Link> open() {
+    const device::OpenTransport transport =
+        [this](const link::Endpoint&, const catalogue::LinkFacts&,
+               Duration) -> Result<std::unique_ptr<link::Transport>> {
+      return sim::make_sim_transport(*bench.bus, {++bench.connections}, modbus::Framing::rtu,
+                                     bench.faults, bench.answers, bench.clock, bench.never,
+                                     {.character_time = 1146us});
+    };
+    device::LinkOptions options;
+    options.trace.bytes = [this](link::Direction direction, ByteView bytes) {
+      if (direction == link::Direction::sent && bytes.size() > 3) ++asked[get_u16(bytes, 2)];
+    };
+    auto device = device::Device::open(
+        {.text = "rtu:///dev/line", .medium = link::Medium::serial, .unit = modbus::UnitId{1}},
+        bench.profile, options, transport, bench.clock);
+    if (!device) return tl::unexpected(device.error());
+    return Watcher::Link{std::move(*device), {}};
+  }
+
+  void watch(Duration time) {
+    const TimePoint end = bench.clock.now() + time;
+    Watcher watcher([this] { return open(); },
+                    [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
+                    Reconnection::never, bench.clock,
+                    [this](const News& one) {
+                      if (const auto* motor = std::get_if<MotorNews>(&one)) {
+                        events.push_back(motor->event);
+                        heard.push_back(bench.clock.now());
+                        states.push_back(motor->state);
+                      }
+                      if (std::holds_alternative<ValueNews>(one)) ++samples;
+                      return Heed::go_on;
+                    });
+    REQUIRE(watcher.run([end] { return end; }));
+  }
+
+  void name(const std::string& parameter) {
+    plan.values.push_back(bench.profile.find(parameter).value());
+  }
+  [[nodiscard]] unsigned requests() const {
+    unsigned all = 0;
+    for (const auto& [first, count] : asked) all += count;
+    return all;
+  }
+
+  test::BlvBench bench;
+  WatchPlan plan = {.events = EventMode::none,
+                    .motor = Motor::of(bench.profile).value(),
+                    .samples = Samples::all};
+  std::map<std::uint16_t, unsigned> asked = {};
+  std::vector<MotorEvent> events = {};
+  std::vector<TimePoint> heard = {};
+  std::vector<device::MotorState> states = {};
+  unsigned samples = 0;
+};
+
+}  // namespace
+
+TEST_CASE("one value that is asked for as fast as can be costs a tenth more than itself") {
+  Line line;
+  line.name("monitor.feedback-speed");
+  line.plan.interval = 10ms;
+  line.watch(60s);
+  REQUIRE(line.samples > 500);
+  CHECK(line.requests() <= line.samples * 11 / 10 + 8);
+  CHECK(line.asked.at(status_register) > line.samples / 30);
+  CHECK(line.asked.at(warning_register) > line.samples / 80);
+}
+
+TEST_CASE("where there is time, one piece of the motor's state is read between two polls") {
+  Line line;
+  line.name("monitor.feedback-speed");
+  line.plan.interval = 200ms;
+  line.watch(20s);
+  CHECK(line.samples >= 100);
+  CHECK(line.samples <= 101);
+  CHECK(line.requests() <= 2 * line.samples + 8);
+  CHECK(line.requests() >= 2 * line.samples - 8);
+}
+
+TEST_CASE("what is polled anyhow is not read again for the motor's sake") {
+  Line line;
+  for (const char* name : {"status.driver-output", "alarm.present", "warning.present"}) {
+    line.name(name);
+  }
+  line.plan.interval = 200ms;
+  line.watch(20s);
+  CHECK(line.samples >= 300);
+  CHECK(line.samples <= 303);
+  // Status and alarm stand side by side, the warning apart; the mode that names bits comes seldom.
+  CHECK(line.requests() <= 100 * 2 + 100 / 8 * 2 + 12);
+}
+
+TEST_CASE("a motor that is run and stopped by others is told soon, with the speed that it has") {
+  for (const Duration interval : {10ms, 200ms}) {
+    CAPTURE(interval.count());
+    Line line;
+    line.name("operation.2.speed");
+    line.plan.interval = interval;
+    const TimePoint began = line.bench.clock.now();
+    line.bench.clock.at(began + 5s, [&] { line.bench.write(command_register, run_forward); });
+    line.bench.clock.at(began + 10s, [&] { line.bench.write(command_register, 0x0022); });
+    line.watch(15s);
+    REQUIRE(line.events == std::vector<MotorEvent>{MotorEvent::started, MotorEvent::at_speed,
+                                                   MotorEvent::stopped});
+    CHECK(line.heard[0] - began > 5s);
+    CHECK(line.heard[0] - began < 6500ms);
+    CHECK(line.states[0].feedback_speed > 0);
+    CHECK(line.states[1].feedback_speed == 1000);
+    CHECK(line.states[2].feedback_speed == 0);
+  }
+}
