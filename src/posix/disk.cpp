@@ -223,8 +223,7 @@ Result<void> append_line(const std::string& path, std::string_view text) {
   if (!file.valid()) return tl::unexpected(unwritable(path, errno));
   lock_for_a_while(file);
   std::string line(text);
-  if (is_cut_off(file)) line.insert(line.begin(), '
-');
+  if (is_cut_off(file)) line.insert(line.begin(), '\n');
   const int code = write_whole(file.number(), line, WhenFull::fail);
   if (code != 0) return tl::unexpected(unwritable(path, code));
   return {};

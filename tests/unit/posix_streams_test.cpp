@@ -111,6 +111,22 @@ TEST_CASE("streams: everything is written, also more than a pipe holds at once")
   }
 }
 
+TEST_CASE("streams: so is what is said on standard error") {
+  for (const int flags : {0, O_NONBLOCK}) {
+    CAPTURE(flags);
+    Pipe pipe;
+    ::fcntl(pipe.writer.number(), F_SETFL, flags);
+    const std::string text(300'000, 'x');
+    const pid_t child = start(STDERR_FILENO, pipe.writer.number(), [&text] {
+      posix::write_err(text);
+      return 0;
+    });
+    pipe.writer.close();
+    CHECK((read_all(pipe.reader) == text));
+    CHECK(finish(child) == 0);
+  }
+}
+
 TEST_CASE("streams: a reader that is gone is closed_pipe, and status 0") {
   Pipe pipe;
   pipe.reader.close();
