@@ -107,6 +107,9 @@ class RemoteRun {
         log_(change_log("remote-start", tool, context)) {}
 
   Result<Outcome> run() {
+    if (auto guarded = guarded_.set_guardian(); !guarded) {
+      return tl::unexpected(std::move(guarded.error()));
+    }
     auto selected = check_ready(*plan_, *tool_).and_then([&] { return select(); });
     if (!selected) return tl::unexpected(std::move(selected.error()));
     device::RunFollower follower(tool_->device, plan_->start, context_->clock);

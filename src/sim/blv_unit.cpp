@@ -306,6 +306,19 @@ std::uint32_t BlvUnit::mask_of(const std::string& parameter, std::string_view bi
   return 0;
 }
 
+std::uint16_t BlvUnit::standard_word() const {
+  const auto word = static_cast<std::uint16_t>(registers_.get(run_.command));
+  const catalogue::InputFacts& inputs = run_.inputs;
+  if (inputs.parameter.empty()) return word;
+  std::vector<std::int64_t> numbers;
+  for (std::uint16_t n = inputs.first; n <= inputs.last; ++n) {
+    numbers.push_back(registers_.get(catalogue::numbered_name(inputs.parameter, n)));
+  }
+  const catalogue::CommandBits bits(inputs, numbers);
+  const auto known = static_cast<std::uint16_t>(word & ~unsigned{bits.unknown()});
+  return bits.standard(known).value_or(0);
+}
+
 BlvUnit::Wish BlvUnit::wish_of(std::uint32_t word) const {
   const auto on = [&](std::string_view bit) {
     return (word & mask_of(run_.command, bit, mode_)) != 0;
@@ -333,7 +346,7 @@ Duration BlvUnit::time_of(const std::string& pattern, std::uint16_t operation) c
 
 void BlvUnit::obey(TimePoint now) {
   if (registers_.get(run_.alarm) != 0 || configured_at_) return;
-  const auto word = static_cast<std::uint32_t>(registers_.get(run_.command));
+  const std::uint32_t word = standard_word();
   const auto operation = static_cast<std::uint16_t>(
       (word & run_.select) >> static_cast<unsigned>(std::countr_zero(run_.select)));
   registers_.set("monitor.operation-number", operation);

@@ -88,6 +88,9 @@ class BlvUnit {
   }
 
   void obey(TimePoint now);
+  /// The command word in the bits of the default assignment. What an unknown function does is not
+  /// simulated.
+  [[nodiscard]] std::uint16_t standard_word() const;
   [[nodiscard]] Wish wish_of(std::uint32_t word) const;
   [[nodiscard]] std::int64_t speed_of(std::uint16_t operation) const;
   [[nodiscard]] Duration time_of(const std::string& pattern, std::uint16_t operation) const;
