@@ -38,7 +38,7 @@ std::string GuardedRun::take_over(catalogue::StopMode mode) const {
   StopPursuit pursuit(*tool_, mode, calm);
   const device::StopReport report = pursuit.stop();
   const bool stopped = report.result != device::StopResult::unconfirmed;
-  ChangeLog log("guardian", *tool_, *context_);
+  work::ChangeLog log = change_log("guardian", *tool_, *context_);
   log.add({.name = "stop", .result = stopped ? "stopped" : "stop-not-confirmed"});
   const std::string who = fmt::format("{}: the program that ran it ended before it had stopped it",
                                       tool_->target.shown);
