@@ -39,7 +39,9 @@ std::string GuardedRun::take_over(catalogue::StopMode mode) const {
   const device::StopReport report = pursuit.stop();
   const bool stopped = report.result != device::StopResult::unconfirmed;
   work::ChangeLog log = change_log("guardian", *tool_, *context_);
-  log.add({.name = "stop", .result = stopped ? "stopped" : "stop-not-confirmed"});
+  // Behind the stop, which waits for no disk.
+  log.end(log.begin({.name = "stop"}),
+          {.name = "stop", .result = stopped ? "stopped" : "stop-not-confirmed"});
   const std::string who = fmt::format("{}: the program that ran it ended before it had stopped it",
                                       tool_->target.shown);
   if (stopped) return fmt::format("{}; its guardian did, and the tool stands still", who);

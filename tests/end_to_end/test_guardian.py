@@ -60,8 +60,9 @@ class KilledTest(unittest.TestCase):
         return guardian
 
     def assert_recorded(self, target):
-        support.wait_until(lambda: guardians_of(target), "the guardian records what it did")
-        self.assertEqual([c["result"] for c in guardians_of(target)], ["stopped"])
+        results = ["begun", "stopped"]
+        support.wait_until(lambda: len(guardians_of(target)) == len(results), "the guardian records what it did")
+        self.assertEqual([c["result"] for c in guardians_of(target)], results)
 
     @contextlib.contextmanager
     def bm_run(self, *options):
