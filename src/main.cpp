@@ -1,5 +1,4 @@
 #include "spindle/cli/run.hpp"
-#include "spindle/posix/clock.hpp"
 #include "spindle/posix/disk.hpp"
 #include "spindle/posix/serve.hpp"
 #include "spindle/posix/signals.hpp"
@@ -16,7 +15,8 @@ int main(int count, char** arguments) {
       .clock = clock,
       .interrupt = signals.interrupt(),
       .open = line_opener(clock, signals.interrupt()),
-      .calm = {calm.clock, calm.interrupt, line_opener(calm), [&] { signals.stay_awake(); }},
+      .calm = {calm.clock, calm.interrupt, line_opener(calm), [&] { signals.stay_awake(); },
+               [&](std::string_view words) { signals.set_last_words(words); }, start_guardian},
       .serve = tool_server(clock, signals.interrupt()),
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,

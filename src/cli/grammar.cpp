@@ -292,6 +292,7 @@ struct TypedSimulate {
   std::string rundown_every;
   std::string ng_every;
   std::string burst;
+  std::string busy;
 };
 
 /// Everything that CLI11 writes into; must live as long as the parser.
@@ -569,6 +570,14 @@ Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
   const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
   if (!rundown_every) return tl::unexpected(rundown_every.error());
   bm.rundown_every = *rundown_every;
+  const auto busy = to_duration("--busy", typed.busy);
+  if (!busy) return tl::unexpected(busy.error());
+  constexpr Duration longest_busy = std::chrono::seconds(1);
+  if (*busy && **busy > longest_busy) {
+    return tl::unexpected(bad_option("--busy", fmt::format("'{}' is too long", typed.busy),
+                                     "Configuration takes 1s or less"));
+  }
+  options.tool.busy = *busy;
   const bool work_is_described = !typed.ng_every.empty() || !typed.burst.empty();
   if (work_is_described && !bm.rundown_every) {
     return tl::unexpected(
@@ -878,7 +887,8 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
     option(command, "--listen", options.listen, "URL",
            "where to listen (default a free port of 127.0.0.1)");
     option(command, "--pty", options.pty, "PATH",
-           "serial tools: make a pseudo terminal that this path leads to");
+           "serial tools: make a pseudo terminal that this path leads to; it has no parity, so a "
+           "wrong one goes unnoticed");
     option(command, "--units", typed.simulate.units, "LIST",
            "serial tools: which units, such as 1-3");
     option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
@@ -888,6 +898,18 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
         ->type_name("FAULT")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    option(command, "--busy", typed.simulate.busy, "DURATION",
+           "motor drivers: how long Configuration takes (default 200ms, at most 1s)");
+    const auto repeatable = [command](const char* name, std::vector<std::string>& into,
+                                      const char* meaning) {
+      command->add_option(name, into, meaning)
+          ->type_name("CODE")
+          ->expected(1)
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    };
+    repeatable("--alarm", options.alarms,
+               "an alarm that the tool raises, such as 30h, or 30h@5s after a time; repeatable");
+    repeatable("--warning", options.warnings, "motor drivers: a warning in the same form");
     option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
            "length of the identity: 12, 13 or 17");
     option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");

@@ -5,7 +5,10 @@
 
 #include <utility>
 
+#include "change_log.hpp"
 #include "records.hpp"
+#include "stop_pursuit.hpp"
+#include "stops.hpp"
 
 namespace spindle::commands {
 
@@ -50,6 +53,46 @@ Error not_ready(const Target& target, std::string message, std::string hint) {
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
     : tool_(&tool), context_(&context), progress_(context), calm_line_(tool, context) {}
 
+Result<void> GuardedRun::set_guardian(catalogue::StopMode mode) {
+  const bool simulated = tool_->target.endpoint.medium == link::Medium::simulated;
+  if (simulated || !context_->calm.start_guardian) return {};
+  auto tell_safe = context_->calm.start_guardian([this, mode] { return take_over(mode); });
+  if (!tell_safe) return tl::unexpected(tool_->target.blamed(std::move(tell_safe.error())));
+  tell_safe_ = std::move(*tell_safe);
+  return {};
+}
+
+std::string GuardedRun::take_over(catalogue::StopMode mode) const {
+  const Context calm = calm_context(*context_);
+  StopPursuit pursuit(*tool_, mode, calm);
+  const device::StopReport report = pursuit.stop();
+  const bool stopped = report.result != device::StopResult::unconfirmed;
+  work::ChangeLog log = change_log("guardian", *tool_, *context_);
+  // Behind the stop, which waits for no disk.
+  log.end(log.begin({.name = "stop"}),
+          {.name = "stop", .result = stopped ? "stopped" : "stop-not-confirmed"});
+  const std::string who = fmt::format("{}: the program that ran it ended before it had stopped it",
+                                      tool_->target.shown);
+  if (stopped) return fmt::format("{}; its guardian did, and the tool stands still", who);
+  return fmt::format(
+      "{}. THE TOOL MAY STILL RUN: its guardian tried for {} s ({} times) and could "
+      "not confirm a stop: {}; stop it at the tool",
+      who, std::chrono::duration_cast<std::chrono::seconds>(report.tried).count(), report.attempts,
+      report.trouble);
+}
+
+void GuardedRun::tell_guardian() {
+  if (const auto tell = std::exchange(tell_safe_, nullptr)) tell();
+}
+
+std::string GuardedRun::words_of_death() const {
+  const std::string guardian = tell_safe_ ? "; its guardian goes on trying to stop it" : "";
+  return fmt::format(
+      "{}: THE TOOL MAY STILL RUN: a second signal ended the program before the stop "
+      "was confirmed{}; stop it at the tool",
+      tool_->target.shown, guardian);
+}
+
 device::RunGuard::Reopen GuardedRun::reopener() {
   return [this](Duration patience) {
     progress_.show("the link is lost; trying to stop the tool");
@@ -85,7 +128,7 @@ void GuardedRun::fail(const device::StopReport& unconfirmed) {
        .message = fmt::format("THE TOOL MAY STILL RUN: the stop was tried for {} s ({} times) and "
                               "could not be confirmed: {}",
                               seconds, unconfirmed.attempts, unconfirmed.trouble),
-       .hint = "stop it at the tool"}));
+       .hint = where_to_stop(tool_->profile.get())}));
 }
 
 Result<void> GuardedRun::tell_errors() {

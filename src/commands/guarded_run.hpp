@@ -1,11 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "calm_line.hpp"
+#include "last_words.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
 #include "spindle/commands/target.hpp"
@@ -43,15 +45,26 @@ class GuardedRun {
  public:
   GuardedRun(OpenTool& tool, Context& context);
 
+  ~GuardedRun() { tell_guardian(); }
+  GuardedRun(const GuardedRun&) = delete;
+  GuardedRun& operator=(const GuardedRun&) = delete;
+
+  /// Starts the process that stops the tool when this one dies before it has done so itself. Comes
+  /// before everything that a run changes. An error means that there is none, so do not start. A
+  /// simulated tool ends with the program and needs none.
+  Result<void> set_guardian(catalogue::StopMode mode = catalogue::StopMode::decelerate);
+
   /// Starts, follows and stops, whatever happens meanwhile: the pair of what `follow` says and how
   /// the stop went. `limit` is asked before the start is sent; `follow` gets what it says.
   template <typename Limit, typename Follow>
   auto run(device::GuardedMotion motion, Limit limit, Follow follow) {
     if (context_->calm.stay_awake) context_->calm.stay_awake();
     device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
+    const LastWords last_words(*context_, words_of_death());
     const auto limits = limit();
     auto followed = guard.start().and_then([&] { return follow(limits); });
     const device::StopReport stop = guard.stop();
+    tell_guardian();
     progress_.clear();  // not before the stop: a terminal may keep its writer waiting
     return std::pair(std::move(followed), stop);
   }
@@ -76,6 +89,11 @@ class GuardedRun {
   Result<Outcome> end(Listing& listing, const device::StopReport& stop, const RunEnd& run_end);
 
  private:
+  /// In the guardian's process: stops the tool, and says in words what became of it.
+  std::string take_over(catalogue::StopMode mode) const;
+  /// That all is safe.
+  void tell_guardian();
+  [[nodiscard]] std::string words_of_death() const;
   /// A line that signals do not end, for a stop after the first one broke.
   device::RunGuard::Reopen reopener();
   /// A stop that could not be confirmed: nothing else matters as much.
@@ -89,6 +107,7 @@ class GuardedRun {
   Context* context_;
   ProgressLine progress_;
   CalmLine calm_line_;
+  std::function<void()> tell_safe_ = {};  ///< empty: there is no guardian, or it knows
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};
   std::vector<Left> left_ = {};

@@ -72,6 +72,7 @@ Result<MotorPlan> plan_motor(const RemoteStartOptions& options, const Profile& p
   const RunFacts& run = motor->facts();
   MotorPlan plan{.motor = *motor,
                  .operation = options.operation.value_or(run.preferred),
+                 .direction = options.direction_of_motor,
                  .settings = {},
                  .watchdog_parameter = std::nullopt,
                  .watchdog = std::nullopt};

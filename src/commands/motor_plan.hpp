@@ -16,6 +16,7 @@ namespace spindle::commands {
 struct MotorPlan {
   device::Motor motor;
   std::uint16_t operation = 0;
+  catalogue::Direction direction = catalogue::Direction::forward;
   /// Of the operation data, the speed first.
   std::vector<std::pair<catalogue::Parameter, catalogue::Value>> settings;
   std::optional<catalogue::Parameter> watchdog_parameter;

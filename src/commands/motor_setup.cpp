@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "group.hpp"
 #include "guarded_run.hpp"
@@ -34,6 +36,14 @@ Parameter low_half(Parameter parameter) {
 bool is_small(const Parameter& parameter, const Value& value) {
   const auto registers = catalogue::encode(parameter, value.number);
   return registers && registers->size() == 2 && registers->front() == 0;
+}
+
+/// "io.net-in.{n}" as it is typed for all of them.
+std::string glob_of(std::string pattern) {
+  constexpr std::string_view counter = "{n}";
+  const std::size_t at = pattern.find(counter);
+  if (at != std::string::npos) pattern.replace(at, counter.size(), "*");
+  return pattern;
 }
 
 }  // namespace
@@ -70,7 +80,17 @@ Result<void> MotorSetup::read_settings() {
   std::size_t next = 3;
   found_.analog = run.analog.empty() ? run.digital : value(next++).number.mantissa();
   if (!run.watchdog.empty()) found_.watchdog = value(next);
+  auto bits = plan_->motor.read_bits(tool_->device, std::numeric_limits<std::uint16_t>::max());
+  if (!bits) return tl::unexpected(std::move(bits.error()));
+  found_.bits = *bits;
   return {};
+}
+
+std::uint16_t MotorSetup::standard_word() const {
+  const catalogue::RunWords& words = facts().modes.at(found_.mode);
+  const unsigned run =
+      plan_->direction == catalogue::Direction::forward ? words.forward : words.reverse;
+  return static_cast<std::uint16_t>(run | facts().selecting(plan_->operation));
 }
 
 Result<void> MotorSetup::check_ready() {
@@ -96,7 +116,26 @@ Result<void> MotorSetup::check_ready() {
         fmt::format("{} is {}, which the profile does not know", facts().mode, found_.mode),
         "'spindle get' shows it");
   }
-  return check_analog();
+  return check_inputs().and_then([&] { return check_analog(); });
+}
+
+/// A start whose word can not be made for this driver is none.
+Result<void> MotorSetup::check_inputs() const {
+  const std::uint16_t word = standard_word();
+  if (found_.bits.word(word)) return {};
+  std::vector<std::int64_t> missing;
+  for (const catalogue::InputFunction& function : facts().inputs.functions) {
+    if (!function.bit) continue;
+    const auto bit = static_cast<std::uint16_t>(1U << *function.bit);
+    if ((word & bit) != 0 && !found_.bits.word(bit)) missing.push_back(function.number);
+  }
+  return tl::unexpected(
+      not_ready(tool_->target,
+                fmt::format("no input of this driver has function {}, which this start needs, so "
+                            "the motor was not started",
+                            fmt::join(missing, ", ")),
+                fmt::format("'spindle get' with '{}' shows what the inputs are assigned to",
+                            glob_of(facts().inputs.parameter))));
 }
 
 Result<void> MotorSetup::check_analog() const {
@@ -114,9 +153,10 @@ Result<void> MotorSetup::check_analog() const {
 
 /// A word that runs at speed 0 would start the motor when its speed is set.
 Result<void> MotorSetup::clear_word() {
-  if ((found_.word & facts().starting) == 0) return {};
-  cleared_word_ = plan_->motor.runs(found_.word, found_.mode);
-  return plan_->motor.command(tool_->device, facts().decelerate_always);
+  if ((found_.word & found_.bits.any_of(facts().starting)) == 0) return {};
+  const auto standard = found_.bits.standard(found_.word);
+  cleared_word_ = !standard || plan_->motor.runs(*standard, found_.mode);
+  return plan_->motor.command(tool_->device, plan_->motor.idle_word());
 }
 
 Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& value) {
@@ -154,7 +194,7 @@ Result<void> MotorSetup::set_watchdog() {
   }
   if (is_off && plan_->watchdog_parameter) {
     context_->renderer.note(
-        fmt::format("{}: {} is off: if this program or the line fails, the motor runs on; with "
+        fmt::format("{}: {} is off: if this computer or the line fails, the motor runs on; with "
                     "--watchdog 1s the driver itself stops it",
                     tool_->target.shown, plan_->watchdog_parameter->name));
   }

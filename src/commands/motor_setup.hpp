@@ -44,6 +44,14 @@ class MotorSetup {
 
   /// By which the words of the run are chosen.
   [[nodiscard]] std::int64_t input_mode() const { return found_.mode; }
+  /// What the bits of the command word do on this driver.
+  [[nodiscard]] const catalogue::CommandBits& bits() const { return found_.bits; }
+  /// The word of the profile that starts the run.
+  [[nodiscard]] std::uint16_t standard_word() const;
+  /// The same word for this driver. Requires that prepare() succeeded.
+  [[nodiscard]] std::uint16_t start_word() const {
+    return found_.bits.word(standard_word()).value_or(plan_->motor.idle_word());
+  }
   /// How long the motor takes to decelerate, as it is set now.
   [[nodiscard]] Duration stopping() const { return found_.stopping; }
   /// The one that is in force during the run; empty or 0 where there is none.
@@ -56,6 +64,7 @@ class MotorSetup {
   struct Found {
     std::int64_t mode = 0;
     std::uint16_t word = 0;
+    catalogue::CommandBits bits = {};
     std::int64_t analog = 0;
     std::optional<catalogue::Value> watchdog;
     Duration stopping = {};
@@ -64,6 +73,7 @@ class MotorSetup {
   [[nodiscard]] const catalogue::RunFacts& facts() const { return plan_->motor.facts(); }
   Result<void> read_settings();
   Result<void> check_ready();
+  Result<void> check_inputs() const;
   Result<void> check_analog() const;
   Result<void> clear_word();
   Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);

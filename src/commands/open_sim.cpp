@@ -24,6 +24,9 @@ std::vector<modbus::UnitId> units_for(const link::Endpoint& endpoint,
 
 sim::BlvOptions bus_options(const SimulatedToolOptions& options) {
   sim::BlvOptions bus{.baud = options.baud.value_or(0)};
+  if (options.busy) bus.configuring = *options.busy;
+  bus.alarms = options.alarms;
+  bus.warnings = options.warnings;
   if (options.units.empty()) return bus;
   bus.units.clear();
   for (const modbus::UnitId unit : options.units) bus.units.push_back(unit.value);
@@ -59,7 +62,9 @@ Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profi
   if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
     return tl::unexpected(std::move(known.error()));
   }
-  return sim::make_bm_tool(profile, start, options.bm);
+  sim::BmOptions bm = options.bm;
+  bm.alarms = options.alarms;
+  return sim::make_bm_tool(profile, start, bm);
 }
 
 }  // namespace

@@ -1,45 +1,33 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <optional>
+#include <thread>
 
-#include "deeds.hpp"
+#include "last_words.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "shared_lines.hpp"
 #include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/motor.hpp"
 #include "spindle/device/run_guard.hpp"
+#include "stop_pursuit.hpp"
 #include "stops.hpp"
 
 namespace spindle::commands {
 namespace {
 
-/// Neither asks nor waits for anything but the proof: somebody wants this tool to stand still.
-Result<device::StopResult> stop_one(const Target& target, const RemoteStopOptions& options,
-                                    const Context& context) {
-  auto profile = load_profile(target, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tool = open_tool(target, std::move(*profile), Need::stop_word, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
-  if (tool->profile->run)
-    return stop_motor(*tool, options.stop.value_or(catalogue::StopMode::decelerate), context);
-  const auto start = find_start(*tool->profile);
-  if (!start) return tl::unexpected(start.error());
-  // A stop may be repeated without harm, and one lost answer must not leave a motor running.
-  auto stopped = device::stop_and_confirm(tool->device, *start, context.clock);
-  for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {
-    stopped = device::stop_and_confirm(tool->device, *start, context.clock);
-  }
-  return stopped;
-}
+using catalogue::StopMode;
 
 /// The answer is of no interest here, so hardly waited for.
 constexpr int haste = 5;
 
 /// On a line that several share each waits for those before it, and one that is not there costs
-/// timeouts. So all motors are told to stop before any is asked whether it stands still.
+/// timeouts. So all motors are told to stop before any is asked whether it stands still. Only who
+/// asks for a gentle stop waits for what has to be known for it.
 void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::size_t>& line,
                   const RemoteStopOptions& options, const Context& context) {
   for (const std::size_t index : line) {
@@ -49,33 +37,74 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
     if (!motor) continue;
     Context hurried = context;
     hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / haste;
+    hurried.common.retries = 0;
     auto device = connect_device(targets[index], *profile, hurried);
     if (!device) continue;
-    const catalogue::RunFacts& facts = motor->facts();
-    const bool instant = options.stop == catalogue::StopMode::instant;
-    static_cast<void>(
-        motor->command(*device, instant ? facts.instant_always : facts.decelerate_always));
+    device::MotorStopper stopper(*motor, options.stop.value_or(StopMode::decelerate));
+    if (options.stop == StopMode::decelerate) stopper.observe(*device);
+    static_cast<void>(stopper.send(*device));
   }
 }
 
-/// A stop waits for no other one. The results are in the order of the targets.
-std::vector<Result<device::StopResult>> stop_all(const std::vector<Target>& targets,
-                                                 const RemoteStopOptions& options,
-                                                 const Context& context) {
-  const auto lines = by_line(targets);
-  return side_by_side(targets, targets.size(), [&](const Target& target) {
-    for (const auto& line : lines) {
-      const bool begins = line.size() > 1 && &target == &targets[line.front()];
-      if (begins) tell_to_stop(targets, line, options, context);
+using Pursuits = std::vector<std::unique_ptr<StopPursuit>>;
+
+/// In turns, so that none waits for another one that is not there.
+void pursue(const std::vector<std::size_t>& line, Pursuits& pursuits, const Context& context) {
+  bool goes_on = true;
+  while (goes_on) {
+    goes_on = false;
+    for (const std::size_t index : line) {
+      if (!pursuits[index]->try_stop()) goes_on = true;
     }
-    return stop_one(target, options, context);
-  });
+    if (goes_on && !context.clock.sleep_until(context.clock.now() + device::RunGuard::pause)) break;
+  }
+}
+
+/// A stop waits for no other one, and no signal ends it. The results are in the order of the
+/// targets.
+Pursuits stop_all(const std::vector<Target>& targets, const RemoteStopOptions& options,
+                  const Context& own) {
+  Pursuits pursuits;
+  for (const Target& target : targets) {
+    pursuits.push_back(
+        std::make_unique<StopPursuit>(target, options.stop.value_or(StopMode::decelerate), own));
+  }
+  const auto stop_line = [&](const std::vector<std::size_t>& line) {
+    if (line.size() > 1) tell_to_stop(targets, line, options, own);
+    pursue(line, pursuits, own);
+  };
+  const auto lines = by_line(targets);
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t other = 1; other < lines.size(); ++other) {
+      threads.emplace_back([&, other] { stop_line(lines[other]); });
+    }
+    if (!lines.empty()) stop_line(lines.front());
+  }
+  return pursuits;
 }
 
 /// Why a tool may still run.
-std::optional<Error> failure_of(const Result<device::StopResult>& result, const Target& target) {
+std::optional<Error> failure_of(const Result<device::StopResult>& result, const Target& target,
+                                const catalogue::Profile* profile) {
   if (!result) return result.error();
-  if (result == device::StopResult::unconfirmed) return still_runs(target);
+  if (result == device::StopResult::unconfirmed) return still_runs(target, profile);
+  return std::nullopt;
+}
+
+/// A tools file that does not count as a whole: only who names a group may miss a tool.
+std::optional<Error> fault_of_file(const RemoteStopOptions& options, const Context& context) {
+  const auto& left_out = context.tools.left_out;
+  if (!left_out) return std::nullopt;
+  if (std::any_of(options.targets.begin(), options.targets.end(), names_group)) {
+    return Error{
+        .code = left_out->code,
+        .message = fmt::format("not all of the tools file counts, so a group may lack tools: {}",
+                               describe(*left_out)),
+        .hint = "name each tool, or stop it at the tool"};
+  }
+  context.renderer.note(
+      fmt::format("warning: not all of the tools file counts: {}", describe(*left_out)));
   return std::nullopt;
 }
 
@@ -96,35 +125,33 @@ Summary summary_of(const Outcome& outcome, Reach reach) {
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
   // Nobody's wrong name keeps another tool running, and no fault of the tools file.
   auto [targets, faults] = resolve_each_target(options.targets, context);
-  if (const auto& left_out = context.tools.left_out) {
-    const bool may_lack_some =
-        std::any_of(options.targets.begin(), options.targets.end(), names_group);
-    if (may_lack_some) {
-      faults.push_back({.code = left_out->code,
-                        .message = fmt::format("not all of the tools file counts, so a group may "
-                                               "lack tools: {}",
-                                               describe(*left_out)),
-                        .hint = "name each tool, or stop it at the tool"});
-    } else {
-      context.renderer.note(
-          fmt::format("warning: not all of the tools file counts: {}", describe(*left_out)));
-    }
-  }
   for (Target& target : targets) {
     target.reach = options.reach;
     target.endpoint.claim = link::Claim::beside;
   }
-  const auto results = stop_all(targets, options, context);
+  const Context calm = calm_context(context);
+  SharedLines shared(targets, calm);
+  const device::OpenTransport open = shared.opener();
+  const Context own = with_lines(calm, open);
+  Pursuits pursuits;
+  {
+    const LastWords last_words(
+        context,
+        "THE TOOL MAY STILL RUN: a second signal ended the program before the stop was "
+        "confirmed; stop it at the tool");
+    pursuits = stop_all(targets, options, own);
+  }
+  if (auto fault = fault_of_file(options, context)) faults.push_back(std::move(*fault));
   Outcome outcome;
   Listing listing(context, stop_columns());
   const auto fail = [&](const Error& error) {
     outcome.fail(error);
     listing.add(error);
   };
-  for (std::size_t index = 0; index < results.size(); ++index) {
-    const Result<device::StopResult>& result = results[index];
+  for (std::size_t index = 0; index < pursuits.size(); ++index) {
+    const Result<device::StopResult> result = pursuits[index]->result();
     if (result) listing.add(stop_record(*result, targets[index], context.clock));
-    const auto failure = failure_of(result, targets[index]);
+    const auto failure = failure_of(result, targets[index], pursuits[index]->profile());
     failure ? fail(*failure) : outcome.succeed();
   }
   std::for_each(faults.begin(), faults.end(), fail);

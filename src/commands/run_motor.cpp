@@ -47,11 +47,15 @@ class MotorRun {
                     .value_or(catalogue::CodeTables())) {}
 
   Result<Outcome> run() {
+    const auto stop_mode = options_->stop.value_or(catalogue::StopMode::decelerate);
+    if (auto guarded = guarded_.set_guardian(stop_mode); !guarded) {
+      return tl::unexpected(std::move(guarded.error()));
+    }
     if (auto ready = setup_.prepare(); !ready) {
       return tl::unexpected(with_left(std::move(ready.error()), setup_.put_back()));
     }
-    const std::uint16_t word = start_word();
-    stopper_.started(word, setup_.input_mode(), setup_.stopping());
+    const std::uint16_t word = setup_.start_word();
+    stopper_.started(setup_.standard_word(), setup_.input_mode(), setup_.bits(), setup_.stopping());
     listing_.emplace(*context_, motor_columns(Tools::one));
     started_ = log_.begin({.name = "start", .new_value = Decimal(word)});
     auto [followed, stop] = guarded_.run(
@@ -67,13 +71,6 @@ class MotorRun {
 
  private:
   [[nodiscard]] const RunFacts& facts() const { return plan_->motor.facts(); }
-
-  [[nodiscard]] std::uint16_t start_word() const {
-    const catalogue::RunWords& words = facts().modes.at(setup_.input_mode());
-    const unsigned run =
-        options_->direction_of_motor == Direction::forward ? words.forward : words.reverse;
-    return static_cast<std::uint16_t>(run | facts().selecting(plan_->operation));
-  }
 
   device::GuardedMotion motion(std::uint16_t word) {
     return {.start = [this,
@@ -142,7 +139,7 @@ class MotorRun {
 
   void log_run(const Result<MotorEnding>& followed, const device::StopReport& stop) {
     log_.end(started_, {.name = "start",
-                        .new_value = Decimal(start_word()),
+                        .new_value = Decimal(setup_.start_word()),
                         .result = log_word(result_of(followed), stop)});
   }
 

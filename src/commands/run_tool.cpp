@@ -53,6 +53,9 @@ class RemoteRun {
                      .value_or(catalogue::CodeTables())) {}
 
   Result<Outcome> run() {
+    if (auto guarded = guarded_.set_guardian(); !guarded) {
+      return tl::unexpected(std::move(guarded.error()));
+    }
     device::RunFollower follower(tool_->device, plan_->start, context_->clock,
                                  [this](const device::EventNews& event) { tell(event); });
     auto ready = setup_.look().and_then([&] { return setup_.select(); }).and_then([&] {

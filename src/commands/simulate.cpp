@@ -34,6 +34,81 @@ Error misplaced(std::string message, std::string hint) {
   return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
 }
 
+/// A tool that this profile describes would not notice it.
+Error useless(std::string_view option, const catalogue::Profile& profile, std::string_view why) {
+  return misplaced(fmt::format("{} does nothing for {}: {}", option, profile.id, why),
+                   "leave it out");
+}
+
+constexpr std::string_view no_identity = "its simulation has no identity";
+constexpr std::string_view no_events = "it has no operator who drives screws";
+constexpr std::string_view no_motor = "it has no motor that a command word runs";
+
+/// The first option that does nothing for this profile.
+std::optional<Error> useless_option(const SimulateOptions& options,
+                                    const catalogue::Profile& profile) {
+  const sim::BmOptions& bm = options.tool.bm;
+  const bool motor = profile.run.has_value();
+  const bool identity = profile.identity && !motor;
+  struct Row {
+    std::string_view option;
+    bool given;
+    bool works;
+    std::string_view why;
+  };
+  const Row rows[] = {
+      {"--identity-bytes", bm.identity_bytes.has_value(), identity, no_identity},
+      {"--firmware", bm.firmware.has_value(), identity, no_identity},
+      {"--serial", bm.serial.has_value(), identity, no_identity},
+      {"--model", bm.tool_model.has_value(), identity, no_identity},
+      {"--rundown-every", bm.rundown_every.has_value(), !motor, no_events},
+      {"--busy", options.tool.busy.has_value(), motor, no_motor},
+      {"--warning", !options.tool.warnings.empty(), motor, no_motor},
+      {"--no-gap", options.gaps == sim::LineModel::Gaps::ignored,
+       profile.link.framing == modbus::Framing::tcp || !profile.link.serial.gaps.empty(),
+       "it asks for no gaps"},
+  };
+  for (const Row& row : rows) {
+    if (row.given && !row.works) return useless(row.option, profile, row.why);
+  }
+  return std::nullopt;
+}
+
+/// Why nobody would feel the fault; empty: it is felt.
+std::string_view why_not_felt(sim::FaultKind kind, const catalogue::Profile& profile) {
+  const bool serial = profile.link.framing == modbus::Framing::rtu;
+  switch (sim::need_of(kind)) {
+    case sim::FaultNeed::network:
+      return serial ? "it is on a serial line" : "";
+    case sim::FaultNeed::serial_line:
+      return serial ? "" : "it speaks Modbus TCP";
+    case sim::FaultNeed::events:
+      return profile.events && !profile.run ? "" : "it sends nothing unasked";
+    case sim::FaultNeed::screwdriver:
+      return profile.run ? "a simulated motor driver stores what is written" : "";
+    case sim::FaultNeed::nothing:
+      break;
+  }
+  return {};
+}
+
+std::optional<Error> useless_trouble(const sim::FaultPlan& faults,
+                                     const std::vector<sim::Outage>& outages,
+                                     const catalogue::Profile& profile) {
+  for (const sim::Fault& fault : faults) {
+    const std::string_view why = why_not_felt(fault.kind, profile);
+    if (!why.empty()) {
+      return useless(fmt::format("--fault {}", sim::to_text(fault.kind)), profile, why);
+    }
+  }
+  for (const sim::Outage& outage : outages) {
+    if (profile.link.framing == modbus::Framing::tcp || !sim::needs_radio(outage.kind)) continue;
+    return useless(fmt::format("--outage {}", sim::to_text(outage.kind)), profile,
+                   "it is on a serial line, not on a radio");
+  }
+  return std::nullopt;
+}
+
 /// What only makes sense on a serial line, by the name of its option; empty: nothing was asked for.
 std::string_view serial_option(const SimulateOptions& options) {
   if (!options.pty.empty()) return "--pty";
@@ -148,6 +223,14 @@ void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Cont
                              connection, words_of(heard), to_hex(bytes)));
 }
 
+/// What was heard and will not be answered, which a real tool would keep to itself.
+void tell_ignored(std::uint32_t connection, ByteView bytes, std::string_view reason,
+                  const Context& context) {
+  context.renderer.note(fmt::format("{} client {} ignored {}: {}",
+                                    report::to_text(context.clock.wall()), connection,
+                                    to_hex(bytes), reason));
+}
+
 Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& context) {
   return context.renderer.summary(summary_record({{"connections", count(traffic.connections)},
                                                   {"requests", count(traffic.requests)}},
@@ -163,12 +246,25 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   if (!faults) return tl::unexpected(std::move(faults.error()));
   auto outages = parse_each("--outage", options.outages, sim::parse_outage);
   if (!outages) return tl::unexpected(std::move(outages.error()));
-  SimulatedToolOptions wanted = options.tool;
-  wanted.bm.faults = *faults;
-  auto tool = make_simulated_tool(options.profile, wanted, context);
+  SimulateOptions wanted = options;
+  constexpr std::uint16_t highest_code = 0xFFFF;
+  const auto parse_code = [](const std::string& text) {
+    return sim::parse_raised(text, highest_code);
+  };
+  auto alarms = parse_each("--alarm", options.alarms, parse_code);
+  if (!alarms) return tl::unexpected(std::move(alarms.error()));
+  auto warnings = parse_each("--warning", options.warnings, parse_code);
+  if (!warnings) return tl::unexpected(std::move(warnings.error()));
+  wanted.tool.alarms = std::move(*alarms);
+  wanted.tool.warnings = std::move(*warnings);
+  wanted.tool.bm.faults = *faults;
+  auto tool = make_simulated_tool(options.profile, wanted.tool, context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   auto place = place_of(options, tool->profile);
   if (!place) return tl::unexpected(std::move(place.error()));
+  auto idle = useless_option(wanted, tool->profile);
+  if (!idle) idle = useless_trouble(*faults, *outages, tool->profile);
+  if (idle) return tl::unexpected(std::move(*idle));
   Outcome outcome;
   outcome.succeed();
   Traffic traffic;
@@ -181,6 +277,9 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     traffic.count(heard);
     if (context.common.verbosity == Verbosity::frames) tell(heard, connection, bytes, context);
+  };
+  serve.ignored = [&](std::uint32_t connection, ByteView bytes, std::string_view reason) {
+    tell_ignored(connection, bytes, reason, context);
   };
   auto served = context.serve(*tool->server, serve);
   // Being stopped is how it ends; the status still says by what.

@@ -3,7 +3,6 @@
 #include <array>
 
 #include "records.hpp"
-#include "spindle/device/motor.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -20,18 +19,17 @@ std::string_view to_text(device::StopResult result) {
   return "";
 }
 
-/// Nobody acknowledges it, so it is sent more than once.
+}  // namespace
+
 Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
                             catalogue::StopMode mode) {
   const catalogue::RunFacts& facts = motor.facts();
-  const std::uint16_t word =
-      mode == catalogue::StopMode::decelerate ? facts.decelerate_always : facts.instant_always;
+  const bool gently = mode == catalogue::StopMode::decelerate && !motor.has_inputs();
+  const std::uint16_t word = gently ? facts.decelerate_always : motor.idle_word();
   Result<void> sent;
   for (int again = 0; again < most_stops && sent; ++again) sent = motor.broadcast(device, word);
   return sent;
 }
-
-}  // namespace
 
 bool leaves_open(const Result<device::StopResult>& stopped) {
   if (stopped) return *stopped == device::StopResult::unconfirmed;
@@ -80,11 +78,17 @@ std::span<const report::Column> stop_columns() {
   return columns;
 }
 
-Error still_runs(const Target& target) {
+std::string where_to_stop(const catalogue::Profile* profile) {
+  const std::string here = "stop it at the tool";
+  const bool has_more = profile != nullptr && profile->run && !profile->run->still_runs.empty();
+  return has_more ? here + "; " + profile->run->still_runs : here;
+}
+
+Error still_runs(const Target& target, const catalogue::Profile* profile) {
   return target.blamed(
       {.code = Errc::mismatch,
        .message = "the stop was acknowledged, but the tool still says that it runs",
-       .hint = "stop it at the tool"});
+       .hint = where_to_stop(profile)});
 }
 
 }  // namespace spindle::commands

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 #include "spindle/commands/target.hpp"
+#include "spindle/device/motor.hpp"
 #include "spindle/device/run_guard.hpp"
 #include "spindle/report/renderer.hpp"
 
@@ -20,6 +22,11 @@ bool leaves_open(const Result<device::StopResult>& stopped);
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Context& context);
 
+/// Tells every motor on the line to stop, more than once, as none of them acknowledges it. Which
+/// bit starts what on each of them can not be asked.
+Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+                            catalogue::StopMode mode);
+
 /// The catalogue's action that starts a motion and can end it again. Error `usage` where a product
 /// has none.
 Result<catalogue::Action> find_start(const catalogue::Profile& profile);
@@ -28,7 +35,10 @@ Result<catalogue::Action> find_start(const catalogue::Profile& profile);
 report::Record stop_record(device::StopResult result, const Target& target, const Clock& clock);
 std::span<const report::Column> stop_columns();
 
-/// The stop was acknowledged, and the tool says that it runs all the same.
-Error still_runs(const Target& target);
+/// What helps where a stop could not be confirmed, with what else may keep this product running.
+std::string where_to_stop(const catalogue::Profile* profile);
+
+/// The stop was acknowledged, and the tool says that it runs all the same. `profile` may be null.
+Error still_runs(const Target& target, const catalogue::Profile* profile);
 
 }  // namespace spindle::commands

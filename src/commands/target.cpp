@@ -366,9 +366,7 @@ Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Nee
   if (!tool || need == Need::raw_registers) return tool;
   auto known = target.profile.empty() ? find_profile(*tool, context)
                                       : tool->device.require_known_registers();
-  // A motor must not run on because the tool is of another product than the profile says.
-  const bool stops = need == Need::stop_word && !known && known.error().code == Errc::mismatch;
-  if (!known && !stops) return tl::unexpected(std::move(known.error()));
+  if (!known) return tl::unexpected(std::move(known.error()));
   return tool;
 }
 

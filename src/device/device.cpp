@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
+#include "spindle/device/motor.hpp"
 #include "spindle/link/serial_settings.hpp"
 
 namespace spindle::device {
@@ -775,11 +777,22 @@ Result<ActionResult> Device::confirm(const catalogue::Action& action, const Para
   }
 }
 
+/// On a driver whose inputs are assigned otherwise other bits do the same; all of them where that
+/// can not be known.
+std::uint16_t Device::bits_to_clear(const catalogue::Preparation& preparation) {
+  const auto motor = Motor::of(*profile_);
+  const bool varies =
+      motor && motor->has_inputs() && motor->command_register() == preparation.address;
+  if (!varies) return preparation.clear;
+  const auto bits = motor->read_bits(*this, std::numeric_limits<std::uint16_t>::max());
+  return bits ? bits->any_of(preparation.clear) : std::numeric_limits<std::uint16_t>::max();
+}
+
 Result<void> Device::prepare(const catalogue::Preparation& preparation) {
   const auto words = read_raw({modbus::RegisterTable::holding, preparation.address.value, 1});
   if (!words) return tl::unexpected(words.error());
   const std::uint16_t word = words->front();
-  const auto cleared = static_cast<std::uint16_t>(word & ~unsigned{preparation.clear});
+  const auto cleared = static_cast<std::uint16_t>(word & ~unsigned{bits_to_clear(preparation)});
   if (cleared == word) return {};
   return while_busy([&] { return client_.write(preparation.address, cleared); });
 }

@@ -8,8 +8,6 @@ namespace {
 
 /// How long a stop is tried before it is given up and said so.
 constexpr Duration stop_patience = std::chrono::seconds(10);
-/// Pause before the next try, so that a refusing tool is not flooded.
-constexpr Duration stop_pause = std::chrono::milliseconds(200);
 /// The first stop is sent again when its answer takes longer than this; a slow tool's answer is
 /// waited for by the later ones.
 constexpr Duration first_answer = std::chrono::milliseconds(500);
@@ -49,6 +47,14 @@ RunGuard::RunGuard(Device& device, GuardedMotion motion, Reopen reopen, Clock& c
       calm_(&calm),
       answer_timeout_(device.session().options().answer_timeout) {}
 
+RunGuard::RunGuard(GuardedMotion motion, Reopen reopen, Clock& calm, Duration settles)
+    : device_(nullptr),
+      motion_(std::move(motion)),
+      reopen_(std::move(reopen)),
+      calm_(&calm),
+      settles_(settles),
+      line_(Line::lost) {}
+
 RunGuard::~RunGuard() {
   if (armed_) stop();
 }
@@ -61,28 +67,45 @@ Result<void> RunGuard::start() {
 }
 
 StopReport RunGuard::stop() {
-  if (report_) return *report_;
-  armed_ = false;
-  const TimePoint began = calm_->now();
-  const TimePoint limit = began + stop_patience + motion_.stopping;
-  StopReport report;
   while (true) {
-    const auto stopped = try_to_stop(++report.attempts, limit);
-    report.result = stopped.value_or(StopResult::unconfirmed);
-    report.trouble = stopped ? "the tool still says that it runs" : message_of(stopped.error());
-    if (!stopped) judge_line(stopped.error());
-    const TimePoint next = calm_->now() + stop_pause;
-    if (is_proven(report) || next > limit || !calm_->sleep_until(next)) break;
+    if (auto report = try_stop()) return *report;
+    if (!calm_->sleep_until(calm_->now() + pause)) return end_stop();
   }
-  report.tried = calm_->now() - began;
-  report_ = report;
-  return report;
+}
+
+StopReport RunGuard::end_stop() {
+  trying_.tried = calm_->now() - *began_;
+  report_ = trying_;
+  return trying_;
+}
+
+void RunGuard::begin_stop() {
+  if (began_) return;
+  armed_ = false;
+  began_ = calm_->now();
+  limit_ = *began_ + stop_patience + motion_.stopping;
+}
+
+std::optional<StopReport> RunGuard::try_stop() {
+  if (report_) return report_;
+  begin_stop();
+  const TimePoint tried_at = calm_->now();
+  const auto stopped = try_to_stop(++trying_.attempts);
+  trying_.result = stopped.value_or(StopResult::unconfirmed);
+  trying_.trouble = stopped ? "the tool still says that it runs" : message_of(stopped.error());
+  if (!stopped) judge_line(stopped.error());
+  // A motor that needs long to stand still, and does not, is still braked.
+  if (stopped && !std::exchange(extended_, true)) limit_ += calm_->now() - tried_at;
+  const bool over = calm_->now() + pause > limit_;
+  const bool hopeless = !stopped && is_hopeless(stopped.error());
+  if (!is_proven(trying_) && !over && !hopeless) return std::nullopt;
+  return end_stop();
 }
 
 /// One stop, on the connection that is there or on a new one.
-Result<StopResult> RunGuard::try_to_stop(unsigned attempt, TimePoint limit) {
+Result<StopResult> RunGuard::try_to_stop(unsigned attempt) {
   if (line_ == Line::lost) {
-    if (auto opened = reopen(limit - calm_->now()); !opened) {
+    if (auto opened = reopen(limit_ - calm_->now()); !opened) {
       return tl::unexpected(std::move(opened.error()));
     }
   }
@@ -95,18 +118,24 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt, TimePoint limit) {
 }
 
 Result<void> RunGuard::reopen(Duration patience) {
-  device_->hang_up();
+  if (device_ != nullptr) device_->hang_up();
   auto opened = reopen_(patience);
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  *device_ = std::move(*opened);
+  if (device_ == nullptr) {
+    own_.emplace(std::move(*opened));
+    device_ = &*own_;
+  } else {
+    *device_ = std::move(*opened);
+  }
   line_ = Line::open;
   silences_ = 0;
-  if (!acknowledged_) settled_at_ = calm_->now() + std::min(answer_timeout_, longest_answer);
+  if (!answer_timeout_) answer_timeout_ = device_->session().options().answer_timeout;
+  if (!acknowledged_) settled_at_ = calm_->now() + std::min(*answer_timeout_, settles_);
   return {};
 }
 
 Duration RunGuard::patience_of(unsigned attempt) const {
-  return std::min(answer_timeout_, attempt == 1 ? first_answer : longest_answer);
+  return std::min(*answer_timeout_, attempt == 1 ? first_answer : longest_answer);
 }
 
 /// A refusal says that the line works, and one lost answer does not say that it is gone.
@@ -114,6 +143,10 @@ void RunGuard::judge_line(const Error& error) {
   if (error.code == Errc::exception_response) return;
   const bool silent = error.code == Errc::no_answer && ++silences_ < silences_allowed;
   if (!silent) line_ = Line::lost;
+}
+
+bool RunGuard::is_hopeless(const Error& error) const {
+  return motion_.hopeless && motion_.hopeless(error);
 }
 
 /// On one connection a stop comes after its start. On another one it may come before a start that

@@ -45,6 +45,35 @@ void read_modes(const YamlNode& node, RunFacts& run, Findings& findings) {
   }
 }
 
+void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
+  expect(node, YamlNode::Kind::sequence, findings);
+  inputs.functions.clear();
+  for (const YamlNode& item : node.items) {
+    YamlMap map(item, findings);
+    catalogue::InputFunction function;
+    assign(function.number, map.number<std::uint16_t>("number", Need::required));
+    function.bit = map.number<std::uint8_t>("bit");
+    assign(function.evidence,
+           map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, Need::required));
+    assign(function.source, map.text("source", Need::required));
+    map.finish();
+    inputs.functions.push_back(std::move(function));
+  }
+}
+
+void read_inputs(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
+  YamlMap map(node, findings);
+  assign(inputs.parameter, map.text("parameter", Need::required));
+  if (const auto bits = map.range("bits", last_register, Need::required)) {
+    inputs.first = static_cast<std::uint16_t>(bits->from);
+    inputs.last = static_cast<std::uint16_t>(bits->to);
+  }
+  if (const YamlNode* functions = map.get("functions", Need::required)) {
+    read_functions(*functions, inputs, findings);
+  }
+  map.finish();
+}
+
 void read_command(const YamlNode& node, RunFacts& run, Need need, Findings& findings) {
   YamlMap map(node, findings);
   assign(run.command, map.text("parameter", need));
@@ -58,6 +87,7 @@ void read_command(const YamlNode& node, RunFacts& run, Need need, Findings& find
     assign(run.instant_always, words.number<std::uint16_t>("instant", Need::required));
     words.finish();
   }
+  if (const YamlNode* inputs = map.get("inputs")) read_inputs(*inputs, run.inputs, findings);
   map.finish();
 }
 
@@ -159,6 +189,7 @@ class DriveRules {
     }
     if (run.modes.empty()) findings_.add_once(at, "there is no mode in which the motor runs");
     for (const auto& [mode, words] : run.modes) check_mode(mode, words, run, at);
+    check_inputs(run, at);
     if (((run.decelerate_always | run.instant_always) & run.starting) != 0) {
       findings_.add_once(at, "a word that stops in every mode has a bit that starts in one");
     }
@@ -167,6 +198,44 @@ class DriveRules {
     if (room < run.last || ((room + 1) & room) != 0) {
       findings_.add_once(at, fmt::format("the bits {:#x} can not select operation data up to {}",
                                          run.select, run.last));
+    }
+  }
+
+  /// Every bit of a word has one function by which it is found on a driver.
+  void check_inputs(const RunFacts& run, const Position& at) {
+    const catalogue::InputFacts& inputs = run.inputs;
+    if (inputs.parameter.empty()) return;
+    constexpr std::uint16_t highest_bit = 15;
+    if (inputs.first > inputs.last || inputs.last > highest_bit) {
+      findings_.add_once(at, fmt::format("the bits of inputs are 0 to {}", highest_bit));
+      return;
+    }
+    for (std::uint16_t n = inputs.first; n <= inputs.last; ++n) {
+      require(catalogue::numbered_name(inputs.parameter, n), at);
+    }
+    unsigned used =
+        unsigned{run.select} | run.starting | run.decelerate_always | run.instant_always;
+    for (const auto& [mode, words] : run.modes) {
+      used |= unsigned{words.forward} | words.reverse | words.decelerate | words.instant;
+    }
+    unsigned known = 0;
+    for (const catalogue::InputFunction& function : inputs.functions) {
+      if (inputs.find(function.number) != &function) {
+        findings_.add_once(at, fmt::format("function {} is there twice", function.number));
+      }
+      if (!function.bit) continue;
+      if (*function.bit > highest_bit) {
+        findings_.add_once(
+            at, fmt::format("function {}: a bit is 0 to {}", function.number, highest_bit));
+      } else if ((known >> *function.bit & 1U) != 0) {
+        findings_.add_once(at, fmt::format("bit {} has two functions", *function.bit));
+      } else {
+        known |= 1U << *function.bit;
+      }
+    }
+    for (unsigned bit = 0; bit <= highest_bit; ++bit) {
+      const bool is_missing = ((used & ~known) >> bit & 1U) != 0;
+      if (is_missing) findings_.add_once(at, fmt::format("bit {} has no function in inputs", bit));
     }
   }
 

@@ -353,6 +353,12 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
   if (const YamlNode* bytes = map.get("bytes", Need::required)) {
     facts.identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
   }
+  // Behind function code and byte count.
+  constexpr std::size_t most = modbus::max_pdu_size - 2;
+  if (facts.identity.size() > most) {
+    findings.add(node.at, fmt::format("an answer holds at most {} bytes", most));
+    facts.identity.resize(most);
+  }
   facts.identity_bytes =
       map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));
   if (facts.identity_bytes > facts.identity.size()) {

@@ -1,5 +1,6 @@
 #include "posix/served_client.hpp"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -46,6 +47,12 @@ ServedClient::ServedClient(Descriptor descriptor, Wire wire, sim::ConnectionId c
       peer_(service.server, connection, service.options.framing, service.options.faults,
             service.answers, service.options.line) {
   hear(sim::Heard::connected, {});
+  peer_.set_ignored([this](ByteView bytes, std::string_view reason) {
+    if (!options_->ignored) return;
+    if (!at_another_rate()) return options_->ignored(connection_.value, bytes, reason);
+    options_->ignored(connection_.value, bytes,
+                      fmt::format("it comes at another rate than {} baud", options_->baud));
+  });
 }
 
 ServedClient::~ServedClient() {
@@ -87,6 +94,14 @@ void ServedClient::read(TimePoint now) {
     hear(sim::Heard::request, got);
     peer_.receive(got, now);
   }
+}
+
+void ServedClient::forget() {
+  std::array<std::uint8_t, read_size> lost;
+  std::size_t reads = max_discarded_reads;
+  while (reads > 0 && ::read(descriptor(), lost.data(), lost.size()) > 0) --reads;
+  outgoing_.clear();
+  peer_.forget();
 }
 
 void ServedClient::push(const modbus::Pdu& pdu, TimePoint now) {

@@ -39,6 +39,8 @@ class ServedClient {
   void read(TimePoint now);
   /// Queues an event frame.
   void push(const modbus::Pdu& pdu, TimePoint now);
+  /// Whatever is under way in either direction is lost.
+  void forget();
   /// Sends what is due, as far as the client takes it.
   void write(TimePoint now);
   /// Both directions have ended, or the client is gone, too slow, or lingers for too long.

@@ -42,7 +42,12 @@ void Serving::follow_outages(TimePoint now) {
   const bool rebooted = outage_ == sim::OutageKind::reboot;
   if (rebooted) service_.server.reboot(now);
   const bool came_back = before == sim::OutageKind::roam;
-  const bool drops = came_back || rebooted || outage_ == sim::OutageKind::other_client;
+  // A line outlives what hangs on it, but what was said to a driver without power is lost.
+  const bool serial = service_.options.framing == modbus::Framing::rtu;
+  if (serial && (rebooted || before == sim::OutageKind::reboot)) {
+    for (auto& [id, client] : clients_) client.forget();
+  }
+  const bool drops = came_back || (rebooted && !serial) || outage_ == sim::OutageKind::other_client;
   if (drops && listener_.valid()) clients_.clear();  // a serial line stays where it is
 }
 

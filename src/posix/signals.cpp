@@ -3,12 +3,14 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
 #include <ctime>
+#include <map>
 
 namespace spindle::posix {
 namespace {
@@ -16,8 +18,27 @@ namespace {
 // A shell reads 128 + n as "ended by signal n".
 constexpr int signal_status_base = 128;
 
-constexpr std::array watched_signals = {SIGINT,  SIGTERM, SIGHUP, SIGQUIT,
-                                        SIGPIPE, SIGXFSZ, SIGTSTP};
+// Those that wait for their request: the program ends, and leaves a tool safe.
+constexpr std::array requests = {SIGINT,  SIGTERM,   SIGHUP,  SIGQUIT, SIGUSR1, SIGUSR2,  SIGALRM,
+                                 SIGXCPU, SIGVTALRM, SIGPROF, SIGIO,   SIGPWR,  SIGSTKFLT};
+// Raised by a fault of the process, after which nothing can be done in it, or sent by another one.
+constexpr std::array faults = {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS};
+// A reader that has gone and a file that may not grow are told by the write itself.
+constexpr std::array told_otherwise = {SIGPIPE, SIGXFSZ};
+// Left as they are until a tool runs.
+constexpr std::array suspending = {SIGTSTP, SIGTTIN, SIGTTOU};
+
+template <std::size_t count>
+bool is_in(const std::array<int, count>& numbers, int number) {
+  return std::find(numbers.begin(), numbers.end(), number) != numbers.end();
+}
+
+bool is_real_time(int number) { return number >= SIGRTMIN && number <= SIGRTMAX; }
+
+bool is_watched(int number) {
+  return is_in(requests, number) || is_in(faults, number) || is_in(told_otherwise, number) ||
+         is_in(suspending, number) || is_real_time(number);
+}
 
 // Supervisors, wrappers and terminals send several signals for one wish. Those that follow this
 // soon (a hand is slower) are part of the first, or they would end the process before it has
@@ -27,8 +48,11 @@ constexpr std::int64_t one_wish_ns = 50'000'000;
 // The one mutable global of the program: a signal handler gets nothing but the signal's number, so
 // the way to the Interrupt has to be static.
 std::atomic<Interrupt*> watched{nullptr};
-std::atomic<std::int64_t> first_signal_ns{0};  // its companion, for the same reason
+std::atomic<std::int64_t> first_signal_ns{0};   // its companion, for the same reason
+std::array<char, 512> last_words = {};          // likewise
+std::atomic<std::size_t> last_words_length{0};  // likewise
 static_assert(std::atomic<Interrupt*>::is_always_lock_free, "read by a signal handler");
+static_assert(std::atomic<std::size_t>::is_always_lock_free, "read by a signal handler");
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "read by a signal handler");
 
 std::int64_t monotonic_ns() {
@@ -43,14 +67,18 @@ void wake(const Interrupt& interrupt) {
   [[maybe_unused]] const ssize_t written = ::write(interrupt.descriptor(), &one, sizeof one);
 }
 
+[[noreturn]] void end_at_once(int number) {
+  [[maybe_unused]] const ssize_t written =
+      ::write(STDERR_FILENO, last_words.data(), last_words_length.load());
+  ::_exit(signal_status_base + number);
+}
+
 extern "C" void on_signal(int number) {
   Interrupt* const interrupt = watched.load();
   if (interrupt == nullptr) return;
   const int interrupted_errno = errno;
   if (interrupt->signalled()) {
-    if (monotonic_ns() - first_signal_ns.load() >= one_wish_ns) {
-      ::_exit(signal_status_base + number);
-    }
+    if (monotonic_ns() - first_signal_ns.load() >= one_wish_ns) end_at_once(number);
     errno = interrupted_errno;
     return;
   }
@@ -60,52 +88,92 @@ extern "C" void on_signal(int number) {
   errno = interrupted_errno;
 }
 
+extern "C" void on_fault(int number, siginfo_t* info, void* /*context*/) {
+  const bool is_sent = info->si_code == SI_USER || info->si_code == SI_QUEUE;
+  if (is_sent && info->si_pid != ::getpid()) {
+    on_signal(number);
+    return;
+  }
+  // Behind the return the fault happens again, or abort() goes on, and the process ends.
+  ::signal(number, SIG_DFL);
+}
+
 struct sigaction action_for(int number) {
   struct sigaction action = {};
   // No SA_RESTART: a question at the terminal must end too, and that is a plain read().
-  // A reader that has gone and a file that may not grow are told by the write itself.
-  const bool is_told = number == SIGPIPE || number == SIGXFSZ;
+  const bool is_told = is_in(told_otherwise, number) || number == SIGTTIN || number == SIGTTOU;
   action.sa_handler = is_told ? SIG_IGN : on_signal;
-  for (const int other : watched_signals) ::sigaddset(&action.sa_mask, other);
+  if (is_in(faults, number)) {
+    action.sa_sigaction = on_fault;
+    action.sa_flags = SA_SIGINFO;
+    return action;
+  }
+  for (int other = 1; other <= SIGRTMAX; ++other) {
+    if (is_watched(other) && !is_in(faults, other)) ::sigaddset(&action.sa_mask, other);
+  }
   return action;
+}
+
+/// nohup and its like: what was ignored was meant to be. A shell ignores SIGINT and SIGQUIT for
+/// what it starts in the background.
+bool stays_ignored(int number, const struct sigaction& before) {
+  const bool heeded = number == SIGINT || number == SIGQUIT || number == SIGTERM;
+  return before.sa_handler == SIG_IGN && !heeded;
+}
+
+/// One that the process had taken for itself: a sanitizer, a debugger.
+bool has_handler(const struct sigaction& action) {
+  return action.sa_handler != SIG_DFL && action.sa_handler != SIG_IGN;
 }
 
 }  // namespace
 
 struct SignalWatch::Previous {
-  std::array<struct sigaction, watched_signals.size()> actions = {};
+  std::map<int, struct sigaction> actions = {};
 };
 
 SignalWatch::SignalWatch()
     : interrupt_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       previous_(std::make_unique<Previous>()) {
   watched.store(&interrupt_);
-  for (std::size_t i = 0; i < watched_signals.size(); ++i) {
-    const struct sigaction action = action_for(watched_signals[i]);
-    struct sigaction& before = previous_->actions[i];
-    if (watched_signals[i] == SIGTSTP) {  // until somebody refuses it
-      ::sigaction(SIGTSTP, nullptr, &before);
-      continue;
-    }
-    ::sigaction(watched_signals[i], &action, &before);
-    // nohup: the terminal may go.
-    if (watched_signals[i] == SIGHUP && before.sa_handler == SIG_IGN) {
-      ::sigaction(SIGHUP, &before, nullptr);
-    }
+  for (int number = 1; number <= SIGRTMAX; ++number) {
+    if (!is_watched(number)) continue;
+    struct sigaction before = {};
+    if (::sigaction(number, nullptr, &before) != 0) continue;
+    previous_->actions[number] = before;
+    if (is_in(suspending, number)) continue;
+    if (stays_ignored(number, before) || (is_in(faults, number) && has_handler(before))) continue;
+    const struct sigaction action = action_for(number);
+    ::sigaction(number, &action, nullptr);
   }
 }
 
 SignalWatch::~SignalWatch() {
-  for (std::size_t i = 0; i < watched_signals.size(); ++i) {
-    ::sigaction(watched_signals[i], &previous_->actions[i], nullptr);
-  }
+  for (const auto& [number, action] : previous_->actions) ::sigaction(number, &action, nullptr);
   watched.store(nullptr);
+  last_words_length.store(0);
   ::close(interrupt_.descriptor());
 }
 
 void SignalWatch::stay_awake() {
-  const struct sigaction action = action_for(SIGTSTP);
-  ::sigaction(SIGTSTP, &action, nullptr);
+  for (const int number : suspending) {
+    const struct sigaction action = action_for(number);
+    ::sigaction(number, &action, nullptr);
+  }
+}
+
+void SignalWatch::set_last_words(std::string_view words) {
+  last_words_length.store(0);
+  if (words.empty()) return;
+  // On a terminal the line of progress ends first.
+  const std::string_view begin = ::isatty(STDERR_FILENO) == 1 ? "\nspindle: " : "spindle: ";
+  std::size_t length = 0;
+  for (const std::string_view part : {begin, words}) {
+    const std::size_t room = last_words.size() - 1 - length;  // one for the end of the line
+    length += part.copy(last_words.data() + length, room);
+  }
+  last_words[length++] = '\n';
+  last_words_length.store(length);
 }
 
 void SignalWatch::end_waits() {

@@ -23,7 +23,13 @@ class SimulatedBus final : public BlvBus {
  public:
   SimulatedBus(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
                const BlvOptions& options) {
-    for (const std::uint8_t unit : options.units) units_.emplace_back(profile, start, unit);
+    for (const std::uint8_t unit : options.units) {
+      units_.emplace_back(profile, start, unit, options.configuring);
+    }
+    for (const Raised& alarm : options.alarms) trouble_.push_back({alarm, &BlvUnit::raise_alarm});
+    for (const Raised& warning : options.warnings) {
+      trouble_.push_back({warning, &BlvUnit::raise_warning});
+    }
     const catalogue::SerialFacts& serial = profile.link.serial;
     const unsigned baud = options.baud == 0 ? serial.baud : options.baud;
     if (options.gaps == Gaps::enforced) gap_ = gap_at(serial, baud);
@@ -61,6 +67,16 @@ class SimulatedBus final : public BlvBus {
   }
 
   void advance(TimePoint now) override {
+    if (!begin_) begin_ = now;
+    std::erase_if(trouble_, [&](const Trouble& trouble) {
+      const TimePoint due = *begin_ + trouble.raised.after;
+      if (due > now) return false;
+      for (BlvUnit& one : units_) {
+        one.advance(due);
+        (one.*trouble.raise)(trouble.raised.code, due);
+      }
+      return true;
+    });
     for (BlvUnit& one : units_) one.advance(now);
   }
   [[nodiscard]] std::optional<TimePoint> next_change() const override {
@@ -68,6 +84,11 @@ class SimulatedBus final : public BlvBus {
     for (const BlvUnit& one : units_) {
       const auto due = one.next_change();
       if (due && (!next || *due < *next)) next = due;
+    }
+    for (const Trouble& trouble : trouble_) {
+      if (!begin_) break;
+      const TimePoint due = *begin_ + trouble.raised.after;
+      if (!next || due < *next) next = due;
     }
     return next;
   }
@@ -81,10 +102,14 @@ class SimulatedBus final : public BlvBus {
   }
   void raise_warning(std::uint8_t unit, std::uint8_t code, TimePoint now) override {
     advance(now);
-    if (BlvUnit* one = find(unit)) one->raise_warning(code);
+    if (BlvUnit* one = find(unit)) one->raise_warning(code, now);
   }
   void use_setter(std::uint8_t unit, TimePoint until) override {
     if (BlvUnit* one = find(unit)) one->use_setter(until);
+  }
+  void reboot(TimePoint now) override {
+    advance(now);
+    for (BlvUnit& one : units_) one.power_cycle(now);
   }
   void power_cycle(std::uint8_t unit, TimePoint now) override {
     advance(now);
@@ -92,6 +117,11 @@ class SimulatedBus final : public BlvBus {
   }
 
  private:
+  struct Trouble {
+    Raised raised;
+    void (BlvUnit::*raise)(std::int64_t code, TimePoint now);
+  };
+
   static bool is_write(const Pdu& request) {
     const auto function = static_cast<modbus::FunctionCode>(request.function);
     return function == modbus::FunctionCode::write_single_register ||
@@ -110,6 +140,8 @@ class SimulatedBus final : public BlvBus {
   }
 
   std::deque<BlvUnit> units_ = {};
+  std::vector<Trouble> trouble_ = {};
+  std::optional<TimePoint> begin_ = std::nullopt;
   Duration gap_ = {};
 };
 

@@ -9,12 +9,20 @@ namespace {
 // How long a motor that is let go turns on; the real time depends on the load.
 constexpr Duration coasting = std::chrono::milliseconds(800);
 
+// `part` of `whole` of a value. Hours times thousands of turns do not fit 64 bits in nanoseconds.
+std::int64_t share(std::int64_t value, std::int64_t part, std::int64_t whole) {
+  return static_cast<std::int64_t>(static_cast<long double>(value) *
+                                   static_cast<long double>(part) /
+                                   static_cast<long double>(whole));
+}
+
 }  // namespace
 
 void BlvMotor::add(std::int64_t from, std::int64_t to, Duration whole, TimePoint begin) {
   const std::int64_t larger = std::max(std::abs(from), std::abs(to));
   const std::int64_t step = std::abs(to - from);
-  const Duration time = larger == 0 ? Duration::zero() : whole * step / larger;
+  const Duration time =
+      larger == 0 ? Duration::zero() : Duration(share(whole.count(), step, larger));
   ramps_.push_back({from, to, begin, begin + time});
 }
 
@@ -51,7 +59,7 @@ std::int64_t BlvMotor::speed(TimePoint now) const {
     if (now >= ramp.end) continue;
     const auto passed = std::max(now - ramp.begin, Duration::zero()).count();
     const auto whole = (ramp.end - ramp.begin).count();
-    return ramp.from + (ramp.to - ramp.from) * passed / whole;
+    return ramp.from + share(ramp.to - ramp.from, passed, whole);
   }
   return target_;
 }

@@ -7,31 +7,44 @@
 #include <string_view>
 
 #include "spindle/base/bytes.hpp"
+#include "spindle/base/clock.hpp"
 #include "spindle/catalogue/profile.hpp"
 
 namespace spindle::sim {
 
-/// The register pairs of a simulated BLV driver, laid out by its profile, with the values that it
-/// stores and those that it had when it left the factory.
+/// The registers of a simulated BLV driver, laid out by its profile, with the values that it stores
+/// and those that it had when it left the factory. Takes every profile that is valid: any address,
+/// both tables, values of one register and of two.
 class BlvRegisters {
  public:
-  static constexpr std::uint32_t count = 0x2000;
-
   BlvRegisters(const catalogue::Profile& profile, const catalogue::SimulationFacts& start);
 
-  /// Requires registers below `count`.
-  [[nodiscard]] Registers read(std::uint16_t first, std::uint16_t quantity) const;
-  [[nodiscard]] std::uint32_t pair(std::uint16_t even) const;
-  void set_pair(std::uint16_t even, std::uint32_t raw);
+  /// Empty when the request reaches behind the map. Registers inside that nobody named are 0.
+  [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
+                                              std::size_t quantity) const;
+  /// Whether so many holding registers are inside the map.
+  [[nodiscard]] bool holds(std::uint16_t first, std::size_t quantity) const;
+  /// Whether there are input registers at all.
+  [[nodiscard]] bool has_input() const { return input_end_ > 0; }
 
-  /// Whether the profile names something at this pair that can be written, and whether it takes
-  /// this value.
-  enum class Verdict : std::uint8_t { allowed, not_writable, outside };
-  [[nodiscard]] Verdict check(std::uint16_t even, std::uint32_t raw) const;
+  /// A value that can be written, as its registers: one or two.
+  struct Cell {
+    std::uint16_t first = 0;
+    catalogue::Kind kind = catalogue::Kind::u16;
+    bool operation = false;  ///< a command or operation data, as opposed to a parameter
+  };
+  /// The writable value that this holding register belongs to; empty when there is none.
+  [[nodiscard]] std::optional<Cell> cell_at(std::uint16_t address) const;
+  [[nodiscard]] std::uint32_t raw(const Cell& cell) const;
+  void set_raw(const Cell& cell, std::uint32_t raw);
+  /// Whether the value takes this number.
+  [[nodiscard]] bool takes(const Cell& cell, std::uint32_t raw) const;
 
   /// By the name of a parameter; 0 or nothing where the profile does not name it.
   [[nodiscard]] std::int64_t get(std::string_view name) const;
   void set(std::string_view name, std::int64_t value);
+  /// A value in units of time, at most a day; `unit` is what 1 stands for.
+  [[nodiscard]] Duration time(std::string_view name, Duration unit) const;
   /// Puts a code in front of "NAME.1", "NAME.2", …, and forgets the last.
   void push_history(std::string_view name, std::int64_t code);
   void clear_history(std::string_view name);
@@ -39,33 +52,46 @@ class BlvRegisters {
   /// Stores what is not a command. What is stored is what a load or switching on brings back.
   void save() { stored_ = stored_part(); }
   void load();
-  /// Initial values, in memory and stored.
-  enum class Scope : std::uint8_t { without_communication, everything };
+  /// Initial values, in memory and stored. Parity, stop bits and waiting time are the settings of
+  /// the line.
+  enum class Scope : std::uint8_t { without_the_line, everything };
   void initialize(Scope scope);
   /// Begins anew as after switching on; the alarm history stays.
   void restart();
 
  private:
-  using Pairs = std::map<std::uint16_t, std::uint32_t>;
+  using Numbers = std::map<std::string, std::int64_t, std::less<>>;
   struct Place {
-    std::uint16_t address = 0;
-    catalogue::Kind kind = catalogue::Kind::u32;
+    modbus::RegisterTable table = modbus::RegisterTable::holding;
+    Cell cell = {};
     bool writable = false;
     bool stored = false;
+    Decimal scale = Decimal(1);
     std::optional<std::int64_t> minimum = std::nullopt;
     std::optional<std::int64_t> maximum = std::nullopt;
     std::optional<std::pair<std::int64_t, std::int64_t>> except = std::nullopt;
   };
+  struct Memory {
+    Registers holding;
+    Registers input;
+  };
 
-  void add(const catalogue::Parameter& parameter);
-  void add(const catalogue::Action& action);
-  [[nodiscard]] Pairs stored_part() const;
+  /// `is_word`: it is the word that commands the motor.
+  void add(const catalogue::Parameter& parameter, bool is_word);
+  void add(const catalogue::Action& action, bool even_pairs);
+  void reach(const Place& place);
+  [[nodiscard]] const Place* place_at(std::uint16_t address) const;
+  [[nodiscard]] std::int64_t number(const Place& place) const;
+  void set_number(const Place& place, std::int64_t number);
+  [[nodiscard]] Numbers stored_part() const;
 
-  Registers words_ = Registers(count, 0);
+  Memory words_;
+  std::uint32_t holding_end_;  ///< first address that no request may reach
+  std::uint32_t input_end_ = 0;
   std::map<std::string, Place, std::less<>> places_ = {};
-  std::map<std::uint16_t, Place> by_address_ = {};
-  Registers factory_ = {};
-  Pairs stored_ = {};
+  std::map<std::uint16_t, Place> by_address_ = {};  ///< of the holding table
+  Numbers factory_ = {};
+  Numbers stored_ = {};
 };
 
 }  // namespace spindle::sim

@@ -26,8 +26,7 @@ constexpr std::int64_t timeout_alarm = 0x85;
 constexpr std::int64_t memory_alarm = 0x41;
 constexpr std::int64_t overload = 0x30;
 
-// How long the driver works; the manual names about a second for Configuration.
-constexpr Duration configuring = milliseconds(1000);
+// How long the driver works.
 constexpr Duration storing = milliseconds(500);
 constexpr Duration clearing = milliseconds(100);
 
@@ -41,7 +40,7 @@ constexpr std::string_view errors = "communication-error.history";
 }  // namespace
 
 BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
-                 std::uint8_t address)
+                 std::uint8_t address, Duration configuring)
     : address_(address),
       run_(profile.run.value_or(catalogue::RunFacts{})),
       refusals_(profile.refusals.value_or(catalogue::RefusalFacts{})),
@@ -49,7 +48,8 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationF
       max_read_(profile.link.max_read),
       max_write_(profile.link.max_write),
       registers_(profile, start),
-      load_(registers_.get(run_.load)) {
+      load_(registers_.get(run_.load)),
+      configuring_(configuring) {
   constexpr std::array<std::pair<std::string_view, Handler>, 9> handlers = {{
       {"alarm-reset", &BlvUnit::reset_alarm},
       {"clear-alarm-history", &BlvUnit::clear_alarm_history},
@@ -65,9 +65,9 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationF
     const auto* const known = std::find_if(handlers.begin(), handlers.end(), [&](const auto& row) {
       return row.first == action.name;
     });
-    if (known == handlers.end() || !action.value || !action.rest) continue;
-    deeds_.push_back({static_cast<std::uint16_t>(action.address.value & ~1U), *action.rest,
-                      *action.value, known->second});
+    const auto cell = registers_.cell_at(action.address.value);
+    if (known == handlers.end() || !action.value || !action.rest || !cell) continue;
+    deeds_.push_back({cell->first, *action.value, known->second});
   }
   for (const std::string* name : {&run_.command, &run_.status}) {
     if (auto parameter = profile.find(*name)) words_.push_back(std::move(*parameter));
@@ -80,19 +80,24 @@ std::int64_t BlvUnit::group() const { return registers_.get("command.group"); }
 // ---- time ----
 
 std::optional<TimePoint> BlvUnit::watchdog_due() const {
-  const std::int64_t timeout = registers_.get(run_.watchdog);
-  if (timeout == 0 || !last_query_) return std::nullopt;
-  return *last_query_ + milliseconds(timeout);
+  const Duration timeout = registers_.time(run_.watchdog, milliseconds(1));
+  if (timeout == Duration::zero() || !last_query_) return std::nullopt;
+  return *last_query_ + timeout;
 }
 
 void BlvUnit::advance(TimePoint now) {
+  if (configured_at_ && *configured_at_ <= now) finish_configuration(*configured_at_);
   const auto due = watchdog_due();
   if (!due || *due > now) return;
   last_query_.reset();  // once, until the next query
   raise_alarm(timeout_alarm, *due);
 }
 
-std::optional<TimePoint> BlvUnit::next_change() const { return watchdog_due(); }
+std::optional<TimePoint> BlvUnit::next_change() const {
+  const auto due = watchdog_due();
+  if (due && configured_at_) return std::min(*due, *configured_at_);
+  return due ? due : configured_at_;
+}
 
 // ---- requests ----
 
@@ -108,7 +113,8 @@ Pdu BlvUnit::respond(const Pdu& request, TimePoint now) {
     return refuse(request, {parsed.error(), function ? undefined_command : outside_range});
   }
   if (const auto* wanted = std::get_if<modbus::ReadRequest>(&*parsed)) {
-    if (wanted->table == modbus::RegisterTable::holding) return read(request, *wanted, now);
+    const bool holding = wanted->table == modbus::RegisterTable::holding;
+    if (holding || registers_.has_input()) return read(request, *wanted, now);
   }
   if (const auto* wanted = std::get_if<modbus::WriteSingleRequest>(&*parsed)) {
     const Registers one = {wanted->value};
@@ -139,53 +145,55 @@ Pdu BlvUnit::read(const Pdu& request, const modbus::ReadRequest& wanted, TimePoi
   if (wanted.count > max_read_) {
     return refuse(request, {ExceptionCode::illegal_data_value, outside_range});
   }
-  if (std::uint32_t{wanted.first.value} + wanted.count > BlvRegisters::count) {
-    return refuse(request, {ExceptionCode::illegal_data_address, undefined_command});
-  }
   show(now);
-  return modbus::read_response(wanted.table, registers_.read(wanted.first.value, wanted.count));
+  const auto words = registers_.read(wanted.table, wanted.first.value, wanted.count);
+  if (!words) return refuse(request, {ExceptionCode::illegal_data_address, undefined_command});
+  return modbus::read_response(wanted.table, *words);
 }
 
-// In ascending order, pair by pair: what stands before a refused one has been written.
+// In ascending order, value by value: what stands before a refused one has been written.
 BlvUnit::Outcome BlvUnit::write(std::uint16_t first, RegisterView values, TimePoint now) {
   if (values.size() > max_write_) {
     return Refusal{ExceptionCode::illegal_data_value, outside_range};
   }
-  if (std::size_t{first} + values.size() > BlvRegisters::count) {
-    return Refusal{ExceptionCode::illegal_data_address, undefined_command};
-  }
+  const Refusal no_such_register{ExceptionCode::illegal_data_address, undefined_command};
+  if (!registers_.holds(first, values.size())) return no_such_register;
   if (Outcome busy = check_busy(now)) return busy;
   for (std::size_t i = 0; i < values.size();) {
-    const auto address = static_cast<std::uint16_t>(first + i);
-    const auto even = static_cast<std::uint16_t>(address & ~1U);
-    std::uint32_t raw = registers_.pair(even);
-    if (address == even) raw = (raw & 0xFFFFU) | (std::uint32_t{values[i++]} << 16U);
-    if (i < values.size() && first + i == even + 1U) raw = (raw & 0xFFFF0000U) | values[i++];
-    if (Outcome refused = write_pair(even, raw, now)) return refused;
+    const auto cell = registers_.cell_at(static_cast<std::uint16_t>(first + i));
+    if (!cell) return no_such_register;
+    std::uint32_t raw = registers_.raw(*cell);
+    const unsigned end = unsigned{cell->first} + catalogue::register_count(cell->kind);
+    for (; i < values.size() && first + i < end; ++i) {
+      const auto shift = static_cast<unsigned>(16U * (end - 1U - (first + i)));
+      raw = (raw & ~(0xFFFFU << shift)) | (std::uint32_t{values[i]} << shift);
+    }
+    if (Outcome refused = write_cell(*cell, raw, now)) return refused;
   }
   return std::nullopt;
 }
 
 BlvUnit::Outcome BlvUnit::check_busy(TimePoint now) const {
   if (now < setter_until_) return Refusal{ExceptionCode::server_device_failure, setter_busy};
-  if (now < busy_until_) return Refusal{ExceptionCode::server_device_failure, memory_busy};
+  if (now < memory_until_) return Refusal{ExceptionCode::server_device_failure, memory_busy};
   return std::nullopt;
 }
 
-BlvUnit::Outcome BlvUnit::write_pair(std::uint16_t even, std::uint32_t raw, TimePoint now) {
-  switch (registers_.check(even, raw)) {
-    case BlvRegisters::Verdict::not_writable:
-      return Refusal{ExceptionCode::illegal_data_address, undefined_command};
-    case BlvRegisters::Verdict::outside:
-      return Refusal{ExceptionCode::server_device_failure, outside_range};
-    case BlvRegisters::Verdict::allowed:
-      break;
+// While the driver configures itself it takes commands and operation data, and obeys when it is
+// done: the maker's own programs send both 30 ms behind Configuration. Everything else waits.
+BlvUnit::Outcome BlvUnit::write_cell(const BlvRegisters::Cell& cell, std::uint32_t raw,
+                                     TimePoint now) {
+  if (configured_at_ && !cell.operation) {
+    return Refusal{ExceptionCode::server_device_failure, memory_busy};
   }
-  const std::uint32_t before = registers_.pair(even);
+  if (!registers_.takes(cell, raw)) {
+    return Refusal{ExceptionCode::server_device_failure, outside_range};
+  }
+  const std::uint32_t before = registers_.raw(cell);
   for (const Deed& deed : deeds_) {
-    if (deed.even == even) return use(deed, before, raw, now);
+    if (deed.first == cell.first) return use(deed, before, raw, now);
   }
-  registers_.set_pair(even, raw);
+  registers_.set_raw(cell, raw);
   obey(now);
   return std::nullopt;
 }
@@ -196,7 +204,7 @@ BlvUnit::Outcome BlvUnit::use(const Deed& deed, std::uint32_t before, std::uint3
   if (edge) {
     if (Outcome refused = (this->*deed.handler)(now)) return refused;
   }
-  registers_.set_pair(deed.even, raw);
+  if (const auto cell = registers_.cell_at(deed.first)) registers_.set_raw(*cell, raw);
   return std::nullopt;
 }
 
@@ -243,16 +251,21 @@ BlvUnit::Outcome BlvUnit::clear_communication_history(TimePoint /*now*/) {
 
 BlvUnit::Outcome BlvUnit::configure(TimePoint now) {
   if (Outcome refused = check_at_rest(now)) return refused;
+  configured_at_ = now + configuring_;
+  return std::nullopt;
+}
+
+void BlvUnit::finish_configuration(TimePoint now) {
+  configured_at_.reset();
   const Duration waiting = waiting_time_;
   make_effective();
   waiting_time_ = waiting;  // that of the line waits for the next power-on
-  work(configuring, now);
-  return std::nullopt;
+  obey(now);
 }
 
 BlvUnit::Outcome BlvUnit::initialize(TimePoint now) {
   if (Outcome refused = check_at_rest(now)) return refused;
-  registers_.initialize(BlvRegisters::Scope::without_communication);
+  registers_.initialize(BlvRegisters::Scope::without_the_line);
   work(storing, now);
   return std::nullopt;
 }
@@ -293,6 +306,19 @@ std::uint32_t BlvUnit::mask_of(const std::string& parameter, std::string_view bi
   return 0;
 }
 
+std::uint16_t BlvUnit::standard_word() const {
+  const auto word = static_cast<std::uint16_t>(registers_.get(run_.command));
+  const catalogue::InputFacts& inputs = run_.inputs;
+  if (inputs.parameter.empty()) return word;
+  std::vector<std::int64_t> numbers;
+  for (std::uint16_t n = inputs.first; n <= inputs.last; ++n) {
+    numbers.push_back(registers_.get(catalogue::numbered_name(inputs.parameter, n)));
+  }
+  const catalogue::CommandBits bits(inputs, numbers);
+  const auto known = static_cast<std::uint16_t>(word & ~unsigned{bits.unknown()});
+  return bits.standard(known).value_or(0);
+}
+
 BlvUnit::Wish BlvUnit::wish_of(std::uint32_t word) const {
   const auto on = [&](std::string_view bit) {
     return (word & mask_of(run_.command, bit, mode_)) != 0;
@@ -315,12 +341,12 @@ std::int64_t BlvUnit::speed_of(std::uint16_t operation) const {
 }
 
 Duration BlvUnit::time_of(const std::string& pattern, std::uint16_t operation) const {
-  return milliseconds(100) * registers_.get(catalogue::numbered_name(pattern, operation));
+  return registers_.time(catalogue::numbered_name(pattern, operation), std::chrono::seconds(1));
 }
 
 void BlvUnit::obey(TimePoint now) {
-  if (registers_.get(run_.alarm) != 0) return;
-  const auto word = static_cast<std::uint32_t>(registers_.get(run_.command));
+  if (registers_.get(run_.alarm) != 0 || configured_at_) return;
+  const std::uint32_t word = standard_word();
   const auto operation = static_cast<std::uint16_t>(
       (word & run_.select) >> static_cast<unsigned>(std::countr_zero(run_.select)));
   registers_.set("monitor.operation-number", operation);
@@ -345,7 +371,7 @@ void BlvUnit::obey(TimePoint now) {
 void BlvUnit::make_effective() {
   mode_ = registers_.get(run_.mode);
   analog_ = registers_.get(run_.analog);
-  waiting_time_ = std::chrono::microseconds(100) * registers_.get("communication.waiting-time");
+  waiting_time_ = registers_.time("communication.waiting-time", milliseconds(1));
 }
 
 std::uint32_t BlvUnit::status_word(TimePoint now) const {
@@ -359,7 +385,7 @@ std::uint32_t BlvUnit::status_word(TimePoint now) const {
   show_bit(alarm != 0, mask_of(run_.status, "ALARM-OUT1", std::nullopt));
   show_bit(alarm == overload || warning == overload,
            mask_of(run_.status, "ALARM-OUT2", std::nullopt));
-  show_bit(now < busy_until_, 1U << run_.busy);
+  show_bit(busy(now), 1U << run_.busy);
   show_bit(motor_.moves(now), 1U << run_.running);
   show_bit(near, 1U << run_.at_speed);
   return word;
@@ -384,7 +410,7 @@ void BlvUnit::raise_alarm(std::int64_t code, TimePoint now) {
   motor_.coast(now);
 }
 
-void BlvUnit::raise_warning(std::int64_t code) {
+void BlvUnit::raise_warning(std::int64_t code, TimePoint /*now*/) {
   registers_.set(run_.warning, code);
   if (code != 0) registers_.push_history(warnings, code);
 }
@@ -397,7 +423,7 @@ void BlvUnit::hear_good_frame() {
 void BlvUnit::hear_bad_frame(TimePoint now) {
   ++bad_frames_;
   note_error(transmission_error);
-  if (registers_.get(run_.warning) != transmission_error) raise_warning(transmission_error);
+  if (registers_.get(run_.warning) != transmission_error) raise_warning(transmission_error, now);
   if (bad_frames_ == registers_.get("communication.error-limit")) raise_alarm(line_alarm, now);
 }
 
@@ -405,7 +431,8 @@ void BlvUnit::power_cycle(TimePoint now) {
   registers_.restart();
   motor_.brake(now);
   bad_frames_ = 0;
-  busy_until_ = TimePoint::min();
+  memory_until_ = TimePoint::min();
+  configured_at_.reset();
   setter_until_ = TimePoint::min();
   last_query_.reset();
   make_effective();

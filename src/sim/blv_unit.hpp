@@ -15,8 +15,9 @@ namespace spindle::sim {
 /// One simulated BLV driver. Knows nothing of other units, frames or connections.
 class BlvUnit {
  public:
+  /// `configuring`: how long Configuration takes.
   BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
-          std::uint8_t address);
+          std::uint8_t address, Duration configuring);
 
   [[nodiscard]] std::uint8_t address() const { return address_; }
   [[nodiscard]] std::int64_t group() const;
@@ -32,7 +33,8 @@ class BlvUnit {
   void hear_bad_frame(TimePoint now);
 
   void raise_alarm(std::int64_t code, TimePoint now);
-  void raise_warning(std::int64_t code);
+  /// A warning begins; 0 ends it.
+  void raise_warning(std::int64_t code, TimePoint now);
   void use_setter(TimePoint until) { setter_until_ = until; }
   void power_cycle(TimePoint now);
 
@@ -45,8 +47,7 @@ class BlvUnit {
   using Outcome = std::optional<Refusal>;
   using Handler = Outcome (BlvUnit::*)(TimePoint);
   struct Deed {
-    std::uint16_t even;
-    std::uint32_t rest;
+    std::uint16_t first;  ///< register of its value
     std::uint32_t value;
     Handler handler;
   };
@@ -65,9 +66,10 @@ class BlvUnit {
   modbus::Pdu refuse(const modbus::Pdu& request, const Refusal& refusal);
   modbus::Pdu read(const modbus::Pdu& request, const modbus::ReadRequest& wanted, TimePoint now);
   Outcome write(std::uint16_t first, RegisterView values, TimePoint now);
-  Outcome write_pair(std::uint16_t even, std::uint32_t raw, TimePoint now);
+  Outcome write_cell(const BlvRegisters::Cell& cell, std::uint32_t raw, TimePoint now);
   Outcome use(const Deed& deed, std::uint32_t before, std::uint32_t raw, TimePoint now);
   [[nodiscard]] Outcome check_busy(TimePoint now) const;
+  void finish_configuration(TimePoint now);
 
   Outcome reset_alarm(TimePoint now);
   Outcome clear_alarm_history(TimePoint now);
@@ -80,9 +82,15 @@ class BlvUnit {
   Outcome save(TimePoint now);
   [[nodiscard]] Outcome check_at_rest(TimePoint now) const;
   [[nodiscard]] Outcome check_memory() const;
-  void work(Duration time, TimePoint now) { busy_until_ = now + time; }
+  void work(Duration time, TimePoint now) { memory_until_ = now + time; }
+  [[nodiscard]] bool busy(TimePoint now) const {
+    return now < memory_until_ || configured_at_.has_value();
+  }
 
   void obey(TimePoint now);
+  /// The command word in the bits of the default assignment. What an unknown function does is not
+  /// simulated.
+  [[nodiscard]] std::uint16_t standard_word() const;
   [[nodiscard]] Wish wish_of(std::uint32_t word) const;
   [[nodiscard]] std::int64_t speed_of(std::uint16_t operation) const;
   [[nodiscard]] Duration time_of(const std::string& pattern, std::uint16_t operation) const;
@@ -110,7 +118,9 @@ class BlvUnit {
   std::int64_t analog_ = 0;  ///< likewise
   Duration waiting_time_ = {};
   std::int64_t bad_frames_ = 0;  ///< in a row
-  TimePoint busy_until_ = TimePoint::min();
+  Duration configuring_;
+  TimePoint memory_until_ = TimePoint::min();              ///< works on the stored values
+  std::optional<TimePoint> configured_at_ = std::nullopt;  ///< when Configuration will be done
   TimePoint setter_until_ = TimePoint::min();
   std::optional<TimePoint> last_query_ = std::nullopt;
 };

@@ -1,5 +1,9 @@
 #include "bm_identity.hpp"
 
+#include <algorithm>
+
+#include "spindle/modbus/types.hpp"
+
 namespace spindle::sim {
 namespace {
 
@@ -68,7 +72,8 @@ Bytes make_identity(const std::optional<IdentityFacts>& facts,
                     const catalogue::SimulationFacts& start, const BmOptions& options) {
   const std::size_t usual = start.identity_bytes > 0 ? start.identity_bytes : start.identity.size();
   Bytes identity = start.identity;
-  identity.resize(options.identity_bytes.value_or(usual));
+  constexpr std::size_t most = modbus::max_pdu_size - 2;
+  identity.resize(std::min(options.identity_bytes.value_or(usual), most));
   if (!facts) return identity;
   if (options.firmware) put_number(identity, facts->firmware, *options.firmware);
   if (options.tool_model) put_number(identity, facts->tool_model, *options.tool_model);

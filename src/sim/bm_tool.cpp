@@ -107,6 +107,7 @@ class SimulatedBm final : public BmTool {
   void count_screw();
   void step(TimePoint now);
   void pull_trigger(TimePoint now);
+  void show_alarm(std::uint16_t code, TimePoint now);
   void show_motion(TimePoint now);
   void show_ready();
   void emit(EventKind kind, const EventData& data, TimePoint now);
@@ -127,6 +128,8 @@ class SimulatedBm final : public BmTool {
   enum class Lock : std::uint8_t { off, on } lock_ = Lock::off;
   std::optional<Run> run_ = std::nullopt;
   std::optional<TimePoint> next_trigger_ = std::nullopt;
+  std::optional<TimePoint> begin_ = std::nullopt;
+  std::vector<Raised> alarms_;  // still to come, the next one last
   unsigned triggers_ = 0;
   std::uint32_t writes_ = 0;
   std::map<ConnectionId, TimePoint> armed_until_ = {};
@@ -145,7 +148,10 @@ SimulatedBm::SimulatedBm(const catalogue::Profile& profile, const catalogue::Sim
       faults_(options.faults),
       rundown_every_(options.rundown_every),
       ng_every_(options.ng_every),
-      burst_(options.burst) {
+      burst_(options.burst),
+      alarms_(options.alarms) {
+  std::sort(alarms_.begin(), alarms_.end(),
+            [](const Raised& a, const Raised& b) { return a.after > b.after; });
   constexpr std::array<std::pair<std::string_view, Handler>, 5> handlers = {{
       {"alarm-reset", &SimulatedBm::reset_alarm},
       {"lock", &SimulatedBm::lock},
@@ -386,11 +392,15 @@ void SimulatedBm::show_ready() { registers_.set("status.ready", can_start() ? ye
 // ---- time ----
 
 std::optional<TimePoint> SimulatedBm::next_change() const {
-  if (run_ && next_trigger_) return std::min(run_->end, *next_trigger_);
-  return run_ ? std::optional(run_->end) : next_trigger_;
+  std::optional<TimePoint> next = next_trigger_;
+  const auto consider = [&next](TimePoint due) { next = std::min(next.value_or(due), due); };
+  if (run_) consider(run_->end);
+  if (begin_ && !alarms_.empty()) consider(*begin_ + alarms_.back().after);
+  return next;
 }
 
 void SimulatedBm::advance(TimePoint now) {
+  if (!begin_) begin_ = now;
   const bool has_operator = rundown_every_ && *rundown_every_ > Duration::zero();
   if (has_operator && !next_trigger_) next_trigger_ = now + *rundown_every_;
   for (auto due = next_change(); due && *due <= now; due = next_change()) step(*due);
@@ -399,6 +409,11 @@ void SimulatedBm::advance(TimePoint now) {
 void SimulatedBm::step(TimePoint now) {
   if (run_ && run_->end <= now) finish_run(now);
   if (next_trigger_ && *next_trigger_ <= now) pull_trigger(now);
+  if (!alarms_.empty() && *begin_ + alarms_.back().after <= now) {
+    const Raised alarm = alarms_.back();
+    alarms_.pop_back();
+    show_alarm(alarm.code, now);
+  }
 }
 
 void SimulatedBm::pull_trigger(TimePoint now) {
@@ -472,6 +487,10 @@ void SimulatedBm::operator_rundown(Rundown outcome, TimePoint now) {
 
 void SimulatedBm::raise_alarm(std::uint16_t code, TimePoint now) {
   advance(now);
+  show_alarm(code, now);
+}
+
+void SimulatedBm::show_alarm(std::uint16_t code, TimePoint now) {
   run_.reset();
   registers_.set("status.running", no);
   registers_.set("status.alarm", code);

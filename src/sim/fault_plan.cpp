@@ -180,6 +180,29 @@ bool Fault::strikes(std::uint32_t answer_number) const {
 
 std::string_view to_text(FaultKind kind) { return info_of(kind).name; }
 
+FaultNeed need_of(FaultKind kind) {
+  switch (kind) {
+    case FaultKind::wrong_transaction:
+    case FaultKind::wrong_protocol:
+    case FaultKind::wrong_header_length:
+      return FaultNeed::network;
+    case FaultKind::echo:
+    case FaultKind::foreign:
+    case FaultKind::bad_crc:
+      return FaultNeed::serial_line;
+    case FaultKind::push_before:
+    case FaultKind::push_inside:
+    case FaultKind::push_after:
+      return FaultNeed::events;
+    case FaultKind::ignore_write:
+    case FaultKind::store_other:
+    case FaultKind::reset_neighbour:
+      return FaultNeed::screwdriver;
+    default:
+      return FaultNeed::nothing;
+  }
+}
+
 std::uint16_t number_of(const Fault& fault) {
   return fault.number.value_or(info_of(fault.kind).standard);
 }

@@ -21,8 +21,10 @@ constexpr std::array kinds = {
     KindInfo{OutageKind::sleep, "sleep",
              "hears and says nothing, then answers late; connections survive"},
     KindInfo{OutageKind::roam, "roam", "out of reach of its access point; connections are lost"},
-    KindInfo{OutageKind::reboot, "reboot",
-             "switched off and on: connections are lost, events count from 0"},
+    KindInfo{
+        OutageKind::reboot, "reboot",
+        "switched off and on: connections and all that is not stored are lost, events count from "
+        "0"},
     KindInfo{OutageKind::other_client, "other-client",
              "another client holds its session: all others are shut out"},
 };
@@ -52,6 +54,10 @@ std::string_view to_text(OutageKind kind) {
   return std::find_if(kinds.begin(), kinds.end(),
                       [kind](const KindInfo& row) { return row.kind == kind; })
       ->name;
+}
+
+bool needs_radio(OutageKind kind) {
+  return kind == OutageKind::roam || kind == OutageKind::other_client;
 }
 
 Result<Outage> parse_outage(std::string_view text) {

@@ -1,5 +1,7 @@
 #include "spindle/sim/peer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -201,6 +203,42 @@ Peer::Peer(Server& server, ConnectionId connection, Framing framing, const Fault
   server_->connected(connection_);
 }
 
+namespace {
+
+/// "2.1 ms": what a user compares with the silence that a manual asks for.
+std::string in_milliseconds(Duration duration) {
+  using Milliseconds = std::chrono::duration<double, std::milli>;
+  return fmt::format("{:.1f} ms", std::chrono::duration_cast<Milliseconds>(duration).count());
+}
+
+std::string too_early(Duration silence, Duration needed) {
+  return fmt::format("{} of silence, {} needed", in_milliseconds(silence), in_milliseconds(needed));
+}
+
+std::string fault_of_frame(ByteView bytes) {
+  constexpr std::size_t shortest = 4;
+  if (bytes.size() < shortest) return "it is too short to be a frame";
+  return "its checksum is wrong, or it is no frame";
+}
+
+}  // namespace
+
+void Peer::ignore(ByteView bytes, std::string_view reason) const {
+  if (ignored_) ignored_(bytes, reason);
+}
+
+/// The server hears noise.
+void Peer::no_frame(ByteView bytes, TimePoint now) {
+  ignore(bytes, fault_of_frame(bytes));
+  server_->bad_frame(now);
+}
+
+void Peer::forget() {
+  inbox_.clear();
+  outbox_.clear();
+  if (line_) line_.emplace(server_->required_gap(), character_time_);
+}
+
 Peer::~Peer() { server_->disconnected(connection_); }
 
 void Peer::receive(ByteView bytes, TimePoint now) {
@@ -212,8 +250,7 @@ void Peer::receive(ByteView bytes, TimePoint now) {
     return;
   }
   if (framing_ == Framing::rtu && !inbox_.empty() && now > last_byte_ + longest_pause) {
-    inbox_.clear();
-    server_->bad_frame(now);
+    no_frame(std::exchange(inbox_, {}), now);
   }
   last_byte_ = now;
   inbox_.insert(inbox_.end(), bytes.begin(), bytes.end());
@@ -235,12 +272,16 @@ Duration Peer::time_on_the_wire(std::size_t bytes) const {
 // The silence has ended a frame, so its bounds are known whatever is in it.
 void Peer::take_burst(TimePoint now) {
   const auto burst = line_->take(now);
-  if (!burst || deaf_ || burst->timing == Burst::Timing::too_early) return;
+  if (!burst || deaf_) return;
+  if (burst->timing == Burst::Timing::too_early) {
+    ignore(burst->bytes, too_early(burst->silence, server_->required_gap()));
+    return;
+  }
   const auto request = modbus::whole_rtu_frame(burst->bytes);
   if (request) {
     answer(*request, burst->end, now);
   } else {
-    server_->bad_frame(now);
+    no_frame(burst->bytes, now);
   }
 }
 
@@ -248,19 +289,23 @@ void Peer::take_burst(TimePoint now) {
 bool Peer::take_request(TimePoint now) {
   const modbus::Deframing found = modbus::deframe(framing_, modbus::Role::server, inbox_);
   if (const auto* request = std::get_if<modbus::Deframed>(&found)) {
+    const Bytes skipped(inbox_.begin(),
+                        inbox_.begin() + static_cast<std::ptrdiff_t>(request->skipped));
     inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(request->consumed));
-    if (request->skipped > 0) server_->bad_frame(now);
+    if (request->skipped > 0) no_frame(skipped, now);
     answer(request->adu, now + time_on_the_wire(request->consumed), now);
     return true;
   }
   const auto* junk = std::get_if<modbus::Junk>(&found);
   if (junk == nullptr) return false;
   if (framing_ == Framing::tcp) {
+    ignore(inbox_,
+           fmt::format("this is not Modbus TCP ({}), so the connection is closed", junk->reason));
     hang_up(now);
     return false;
   }
-  server_->bad_frame(now);
   const std::size_t dropped = std::clamp<std::size_t>(junk->size, 1, inbox_.size());
+  no_frame(ByteView(inbox_).first(dropped), now);
   inbox_.erase(inbox_.begin(), inbox_.begin() + static_cast<std::ptrdiff_t>(dropped));
   return !inbox_.empty();
 }
@@ -280,6 +325,10 @@ void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
   unit_ = request.unit;
   const auto response = respond(request, strikes.find(FaultKind::exception), now);
   const bool broadcast = framing_ == Framing::rtu && request.unit == modbus::UnitId{};
+  if (!response && !broadcast) {
+    ignore(modbus::frame(framing_, request),
+           fmt::format("there is no unit {}", request.unit.value));
+  }
   if (!response || broadcast) return;
   ++counter_->value;
 

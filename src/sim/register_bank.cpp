@@ -61,7 +61,8 @@ WriteVerdict RegisterBank::check_write(std::uint16_t address, std::uint16_t valu
 }
 
 void RegisterBank::store(std::uint16_t address, std::uint16_t value) {
-  holding_.at(address) = value;
+  const auto word = holding_.find(address);
+  if (word != holding_.end()) word->second = value;
 }
 
 std::uint16_t RegisterBank::get(std::string_view name) const {
@@ -161,7 +162,8 @@ void RegisterBank::remove(const catalogue::Area& area,
   for (std::uint32_t number = area.from; number <= area.to; ++number) {
     const auto address = static_cast<std::uint16_t>(number);
     words(area.table).erase(address);
-    if (area.table != RegisterTable::holding || writable_.erase(address) == 0 || !limits) continue;
+    if (area.table != RegisterTable::holding || writable_.erase(address) == 0) continue;
+    if (!limits || address < limits->from || address > limits->to) continue;
     holding_.erase(static_cast<std::uint16_t>(number + limits->minimum_offset));
     holding_.erase(static_cast<std::uint16_t>(number + limits->maximum_offset));
   }

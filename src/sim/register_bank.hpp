@@ -29,7 +29,7 @@ class RegisterBank {
                                               std::uint16_t count) const;
 
   [[nodiscard]] WriteVerdict check_write(std::uint16_t address, std::uint16_t value) const;
-  /// Stores without asking. Requires a holding register that exists.
+  /// Stores without asking; nothing happens when there is no such holding register.
   void store(std::uint16_t address, std::uint16_t value);
 
   /// A 16-bit parameter by name; 0 when the profile does not name it or it is a hole.

@@ -9,6 +9,7 @@ void SerialLine::hear(ByteView bytes, TimePoint now) {
   if (burst_.bytes.empty()) {
     const bool early = last_byte_ && now < *last_byte_ + gap_;
     burst_.timing = early ? Burst::Timing::too_early : Burst::Timing::in_time;
+    if (early) burst_.silence = std::max(now - *last_byte_, Duration::zero());
   }
   burst_.bytes.insert(burst_.bytes.end(), bytes.begin(), bytes.end());
   const TimePoint begin = std::max(now, last_byte_.value_or(now));

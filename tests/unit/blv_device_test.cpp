@@ -78,6 +78,30 @@ TEST_CASE("blv device: an alarm is reset as an edge, with the run bits cleared f
   CHECK_FALSE(bench.moves());
 }
 
+TEST_CASE("blv device: an alarm is reset without a motor that starts, whatever the inputs do") {
+  struct Row {
+    std::uint16_t input;     ///< register of its function
+    std::uint16_t function;  ///< 77 is one that nobody knows
+    std::uint16_t word;
+    std::uint16_t left;
+  };
+  const Row rows[] = {{0x116B, 1, 0x2A, 0x02}, {0x116B, 77, 0x2A, 0x02}, {0x1163, 1, 0x02, 0x00}};
+  for (const Row& row : rows) {
+    CAPTURE(row.input);
+    CAPTURE(row.function);
+    BlvBench bench;
+    bench.write(0x0481, 1000);
+    auto device = bench.open().value();
+    bench.write(row.input, row.function);
+    bench.write(0x007D, row.word);
+    bench.bus->raise_alarm(1, 0x30, bench.clock.now());
+    bench.clock.advance(2s);
+    CHECK(device.perform(action(bench, "alarm-reset"), 1) == ActionResult::confirmed);
+    CHECK(bench.read(0x007D) == row.left);
+    CHECK_FALSE(bench.moves());
+  }
+}
+
 TEST_CASE("blv device: without an alarm nothing is reset, and a running motor runs on") {
   BlvBench bench;
   auto device = bench.open().value();

@@ -85,7 +85,8 @@ TEST_CASE("blv driver: what lies outside its map or its limits is refused, and i
     return modbus::read_request(RegisterTable::holding, {first}, count);
   };
   CHECK(refused(read(0x0480, 16)) == 0);
-  CHECK(refused(read(0x1FFF, 1)) == 0);
+  CHECK(refused(read(0x1FFE, 1)) == 0);
+  CHECK(refused(read(0x1FFF, 1)) == 2);  // address and count reach 2000h together
   CHECK(refused(read(0x2000, 1)) == 2);
   CHECK(bus.read(Bus::last_error) == 0x88);
   CHECK(refused(read(0x1FFF, 2)) == 2);
@@ -212,6 +213,108 @@ TEST_CASE("blv driver: three wires count from Configuration on") {
   CHECK(bus.pair(Bus::speed_now) == -1000);
   CHECK(bus.write(Bus::command, 0x0A) == 0);
   CHECK_FALSE(bus.shows(Bus::move));
+}
+
+// om_modbus_master, sample/cpp/BLV/sample3: Configuration by broadcast, the word 30 ms behind it.
+TEST_CASE("blv driver: the maker's own programs run, however long Configuration takes") {
+  for (const Duration configuring : {200ms, 1000ms}) {
+    CAPTURE(configuring.count());
+    Bus bus({.units = {1, 2}, .configuring = configuring});
+    const auto broadcast = [&](std::uint16_t first, std::uint16_t value) {
+      const Registers values = {0, value};
+      CHECK_FALSE(bus.ask(modbus::write_request({first}, RegisterView(values)), 0));
+      bus.wait(35ms);
+    };
+    broadcast(0x1040, 1);
+    broadcast(0x0484, 0);
+    broadcast(0x018C, 1);
+    CHECK(bus.write(0x007C, {0, 26}, 1) == 0);
+    bus.wait(60ms);
+    CHECK(bus.write(0x007C, {0, 58}, 2) == 0);
+    bus.wait(60ms);
+    CHECK(bus.write(0x0484, {0, 500}, 1) == 0);
+    CHECK(bus.write(0x0484, {0, 500}, 2) == 0);
+    CHECK(bus.shows(Bus::busy));
+    CHECK_FALSE(bus.shows(Bus::move));  // not excited while it configures itself
+    bus.wait(2s);
+    CHECK(bus.pair(Bus::speed_now, 1) == 500);
+    CHECK(bus.pair(Bus::speed_now, 2) == -500);
+    CHECK(bus.write(0x007C, {0, 18}, 1) == 0);
+    CHECK(bus.write(0x007C, {0, 10}, 2) == 0);
+    CHECK_FALSE(bus.shows(Bus::move, 2));
+    bus.wait(1s);
+    CHECK_FALSE(bus.shows(Bus::move, 1));
+  }
+}
+
+TEST_CASE(
+    "blv driver: Configuration takes 200 ms unless told otherwise, and parameters wait for it") {
+  Bus bus;
+  bus.write(0x018D, 1);
+  CHECK(bus.bus->next_change() == bus.now + 200ms);
+  CHECK(bus.write(0x1041, 1) == 4);
+  CHECK(bus.read(Bus::last_error) == 0x8A);
+  bus.wait(199ms);
+  CHECK(bus.shows(Bus::busy));
+  bus.wait(1ms);
+  CHECK_FALSE(bus.shows(Bus::busy));
+  CHECK(bus.write(0x1041, 1) == 0);
+  Bus slow({.configuring = 1s});
+  slow.write(0x018D, 1);
+  slow.wait(999ms);
+  CHECK(slow.shows(Bus::busy));
+}
+
+TEST_CASE("blv driver: alarms and warnings come by themselves, each at its time") {
+  Bus bus({.units = {1, 2},
+           .alarms = {{.code = 0x30, .after = 2s}},
+           .warnings = {{.code = 0x25}, {.code = 0x30, .after = 1s}}});
+  CHECK(bus.read(0x0097) == 0x25);
+  CHECK(bus.bus->next_change() == bus.now + 1s);
+  CHECK(bus.write(Bus::command, 0x2A) == 0);
+  bus.wait(1s);
+  CHECK(bus.read(0x0097) == 0x30);
+  CHECK(bus.read(Bus::alarm) == 0);
+  bus.wait(1s);
+  CHECK(bus.read(Bus::alarm) == 0x30);
+  CHECK(bus.read(Bus::alarm, 2) == 0x30);
+  bus.wait(1s);
+  CHECK_FALSE(bus.shows(Bus::move));
+  bus.pulse(0x0181);
+  CHECK(bus.read(Bus::alarm) == 0);  // once
+  CHECK(bus.read(Bus::alarm, 2) == 0x30);
+}
+
+TEST_CASE("blv bus: a reboot is a power cycle of every driver") {
+  Bus bus({.units = {1, 2}});
+  for (const std::uint8_t unit : {std::uint8_t{1}, std::uint8_t{2}}) {
+    CAPTURE(unit);
+    bus.write(0x0485, 1100, unit);
+    CHECK(bus.write(0x0193, 1, unit) == 0);
+  }
+  bus.wait(1s);
+  bus.bus->raise_alarm(1, 0x30, bus.now);
+  bus.bus->raise_warning(1, 0x25, bus.now);
+  bus.write(0x0485, 1300);
+  bus.write(0x1201, 5000);
+  bus.write(0x0030, {0, 2});
+  bus.write(Bus::command, 0x2A, 2);
+  bus.wait(1s);
+  CHECK(bus.shows(Bus::move, 2));
+  bus.ask(modbus::report_server_id_request());
+  bus.bus->reboot(bus.now);
+  CHECK(bus.pair(0x0484) == 1100);  // what was saved
+  CHECK(bus.pair(0x1200) == 0);     // what was not
+  CHECK(bus.pair(0x0030) == -1);
+  CHECK(bus.pair(0x007C, 2) == 0);
+  CHECK(bus.read(0x0193) == 0);
+  CHECK_FALSE(bus.shows(Bus::move, 2));
+  CHECK(bus.read(Bus::alarm) == 0);
+  CHECK(bus.read(0x0097) == 0);
+  CHECK(bus.read(0x0083) == 0x30);  // the alarm history stays
+  CHECK(bus.read(0x0099) == 0);     // the others are in RAM
+  CHECK(bus.read(0x00AF) == 0);
+  CHECK(bus.read(Bus::last_error) == 0);
 }
 
 TEST_CASE("blv driver: data 0 and 1 follow the analog value until digital is configured") {
@@ -348,13 +451,17 @@ TEST_CASE("blv driver: load and initialize take the memory's and the factory's v
   Bus bus;
   bus.write(0x0485, 1100);
   bus.write(0x1407, 0);
+  bus.write(0x1201, 5000);
+  bus.write(0x1203, 7);
   bus.pulse(0x0193);
   bus.write(0x0485, 1200);
   bus.pulse(0x0191);
   CHECK(bus.pair(0x0484) == 1100);
   bus.pulse(0x018F);
   CHECK(bus.pair(0x0484) == 1000);
-  CHECK(bus.pair(0x1406) == 0);
+  CHECK(bus.pair(0x1406) == 0);  // spared, with stop bits and waiting time
+  CHECK(bus.pair(0x1200) == 0);
+  CHECK(bus.pair(0x1202) == 3);
   bus.pulse(0x0195);
   CHECK(bus.pair(0x1406) == 1);
 }

@@ -103,8 +103,8 @@ TEST_CASE("a motor is stopped by the word of its input mode") {
     const Motor motor = Motor::of(bench.profile).value();
     MotorStopper stopper(motor, stop.how);
     stopper.observe(device);
-    CHECK(stopper.stopping() == 500ms);
     CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+    if (stop.how == StopMode::decelerate) CHECK(stopper.stopping() == 500ms);
     CHECK(bench.read(command) == stop.expected);
     CHECK_FALSE(bench.moves());
   }
@@ -139,18 +139,17 @@ TEST_CASE("a gentle stop that does not help becomes a hard one") {
   auto device = bench.open().value();
   const Motor motor = Motor::of(bench.profile).value();
   MotorStopper stopper(motor, StopMode::decelerate);
-  stopper.started(0x2A, 0, 300ms);
+  stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 300ms);
   stopper.seen_running();
   CHECK(stopper.stop(device, bench.clock) == StopResult::unconfirmed);
   CHECK(bench.read(command) == 0x22);
   CHECK(bench.moves());
   CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
-  CHECK(bench.read(command) == 0x02);
+  CHECK(bench.read(command) == 0x00);
 }
 
-TEST_CASE("without anything known a motor is stopped by words that stop in every mode") {
-  for (const auto& [how, expected] : {std::pair(StopMode::decelerate, std::uint16_t{0x20}),
-                                      std::pair(StopMode::instant, std::uint16_t{0x00})}) {
+TEST_CASE("without anything known a motor is stopped by the word that no assignment starts by") {
+  for (const StopMode how : {StopMode::decelerate, StopMode::instant}) {
     BlvBench bench;
     bench.configure(0x1040, 1);
     bench.write(command, 0x1A);
@@ -159,8 +158,95 @@ TEST_CASE("without anything known a motor is stopped by words that stop in every
     const Motor motor = Motor::of(bench.profile).value();
     MotorStopper stopper(motor, how);
     CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
-    CHECK(bench.read(command) == expected);
+    CHECK(bench.read(command) == 0x00);
   }
+}
+
+namespace {
+
+/// Puts a function on an input of the simulated driver.
+void assign(BlvBench& bench, unsigned input, std::uint16_t function) {
+  bench.write(static_cast<std::uint16_t>(0x1161 + 2 * input), function);
+}
+
+struct Assignment {
+  const char* what;
+  std::vector<std::pair<unsigned, std::uint16_t>> inputs;
+};
+
+}  // namespace
+
+TEST_CASE("no assignment of the inputs makes a stop start a motor") {
+  const Assignment assignments[] = {
+      {"FWD instead of STOP-MODE", {{5, 1}}},
+      {"REV instead of STOP-MODE", {{5, 2}}},
+      {"FWD and STOP-MODE changed", {{3, 19}, {5, 1}}},
+      {"FWD to select operation data", {{0, 1}, {1, 2}, {3, 48}, {4, 49}}},
+      {"a function that is not known", {{5, 77}}},
+      {"nothing", {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {5, 0}}},
+      {"FWD on the upper half", {{3, 0}, {8, 1}}},
+  };
+  const std::vector<std::uint16_t> words = {0x00, 0x02, 0x0A, 0x22, 0x2A, 0x12, 0x07};
+  for (const Assignment& assignment : assignments) {
+    CAPTURE(assignment.what);
+    for (const StopMode how : {StopMode::decelerate, StopMode::instant}) {
+      for (const std::uint16_t word : words) {
+        CAPTURE(word);
+        BlvBench bench;
+        bench.write(0x0481, 1000);
+        for (const auto& [input, function] : assignment.inputs) assign(bench, input, function);
+        bench.write(command, word);
+        bench.clock.advance(1s);
+        const bool ran = bench.moves();
+        auto device = bench.open().value();
+        const Motor motor = Motor::of(bench.profile).value();
+        MotorStopper stopper(motor, how);
+        stopper.observe(device);
+        REQUIRE(stopper.send(device));
+        bench.clock.advance(1ms);
+        if (!ran) CHECK_FALSE(bench.moves());
+        bench.clock.advance(1s);
+        CHECK_FALSE(bench.moves());
+      }
+    }
+  }
+}
+
+TEST_CASE("a motor is stopped gently by the inputs that its driver has for it") {
+  BlvBench bench;
+  assign(bench, 3, 19);
+  assign(bench, 5, 1);
+  bench.write(command, 0x2A);
+  bench.clock.advance(1s);
+  REQUIRE(bench.moves());
+  auto device = bench.open().value();
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  stopper.observe(device);
+  REQUIRE(stopper.send(device));
+  CHECK(bench.read(command) == 0x0A);
+  bench.clock.advance(100ms);
+  CHECK(bench.moves());  // it decelerates
+  CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+  CHECK(stopper.stopping() == 500ms);
+}
+
+TEST_CASE("a stop does not wait for what can not be read") {
+  BlvBench bench;
+  bench.write(command, 0x2A);
+  bench.clock.advance(1s);
+  bench.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
+  auto device = bench.open().value();
+  device.set_retries(0);
+  const Motor motor = Motor::of(bench.profile).value();
+  MotorStopper stopper(motor, StopMode::decelerate);
+  const TimePoint began = bench.clock.now();
+  stopper.observe(device);
+  CHECK(bench.clock.now() - began < 400ms);
+  CHECK(device.session().options().answer_timeout == bench.profile.link.answer);
+  static_cast<void>(stopper.send(device));
+  CHECK(bench.read(command) == 0x00);
+  CHECK_FALSE(bench.moves());
 }
 
 TEST_CASE("a guard stops a motor, also when nobody calls it") {
@@ -168,7 +254,7 @@ TEST_CASE("a guard stops a motor, also when nobody calls it") {
   auto device = bench.open().value();
   const Motor motor = Motor::of(bench.profile).value();
   MotorStopper stopper(motor, StopMode::decelerate);
-  stopper.started(0x2A, 0, 500ms);
+  stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 500ms);
   const device::GuardedMotion motion{
       .start = [&](device::Device& on) { return motor.command(on, 0x2A); },
       .stop = [&](device::Device& on, Clock& clock) { return stopper.stop(on, clock); },

@@ -259,6 +259,50 @@ TEST_CASE("however patient the user is, a stop without an answer is soon sent ag
   CHECK(tool.stops() >= 5);
 }
 
+TEST_CASE("what another program started is pursued over lost answers and connections") {
+  GuardedTool tool;
+  const catalogue::Action start = tool.start_action();
+  tool.write_past(4003, 1);
+  tool.clock.advance(100ms);
+  REQUIRE(tool.runs());
+  unsigned opened = 0;
+  const auto open = [&](Duration patience) -> Result<Device> {
+    CHECK(patience <= 10s);
+    tool.reachable = ++opened > 3;
+    return tool.open(tool.calm, tool.never);
+  };
+  tool.fate = fate_of(0, Fate::closes_unheard, 2);
+  RunGuard guard(device::motion_of(start), open, tool.calm, 0s);
+  const StopReport report = guard.stop();
+  CHECK(report.result == StopResult::confirmed);
+  CHECK(report.attempts == 6);
+  CHECK(opened == 6);
+  CHECK_FALSE(tool.runs());
+  CHECK(tool.starts() == 0);
+}
+
+TEST_CASE("a pursued stop goes on for ten seconds, and no longer where it is hopeless") {
+  GuardedTool tool;
+  tool.reachable = false;
+  const catalogue::Action start = tool.start_action();
+  device::GuardedMotion motion = device::motion_of(start);
+  const auto open = [&](Duration) { return tool.open(tool.calm, tool.never); };
+  const TimePoint began = tool.clock.now();
+  SUBCASE("a tool that can not be reached") {
+    RunGuard guard(motion, open, tool.calm, 0s);
+    CHECK(guard.stop().result == StopResult::unconfirmed);
+    CHECK(tool.clock.now() - began > 9s);
+    CHECK(tool.clock.now() - began < 11s);
+  }
+  SUBCASE("an error that stays") {
+    motion.hopeless = [](const Error& error) { return error.code == Errc::connection_refused; };
+    RunGuard guard(motion, open, tool.calm, 0s);
+    const StopReport report = guard.stop();
+    CHECK(report.result == StopResult::unconfirmed);
+    CHECK(report.attempts == 1);
+  }
+}
+
 TEST_CASE("stop_and_confirm without a guard: once, and proven") {
   GuardedTool tool;
   Device device = tool.open();

@@ -60,7 +60,9 @@ TEST_CASE("line: a burst that begins within the gap is too early, in either dire
     SerialLine answered(gap, Duration::zero());
     answered.spoke(start);
     answered.hear(hex("01"), start + row.after);
-    CHECK(answered.take(start + 2s)->timing == row.timing);
+    const auto burst = answered.take(start + 2s);
+    CHECK(burst->timing == row.timing);
+    CHECK(burst->silence == (row.timing == Burst::Timing::too_early ? row.after : 0us));
 
     // Behind the client's own last byte, too: a broadcast, or a query that was not heard itself.
     if (row.after < gap) continue;  // it would go on with the same burst

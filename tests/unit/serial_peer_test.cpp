@@ -246,3 +246,40 @@ TEST_CASE("serial peer: a client that keeps too short a gap hears nothing") {
   CHECK(session.transact(read));
   CHECK(session.transact(read).error().code == Errc::no_answer);
 }
+
+TEST_CASE("serial peer: what is not answered is told, with the reason") {
+  Bus bus;
+  std::vector<std::string> told;
+  bus.peer.set_ignored([&](ByteView bytes, std::string_view reason) {
+    told.push_back(to_hex(bytes) + ": " + std::string(reason));
+  });
+  const auto ask = [&](const Bytes& bytes, Duration at) {
+    told.clear();
+    bus.peer.receive(bytes, start + at);
+    bus.answers();
+    return told.empty() ? std::string() : told.front();
+  };
+  CHECK(ask(read_two, 0ms).empty());
+  CHECK(ask(read_two, 15500us + 2100us) == to_hex(read_two) + ": 2.1 ms of silence, 5.5 ms needed");
+  Bytes spoilt = read_two;
+  spoilt.back() ^= 1U;
+  CHECK(ask(spoilt, 100ms) == to_hex(spoilt) + ": its checksum is wrong, or it is no frame");
+  CHECK(ask(hex("01 03"), 200ms) == "01 03: it is too short to be a frame");
+  const Bytes to_nobody = modbus::frame(Framing::rtu, {{}, {7}, modbus::loopback_request(1)});
+  CHECK(ask(to_nobody, 300ms) == to_hex(to_nobody) + ": there is no unit 7");
+  const Bytes to_all = modbus::frame(Framing::rtu, {{}, {0}, modbus::write_request({2}, 5)});
+  CHECK(ask(to_all, 400ms).empty());
+}
+
+TEST_CASE("serial peer: what is under way when the power goes is lost") {
+  Bus bus;
+  bus.peer.receive(read_two, start);
+  bus.peer.forget();
+  CHECK(bus.answers().empty());
+  bus.peer.receive(loopback_to_2, start + 30ms);
+  bus.peer.take(start + 36ms);
+  bus.peer.forget();
+  CHECK(bus.answers().empty());
+  bus.peer.receive(read_two, start + 60ms);
+  CHECK(bus.answers() == "75500: " + two_words + "; ");
+}

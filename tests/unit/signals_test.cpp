@@ -5,9 +5,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
+#include <cstdlib>
 #include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "spindle/posix/clock.hpp"
 
@@ -64,6 +68,75 @@ TEST_CASE("signals: the first one raises the interrupt and makes its descriptor 
     CHECK(readable(watch.interrupt().descriptor()));
     CHECK(readable(watch.interrupt().descriptor()));
   }
+}
+
+TEST_CASE("signals: every one that would end the process raises the interrupt instead") {
+  std::vector<int> numbers = {SIGUSR1, SIGUSR2, SIGALRM, SIGXCPU,  SIGVTALRM,
+                              SIGPROF, SIGIO,   SIGPWR,  SIGSTKFLT};
+  for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) numbers.push_back(number);
+  for (const int number : numbers) {
+    CAPTURE(number);
+    const int status = status_of_child([number] {
+      const posix::SignalWatch watch;
+      ::raise(number);
+      if (watch.interrupt().error().status() != ExitStatus::terminated) ::_exit(1);
+      if (!readable(watch.interrupt().descriptor())) ::_exit(2);
+    });
+    CHECK(status == 0);
+  }
+}
+
+TEST_CASE("signals: one that tells of a fault and comes from another process is a request") {
+  for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS}) {
+    CAPTURE(number);
+    const int status = status_of_child([number] {
+      for (const int own : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::signal(own, SIG_DFL);
+      const posix::SignalWatch watch;
+      const pid_t self = ::getpid();
+      const pid_t sender = ::fork();
+      if (sender == 0) {
+        ::kill(self, number);
+        ::_exit(0);
+      }
+      ::waitpid(sender, nullptr, 0);
+      if (!watch.interrupt().signalled()) ::_exit(1);
+    });
+    CHECK(status == 0);
+  }
+}
+
+TEST_CASE("signals: a fault of the process itself ends it as always") {
+  const int aborted = status_of_child([] {
+    ::signal(SIGABRT, SIG_DFL);
+    const posix::SignalWatch watch;
+    std::abort();
+  });
+  REQUIRE(WIFSIGNALED(aborted));
+  CHECK(WTERMSIG(aborted) == SIGABRT);
+}
+
+TEST_CASE("signals: the second one says what is left behind") {
+  int ends[2];
+  REQUIRE(::pipe(ends) == 0);
+  const int status = status_of_child([&ends] {
+    ::dup2(ends[1], STDERR_FILENO);
+    posix::SignalWatch watch;
+    watch.set_last_words("the tool may still run");
+    ::raise(SIGINT);
+    const Interrupt calm;
+    posix::SteadyClock clock(calm);
+    static_cast<void>(clock.sleep_until(clock.now() + 310ms));
+    ::raise(SIGINT);
+  });
+  ::close(ends[1]);
+  std::array<char, 128> told = {};
+  const ssize_t length = ::read(ends[0], told.data(), told.size());
+  ::close(ends[0]);
+  REQUIRE(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 130);
+  REQUIRE(length > 0);
+  CHECK(std::string(told.data(), static_cast<std::size_t>(length)) ==
+        "spindle: the tool may still run\n");
 }
 
 TEST_CASE("signals: one that arrives during a sleep ends it") {

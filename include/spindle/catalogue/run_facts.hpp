@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "spindle/catalogue/parameter.hpp"
 
@@ -20,6 +23,55 @@ struct RunWords {
   std::uint16_t instant = 0;
 };
 
+/// What a number in the assignment of inputs means.
+struct InputFunction {
+  std::int64_t number = 0;
+  /// The bit that has this function in the words of the profile; empty: it does nothing.
+  std::optional<std::uint8_t> bit = std::nullopt;
+  Evidence evidence = Evidence::inferred;
+  std::string source = {};
+};
+
+/// Where a driver keeps what each bit of its command word does.
+struct InputFacts {
+  std::string parameter = {};  ///< with {n}, the number of the bit; empty: the bits are fixed
+  std::uint16_t first = 0;     ///< bits from
+  std::uint16_t last = 0;      ///< to
+  std::vector<InputFunction> functions = {};
+
+  [[nodiscard]] const InputFunction* find(std::int64_t number) const;
+};
+
+/// What the bits of the command word do on one driver. Words of the profile are made for the
+/// default assignment; these are the same words for this driver.
+class CommandBits {
+ public:
+  /// Every bit does what the profile says.
+  CommandBits();
+  /// `numbers` are those of the bits from the first on; what is not known of further bits is
+  /// unknown.
+  CommandBits(const InputFacts& facts, std::span<const std::int64_t> numbers);
+
+  /// The word of the profile in the bits of this driver. Empty where no bit has a function that it
+  /// needs.
+  [[nodiscard]] std::optional<std::uint16_t> word(std::uint16_t standard) const;
+  /// The other way round: a word of this driver in the bits of the profile. Empty where it has a
+  /// bit whose function is unknown.
+  [[nodiscard]] std::optional<std::uint16_t> standard(std::uint16_t word) const;
+  /// All bits of this driver that have one of these functions, and those whose function is unknown:
+  /// what has to be off so that none of them acts.
+  [[nodiscard]] std::uint16_t any_of(std::uint16_t standard) const;
+  /// The bits whose function is unknown.
+  [[nodiscard]] std::uint16_t unknown() const { return unknown_; }
+
+ private:
+  static constexpr int width = 16;
+
+  std::uint16_t unknown_ = 0;
+  /// The function of each bit as a bit of the profile; 0: it does nothing, or is unknown.
+  std::array<std::uint16_t, width> functions_ = {};
+};
+
 /// How a product is run whose motor follows a command word: a level, which holds until it is told
 /// otherwise. Names are those of parameters; of a 32-bit one the word is the low half.
 struct RunFacts {
@@ -34,6 +86,7 @@ struct RunFacts {
   std::uint16_t decelerate_always = 0;
   std::uint16_t instant_always = 0;
   std::uint16_t select = 0;  ///< adjoining bits that hold the number of the operation data
+  InputFacts inputs = {};    ///< which bit does what on one driver
 
   std::uint8_t running = 0;   ///< bits of the status word
   std::uint8_t at_speed = 0;  ///< the speed asked for is reached

@@ -160,6 +160,9 @@ Result<Outcome> restore(const RestoreOptions& options, Context& context);
 struct SimulatedToolOptions {
   sim::BmOptions bm = {};
   std::vector<modbus::UnitId> units = {};       ///< of a serial tool; none: as many as usual
+  std::optional<Duration> busy = std::nullopt;  ///< how long Configuration takes; empty: as usual
+  std::vector<sim::Raised> alarms = {};
+  std::vector<sim::Raised> warnings = {};       ///< of a motor driver
   std::optional<unsigned> baud = std::nullopt;  ///< of its line; empty: the profile's
 };
 
@@ -169,8 +172,10 @@ struct SimulateOptions {
   std::string pty;     ///< path of the pseudo terminal to make instead
   SimulatedToolOptions tool;
   sim::LineModel::Gaps gaps = sim::LineModel::Gaps::enforced;
-  std::vector<std::string> faults;   ///< of the tool and of its line
-  std::vector<std::string> outages;  ///< KIND=TIME@every:TIME
+  std::vector<std::string> faults;    ///< of the tool and of its line
+  std::vector<std::string> alarms;    ///< CODE[@TIME]
+  std::vector<std::string> warnings;  ///< CODE[@TIME]
+  std::vector<std::string> outages;   ///< KIND=TIME@every:TIME
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
 

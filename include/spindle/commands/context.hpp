@@ -52,6 +52,13 @@ struct Calm {
   /// From now on a request to suspend the program (Ctrl-Z) ends it as Ctrl-C does: a suspended
   /// program stops no motor. May be empty.
   std::function<void()> stay_awake = {};
+  /// What is told when a second signal ends the program at once; empty: nothing. May be empty.
+  std::function<void(std::string_view words)> set_last_words = {};
+  /// Starts a second process that does `when_orphaned`, and tells what it returns, when this
+  /// program ends, however it ends, without having called the function that is returned. May be
+  /// empty.
+  std::function<Result<std::function<void()>>(std::function<std::string()> when_orphaned)>
+      start_guardian = {};
 };
 
 /// The part of a context that signals end.

@@ -75,7 +75,6 @@ bool is_target(std::string_view text, const Context& context);
 /// What a command has to know of the registers.
 enum class Need : std::uint8_t {
   named_registers,  ///< that they are those of the profile
-  stop_word,        ///< the same, but a stop does not ask for the product
   raw_registers,    ///< nothing
 };
 

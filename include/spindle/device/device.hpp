@@ -250,6 +250,7 @@ class Device {
   [[nodiscard]] Clock& clock() const { return calm_ != nullptr ? *calm_ : session_->clock(); }
   Result<void> while_busy(const std::function<Result<void>()>& write);
   Result<void> prepare(const catalogue::Preparation& preparation);
+  [[nodiscard]] std::uint16_t bits_to_clear(const catalogue::Preparation& preparation);
   Result<Shown> await_ready(Duration limit);
   Result<ActionResult> carry_out(const catalogue::Action& action, std::int64_t value);
   Result<ActionResult> found_done(const catalogue::Action& action,

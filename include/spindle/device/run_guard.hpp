@@ -29,6 +29,9 @@ struct GuardedMotion {
   /// Sends the stop and waits for the proof; may be called again and again.
   std::function<Result<StopResult>(Device&, Clock&)> stop;
   Duration stopping = {};  ///< how long a stop that works may take
+  /// Whether no further try makes sense after this error, because it will be the same. Empty: every
+  /// error may be the last one.
+  std::function<bool(const Error&)> hopeless = {};
 };
 
 /// The motion of an action with a stop value, which must outlive it.
@@ -40,6 +43,9 @@ GuardedMotion motion_of(const catalogue::Action& start);
 /// function.
 class RunGuard {
  public:
+  /// Between two tries, so that a refusing tool is not flooded.
+  static constexpr Duration pause = std::chrono::milliseconds(200);
+
   /// Opens the tool anew for a stop, on a line that interrupts do not end, within `patience`.
   using Reopen = std::function<Result<Device>(Duration patience)>;
 
@@ -48,6 +54,9 @@ class RunGuard {
   /// `start` is an action with a stop value.
   RunGuard(Device& device, const catalogue::Action& start, Reopen reopen, Clock& calm)
       : RunGuard(device, motion_of(start), std::move(reopen), calm) {}
+  /// Only stops what another program has started; the first try opens the tool. `settles` is how
+  /// long a start that was sent before may still be under way to it.
+  RunGuard(GuardedMotion motion, Reopen reopen, Clock& calm, Duration settles);
   ~RunGuard();
   RunGuard(const RunGuard&) = delete;
   RunGuard& operator=(const RunGuard&) = delete;
@@ -61,25 +70,39 @@ class RunGuard {
   /// do nothing and report the same. The device goes on with the connection that it ended with.
   StopReport stop();
 
+  /// One try of stop(): the report when it was the last one. Who stops several tools in turns calls
+  /// this with a pause between.
+  std::optional<StopReport> try_stop();
+
  private:
   enum class Line : std::uint8_t { open, lost };
+  static constexpr Duration longest_settling = std::chrono::seconds(2);
 
-  Result<StopResult> try_to_stop(unsigned attempt, TimePoint limit);
+  Result<StopResult> try_to_stop(unsigned attempt);
+  void begin_stop();
+  StopReport end_stop();
   Result<void> reopen(Duration patience);
   Duration patience_of(unsigned attempt) const;
   void judge_line(const Error& error);
+  [[nodiscard]] bool is_hopeless(const Error& error) const;
   [[nodiscard]] bool is_proven(const StopReport& report) const;
 
-  Device* device_;
+  std::optional<Device> own_ = std::nullopt;
+  Device* device_;  ///< null until the first one is open
   GuardedMotion motion_;
   Reopen reopen_;
   Clock* calm_;
-  Duration answer_timeout_;  ///< the user's or the profile's
+  std::optional<Duration> answer_timeout_;  ///< the user's or the profile's
+  Duration settles_ = longest_settling;
   bool armed_ = false;
   bool acknowledged_ = false;
   TimePoint settled_at_ = {};  ///< before this, a start of the old connection may still come true
   Line line_ = Line::open;
   unsigned silences_ = 0;  ///< stops without an answer on this connection
+  std::optional<TimePoint> began_ = std::nullopt;
+  TimePoint limit_ = {};
+  bool extended_ = false;  ///< once, by a stop that was acknowledged and took its time
+  StopReport trying_ = {};
   std::optional<StopReport> report_ = std::nullopt;
 };
 

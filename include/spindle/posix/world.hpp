@@ -12,6 +12,7 @@
 #include "spindle/link/endpoint.hpp"
 #include "spindle/link/transport.hpp"
 #include "spindle/posix/clock.hpp"
+#include "spindle/posix/guardian.hpp"
 #include "spindle/posix/streams.hpp"
 
 namespace spindle::posix {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "spindle/catalogue/profile.hpp"
+#include "spindle/sim/raised.hpp"
 #include "spindle/sim/server.hpp"
 
 namespace spindle::sim {
@@ -17,6 +18,11 @@ struct BlvOptions {
   std::vector<std::uint8_t> units = {1};  ///< addresses on the bus, 1–31, each once
   unsigned baud = 0;                      ///< decides the gap; 0: the profile's
   Gaps gaps = Gaps::enforced;
+  /// How long Configuration takes: a sibling's manual (AR p.257) says one second or less, and the
+  /// maker's own programs go on 30 ms behind it. Commands and operation data are taken meanwhile.
+  Duration configuring = std::chrono::milliseconds(200);
+  std::vector<Raised> alarms = {};    ///< of every unit
+  std::vector<Raised> warnings = {};  ///< of every unit
 };
 
 /// Several simulated BLV motor drivers on one RS-485 line: registers 0000h–1FFFh as pairs, edges of
@@ -34,6 +40,9 @@ class BlvBus : public Server {
 
   /// Somebody works with the hand-held setter: writes are refused with 89h until then.
   virtual void use_setter(std::uint8_t unit, TimePoint until) = 0;
+
+  /// All units are switched off and on.
+  void reboot(TimePoint now) override = 0;
 
   /// Power off and on: RAM is what the non-volatile memory holds, the rest begins anew; the alarm
   /// history stays.

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/sim/fault_plan.hpp"
+#include "spindle/sim/raised.hpp"
 #include "spindle/sim/server.hpp"
 
 namespace spindle::sim {
@@ -26,7 +28,8 @@ struct BmOptions {
   /// advance(); empty: nobody.
   std::optional<Duration> rundown_every = std::nullopt;
   unsigned ng_every = 0;  ///< every so many of the operator's run-downs end NG; 0: none
-  unsigned burst = 1;     ///< results that each of the operator's run-downs brings, all at once
+  std::vector<Raised> alarms = {};
+  unsigned burst = 1;  ///< results that each of the operator's run-downs brings, all at once
 };
 
 /// How a run-down by the tool's own trigger ends: at the target, or released before it.

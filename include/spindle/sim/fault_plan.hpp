@@ -63,6 +63,16 @@ using FaultPlan = std::vector<Fault>;
 /// "wrong-unit": the kind as parse_fault() reads it.
 std::string_view to_text(FaultKind kind);
 
+/// What a simulated tool must have for a fault to be felt at all.
+enum class FaultNeed : std::uint8_t {
+  nothing,
+  network,      ///< the header of Modbus TCP
+  serial_line,  ///< RTU
+  events,       ///< frames that the tool sends unasked
+  screwdriver,  ///< the tool of BmOptions, which has them
+};
+FaultNeed need_of(FaultKind kind);
+
 /// The fault's number, else the default of its kind (0 where it has none).
 std::uint16_t number_of(const Fault& fault);
 

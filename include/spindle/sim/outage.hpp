@@ -29,6 +29,9 @@ struct Outage {
 /// "other-client": the kind as parse_outage() reads it.
 std::string_view to_text(OutageKind kind);
 
+/// Whether only a tool with a radio can be away like this.
+bool needs_radio(OutageKind kind);
+
 /// Reads "KIND=LASTS@every:INTERVAL", such as "sleep=3s@every:20s". Error `bad_value` with a
 /// suggestion.
 Result<Outage> parse_outage(std::string_view text);

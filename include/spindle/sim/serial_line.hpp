@@ -20,7 +20,8 @@ struct LineModel {
 struct Burst {
   Bytes bytes;
   enum class Timing : std::uint8_t { in_time, too_early } timing = Timing::in_time;
-  TimePoint end = {};  ///< when the silence behind the last byte was complete
+  Duration silence = {};  ///< before a burst that came too early
+  TimePoint end = {};     ///< when the silence behind the last byte was complete
 };
 
 /// A server's ear on a half-duplex line: silence ends a frame, and a frame that begins before the

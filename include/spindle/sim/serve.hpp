@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
@@ -34,6 +35,9 @@ struct ServeOptions {
   std::function<Result<void>(std::uint16_t port)> listening = {};
   /// Hears every connection and all bytes as they come and go (usually a frame at a time).
   std::function<void(Heard, std::uint32_t connection, ByteView bytes)> log = {};
+  /// Hears of what came and is not answered, and why.
+  std::function<void(std::uint32_t connection, ByteView bytes, std::string_view reason)> ignored =
+      {};
 };
 
 /// Serves a tool to any number of clients until an interrupt; `posix` brings the implementation.

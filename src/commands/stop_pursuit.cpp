@@ -1,0 +1,164 @@
+#include "stop_pursuit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "stops.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Profile;
+using catalogue::StopMode;
+using device::StopResult;
+
+/// What a question that goes before the stop may cost.
+constexpr Duration hurried_answer = std::chrono::milliseconds(200);
+/// The first questions of a tool that has to say what it is are repeated soon.
+constexpr Duration soon = std::chrono::milliseconds(500);
+constexpr unsigned soon_repeated = 4;
+/// A start that a program sent before it ended reaches its tool within this time.
+constexpr Duration start_under_way = std::chrono::seconds(2);
+
+/// What is wrong with the command or its files stays so.
+bool is_hopeless(const Error& error) {
+  return error.code == Errc::usage || error.code == Errc::unknown_name ||
+         error.code == Errc::bad_file || error.code == Errc::bad_target ||
+         error.code == Errc::wrong_generation;
+}
+
+}  // namespace
+
+StopPursuit::StopPursuit(const Target& target, StopMode mode, const Context& context)
+    : target_(target),
+      mode_(mode),
+      wanted_connect_(context.common.connect_timeout),
+      usual_(wanted_connect_.value_or(catalogue::LinkFacts().connect)),
+      context_(context),
+      guard_(
+          motion(), [this](Duration patience) { return open(patience); }, context_.clock,
+          Duration::zero()) {}
+
+StopPursuit::StopPursuit(const OpenTool& tool, StopMode mode, const Context& context)
+    : target_(tool.target),
+      mode_(mode),
+      wanted_connect_(context.common.connect_timeout),
+      usual_(wanted_connect_.value_or(tool.profile->link.connect)),
+      context_(context),
+      profile_(tool.profile.get()),
+      generation_is_checked_(true),
+      guard_(
+          motion(), [this](Duration patience) { return open(patience); }, context_.clock,
+          start_under_way) {
+  static_cast<void>(prepare_stop());  // it was started, so it can be stopped
+}
+
+device::GuardedMotion StopPursuit::motion() {
+  return {.start = {},
+          .stop = [this](device::Device& device, Clock& clock) { return stop(device, clock); },
+          .hopeless = is_hopeless};
+}
+
+Result<StopResult> StopPursuit::result() {
+  const device::StopReport report = guard_.stop();
+  if (report.result != StopResult::unconfirmed || !last_) return report.result;
+  Error error = *last_;
+  if (profile_ == nullptr && !is_hopeless(error)) {
+    error.hint =
+        "no stop was sent, as it is not known what the tool is: name its profile with --profile, "
+        "and stop it at the tool";
+  }
+  return tl::unexpected(std::move(error));
+}
+
+Result<device::Device> StopPursuit::open(Duration patience) {
+  context_.common.connect_timeout = std::min(usual_, patience);
+  auto device = profile_ == nullptr && target_.profile.empty() ? connect_unknown() : connect();
+  if (!device) last_ = device.error();
+  return device;
+}
+
+/// The stop needs no identity where the profile is known. One that says in time that its registers
+/// are others is not written to.
+Result<device::Device> StopPursuit::connect() {
+  if (profile_ == nullptr) {
+    auto profile = load_profile(target_, context_);
+    if (!profile) return tl::unexpected(std::move(profile.error()));
+    auto adopted = adopt(std::make_unique<const Profile>(std::move(*profile)));
+    if (!adopted) return tl::unexpected(std::move(adopted.error()));
+  }
+  auto device = connect_device(target_, *profile_, context_);
+  if (!device) return device;
+  return check_generation(*device).map([&] { return std::move(*device); });
+}
+
+Result<void> StopPursuit::check_generation(device::Device& device) {
+  if (!profile_->identity || std::exchange(generation_is_checked_, true)) return {};
+  link::Session& session = device.session();
+  const Duration patience = session.options().answer_timeout;
+  session.shield();
+  session.set_answer_timeout(std::min(patience, hurried_answer));
+  const auto answer = device.report_server_id();
+  session.set_answer_timeout(patience);
+  if (!answer) return {};
+  const auto& facts = *profile_->identity;
+  const auto identity = catalogue::decode_identity(facts, *answer);
+  if (catalogue::generation_of(facts, identity) != catalogue::Generation::later) return {};
+  return device.require_known_registers();
+}
+
+Result<device::Device> StopPursuit::connect_unknown() {
+  const CommonOptions usual = context_.common;
+  const Duration patience = usual.timeout.value_or(catalogue::LinkFacts().answer);
+  context_.common.retries = 0;  // a question that got lost is asked on a new connection
+  if (++questions_ <= soon_repeated) context_.common.timeout = std::min(patience, soon);
+  auto tool = open_tool(target_, Profile(), Need::named_registers, context_);
+  context_.common = usual;
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  generation_is_checked_ = true;
+  auto adopted = adopt(std::move(tool->profile));
+  if (!adopted) return tl::unexpected(std::move(adopted.error()));
+  tool->device.session().set_answer_timeout(usual.timeout.value_or(profile_->link.answer));
+  return std::move(tool->device);
+}
+
+Result<void> StopPursuit::adopt(std::unique_ptr<const Profile> profile) {
+  own_profile_ = std::move(profile);
+  profile_ = own_profile_.get();
+  usual_ = wanted_connect_.value_or(profile_->link.connect);
+  return prepare_stop();
+}
+
+Result<void> StopPursuit::prepare_stop() {
+  if (!profile_->run) {
+    auto start = find_start(*profile_);
+    if (!start) return tl::unexpected(target_.blamed(std::move(start.error())));
+    start_ = std::move(*start);
+    return {};
+  }
+  auto motor = device::Motor::of(*profile_);
+  if (!motor) return tl::unexpected(target_.blamed(std::move(motor.error())));
+  motor_ = std::move(*motor);
+  stopper_.emplace(*motor_, mode_);
+  return {};
+}
+
+Result<StopResult> StopPursuit::stop(device::Device& device, Clock& clock) {
+  auto stopped = send_stop(device, clock);
+  last_.reset();
+  if (!stopped) last_ = stopped.error();
+  return stopped;
+}
+
+Result<StopResult> StopPursuit::send_stop(device::Device& device, Clock& clock) {
+  if (start_) return device::stop_and_confirm(device, *start_, clock);
+  if (target_.reach == Reach::everybody) {
+    return broadcast_stop(device, *motor_, mode_).map([] { return StopResult::sent; });
+  }
+  if (!std::exchange(was_observed_, true)) stopper_->observe(device);
+  return stopper_->stop(device, clock);
+}
+
+}  // namespace spindle::commands
