@@ -121,7 +121,7 @@ class KilledTest(unittest.TestCase):
                     env=support.home().environment(), cwd=support.home().path)
             support.wait_until(station.has_started, "the tool runs")
             process.kill()
-            process.wait(support.DEADLINE)
+            support.wait_for_end(process)
             support.wait_until(lambda: "its guardian did" in told.read_text(), "the guardian tells it")
             self.assertEqual(told.read_text().count("\n"), 1)
 

@@ -104,7 +104,7 @@ const std::vector<BannedWord> banned_words = {
 };
 
 // Lines of code in main.cpp; includes, comments and blank lines are free.
-constexpr std::ptrdiff_t longest_main = 24;
+constexpr std::ptrdiff_t longest_main = 20;
 
 // Spelt in halves so that this file does not find itself.
 const std::vector<std::string> unfinished = {std::string("TO") + "DO", std::string("FIX") + "ME"};

@@ -57,8 +57,8 @@ enum class Talk : std::uint8_t { normal, quiet };
 
 std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk);
 
-/// What users have to know about the values that are shown: one line on stderr, quiet or not. May be
-/// called from any thread.
+/// What users have to know about the values that are shown: one line on stderr, quiet or not. May
+/// be called from any thread.
 void say_warning(const Streams& streams, std::string_view sentence);
 
 /// The `error` record of the contract.
