@@ -11,7 +11,10 @@ CalmLine::CalmLine(const OpenTool& tool, const Context& context)
 
 Result<device::Device> CalmLine::connect(Duration patience) {
   context_.common.connect_timeout = std::min(usual_, patience);
-  return connect_device(tool_->target, *tool_->profile, context_);
+  Target target = tool_->target;
+  target.endpoint.claim =
+      link::Claim::beside;  // what leaves a tool safe waits for no other program
+  return connect_device(target, *tool_->profile, context_);
 }
 
 }  // namespace spindle::commands

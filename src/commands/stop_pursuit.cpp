@@ -52,6 +52,7 @@ StopPursuit::StopPursuit(const OpenTool& tool, StopMode mode, const Context& con
       guard_(
           motion(), [this](Duration patience) { return open(patience); }, context_.clock,
           start_under_way) {
+  target_.endpoint.claim = link::Claim::beside;
   static_cast<void>(prepare_stop());  // it was started, so it can be stopped
 }
 
