@@ -33,7 +33,9 @@ Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
 
 bool leaves_open(const Result<device::StopResult>& stopped) {
   if (stopped) return *stopped == device::StopResult::unconfirmed;
-  return stopped.error().code == Errc::no_answer;
+  const Errc code = stopped.error().code;
+  return code == Errc::no_answer || code == Errc::incomplete_answer ||
+         code == Errc::malformed_answer || code == Errc::bad_checksum;
 }
 
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
