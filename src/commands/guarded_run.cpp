@@ -7,6 +7,7 @@
 
 #include "change_log.hpp"
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "stop_pursuit.hpp"
 #include "stops.hpp"
 
@@ -161,12 +162,25 @@ Result<void> GuardedRun::summarise(const device::StopReport& stop, const RunEnd&
 Result<Outcome> GuardedRun::end(Listing& listing, const device::StopReport& stop,
                                 const RunEnd& run_end) {
   if (stop.result == device::StopResult::unconfirmed) fail(stop);
-  const auto listed = listing.end();
+  const auto listed = listing.end().and_then([&] { return drain(); });
   const auto told = tell_errors();
   tell_left();
   if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
   if (!listed || !told) return outcome_;
-  return summarise(stop, run_end).map([&] { return outcome_; });
+  const auto summarised = summarise(stop, run_end).and_then([&] { return drain(); });
+  if (outcome_.failed() == 0 && !summarised) return tl::unexpected(summarised.error());
+  return outcome_;
+}
+
+Result<void> GuardedRun::drain() {
+  if (!out_) return {};
+  const auto left = out_->drain();
+  if (!left) return tl::unexpected(left.error());
+  if (*left > 0) {
+    context_->io.err(fmt::format("spindle: {}: the reader of standard output did not take {}\n",
+                                 tool_->target.shown, counted(*left, "record")));
+  }
+  return {};
 }
 
 }  // namespace spindle::commands

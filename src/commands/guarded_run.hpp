@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "calm_line.hpp"
 #include "last_words.hpp"
 #include "listing.hpp"
+#include "patient_out.hpp"
 #include "progress.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/device/run_guard.hpp"
@@ -59,6 +61,7 @@ class GuardedRun {
   template <typename Limit, typename Follow>
   auto run(device::GuardedMotion motion, Limit limit, Follow follow) {
     if (context_->calm.stay_awake) context_->calm.stay_awake();
+    out_.emplace(context_->io, context_->interrupt);
     device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
     const LastWords last_words(*context_, words_of_death());
     const auto limits = limit();
@@ -101,11 +104,15 @@ class GuardedRun {
   /// Each on its own: they reach people even where nobody reads the records any more.
   Result<void> tell_errors();
   void tell_left() const;
+  /// Waits until what was told is taken.
+  Result<void> drain();
   Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
   OpenTool* tool_;
   Context* context_;
   ProgressLine progress_;
+  /// From the start on: a motor must not run on because its reader is slow.
+  std::optional<PatientOut> out_ = std::nullopt;
   CalmLine calm_line_;
   std::function<void()> tell_safe_ = {};  ///< empty: there is no guardian, or it knows
   Outcome outcome_ = {};

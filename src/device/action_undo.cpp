@@ -90,7 +90,7 @@ class Undo {
   }
 
   Result<UndoReport> refused_or(Error error) {
-    if (error.code != Errc::exception_response) return tl::unexpected(std::move(error));
+    if (!is_refusal(error)) return tl::unexpected(std::move(error));
     return ended(PutBack::refused, message_of(error));
   }
 
