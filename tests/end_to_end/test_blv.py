@@ -293,6 +293,54 @@ class EndingTest(MotorTest):
                 self.assertEqual(finished.status, 0, finished)
                 self.assert_stopped(bus, finished)
 
+    def test_the_driver_is_left_as_it_was_found(self):
+        names = ("operation.2.speed", "operation.2.deceleration-time", "communication.timeout")
+        with Bus() as bus:
+            before = self.values(bus.url, *names)
+            with self.running(bus, "--watchdog", "2s", "--json") as started:
+                support.wait_until(bus.turns, "the motor turns")
+                started.send_signal(signal.SIGINT)
+                finished = started.finish()
+            self.assertEqual(finished.status, 130, finished)
+            self.assertIsNone(finished.records()[-1]["left"], finished)
+            self.assertEqual(self.values(bus.url, *names), before)
+            self.assert_stopped(bus, finished)
+
+    def test_the_children_of_a_group_are_left_alone(self):
+        with Bus(units="1-2") as bus:
+            child = bus.unit(2)
+            self.assertEqual(run("do", child, "group=1").status, 0)
+            before = self.values(child, "operation.2.speed", "operation.2.deceleration-time", "command.driver-input")
+            heard = len(bus.requests())
+            finished = start(bus.url, "--for", "300ms", "--watchdog", "2s")
+            self.assertEqual(finished.status, 0, finished)
+            functions = {request[1] for request in bus.requests()[heard:]}
+            self.assertNotIn(WRITE_MULTIPLE, functions)  # the only function that reaches a group
+            self.assertEqual(
+                self.values(child, "operation.2.speed", "operation.2.deceleration-time", "command.driver-input"),
+                before)
+
+    def test_a_reader_that_takes_nothing(self):
+        """A pipe that is full from the beginning: what is told waits, and the stop does not."""
+        with Bus() as bus:
+            reading, writing = support.small_pipe()
+            os.set_blocking(writing, False)
+            with contextlib.suppress(BlockingIOError):
+                while os.write(writing, b" " * 4096):
+                    pass
+            os.set_blocking(writing, True)
+            with support.Running(*arguments_of_start(bus.url, "--for", "500ms", "--json"), stdout=writing) as started:
+                os.close(writing)
+                support.wait_until(lambda: bus.has_started() and STOP in bus.commands(), "the motor is stopped")
+                told = b""
+                while chunk := os.read(reading, 65536):
+                    told += chunk
+                os.close(reading)
+                finished = started.finish()
+            self.assertEqual(finished.status, 0, finished)
+            self.assertIn(b'"result":"ran"', told)
+            self.assert_stopped(bus, finished)
+
     def test_a_reader_that_was_never_there(self):
         with Bus() as bus:
             reading, writing = os.pipe()

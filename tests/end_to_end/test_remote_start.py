@@ -188,7 +188,7 @@ class ResultTest(RemoteStartTest):
     def test_people_see_the_same(self):
         with Station(outcome=NG) as station:
             finished = support.run("remote-start", station.url, *GO)
-        self.assertRegex(finished.stdout, r"fastening-ng .* NG +E335 ")
+        self.assertRegex(finished.stdout, r"fastening-ng .* NG +[a-z-]+ +E335 ")
         self.assertEqual(finished.stderr, "NG; the tool stands still\n", finished)
 
 
@@ -448,6 +448,47 @@ class BeforeTest(RemoteStartTest):
             order = [r.words[0] for r in station.requests if r.function == support.WRITE_SINGLE]
             self.assertLess(order.index(TURN), order.index(START))
             self.assert_stopped(station, finished)
+
+    def test_the_tool_is_left_as_it_was_found(self):
+        def interrupt(run, _):
+            run.send_signal(signal.SIGINT)
+
+        def cut(_, station):
+            station.cut()
+
+        for end, status in ((interrupt, 130), (cut, 5)):
+            with self.subTest(end.__name__), Station(**SLOW) as station:
+                with self.running(station, "--preset", "5", "--direction", "loosening", "--json") as run:
+                    end(run, station)
+                    finished = run.finish()
+                self.assertEqual(finished.status, status, finished)
+                self.assertEqual((station.writes(SELECT), station.writes(TURN)), ([5, 3], [1, 0]))
+                order = [r.words for r in station.requests if r.function == support.WRITE_SINGLE]
+                self.assertLess(order.index((START, 0)), order.index((TURN, 0)), "not before the stop")
+                self.assertIsNone(finished.records()[-1]["left"], finished)
+                self.assert_stopped(station, finished)
+
+    def test_what_was_selected_before_a_start_that_fails(self):
+        with Station(deaf_to=[TURN]) as station:
+            finished = self.start(station, "--preset", "5", "--direction", "loosening", "--timeout", "200ms")
+            self.assertEqual(finished.status, 8, finished)
+            self.assertEqual(station.writes(SELECT), [5, 3])
+            self.assert_untouched(station, finished)
+
+    def test_what_can_not_be_set_back_is_said(self):
+        with Station(deaf_to=[(TURN, 0)]) as station:
+            finished = self.start(station, "--direction", "loosening", "--timeout", "200ms", "--quiet")
+            self.assertEqual(finished.records()[-1]["left"], {"direction": "forward"}, finished)
+            self.assertEqual(len(finished.stderr.splitlines()), 1, finished)
+            self.assertIn("not set back: direction: set to loosening, before it was forward", finished.stderr)
+            self.assert_stopped(station, finished)
+
+    def test_what_may_not_be_set_back_while_it_may_run(self):
+        with Station(deaf_to=[(START, 0)], **SLOW) as station:
+            finished = self.start(station, "--direction", "loosening", "--for", "200ms")
+            self.assertEqual(finished.status, 5, finished)
+            self.assertEqual(finished.records()[-1]["left"], {"direction": "forward"}, finished)
+            self.assertEqual(station.writes(TURN), [1])
 
     def test_a_selection_that_does_not_take(self):
         for register, option in ((SELECT, ["--preset", "5"]), (TURN, ["--direction", "loosening"])):
