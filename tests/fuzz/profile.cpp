@@ -10,6 +10,11 @@
 using namespace spindle;
 using spindle::fuzz::require;
 
+/// A profile of many parameters would fill the sanitizer's memory of what was freed, not ours.
+extern "C" const char* __asan_default_options() {  // NOLINT: the sanitizer's name for it
+  return "quarantine_size_mb=64";
+}
+
 namespace {
 
 /// A file without a place in any folder.
