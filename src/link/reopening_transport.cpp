@@ -66,7 +66,10 @@ Result<void> ReopeningTransport::send(ByteView bytes, TimePoint deadline) {
 
 Result<std::size_t> ReopeningTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
   while (true) {
-    if (const std::size_t size = whole(); size > 0) return hand_over(into, size);
+    if (const std::size_t size = whole(); size > 0) {
+      note_answer(ByteView(held_).first(size));
+      return hand_over(into, size);
+    }
     auto taken = take(deadline);
     if (taken && *taken == 0) return hand_over(into, held_.size());
     if (taken) continue;
@@ -86,7 +89,6 @@ Result<std::size_t> ReopeningTransport::take(TimePoint deadline) {
   if (!transport_) return tl::unexpected(Error{.code = Errc::closed});
   std::array<std::uint8_t, chunk_size> chunk = {};
   auto received = transport_->receive(chunk, deadline);
-  if (!received && is_closed(received.error()) && !brought_nothing_) hangs_up_ = true;
   if (!received || *received == 0) return received;
   brought_nothing_ = false;
   held_.insert(held_.end(), chunk.begin(), chunk.begin() + static_cast<std::ptrdiff_t>(*received));
@@ -95,6 +97,7 @@ Result<std::size_t> ReopeningTransport::take(TimePoint deadline) {
 
 Result<void> ReopeningTransport::reopen(Error why) {
   if (brought_nothing_) return tl::unexpected(std::move(why));
+  hangs_up_ = true;
   if (trace_.decision) {
     trace_.decision(Decision::retry, "the tool closed the connection, which is opened once more");
   }
@@ -123,6 +126,18 @@ std::size_t ReopeningTransport::hand_over(std::span<std::uint8_t> into, std::siz
   std::copy(held_.begin(), end, into.begin());
   held_.erase(held_.begin(), end);
   return count;
+}
+
+/// What was answered is not asked again when the connection ends behind it. Not every server
+/// repeats the transaction's number, but the function it does.
+void ReopeningTransport::note_answer(ByteView frames) {
+  for (std::size_t at = 0; frames.size() - at > function_at && request_.size() > function_at;) {
+    const auto function =
+        static_cast<std::uint8_t>(frames[at + function_at] & ~modbus::exception_bit);
+    if (function == request_[function_at]) request_.clear();
+    at += head_size + get_u16(frames, at + length_at);
+    if (at > frames.size()) return;
+  }
 }
 
 /// How many bytes of what is held are whole frames; all where that can not be told.

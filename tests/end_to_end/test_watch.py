@@ -598,7 +598,7 @@ class HangingUpServer(support.Port):
             while chunk := client.recv(4096):
                 buffer += chunk
                 for request in support.take_requests(buffer):
-                    client.sendall(frame(request.transaction, *self._answer(request), unit=1))
+                    client.sendall(frame(request.transaction, *self._answer(request), unit=request.unit))
                     if self.hangs_up:
                         return
 

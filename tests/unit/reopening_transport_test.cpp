@@ -89,6 +89,18 @@ TEST_CASE("reads and writes go on over a server that hangs up behind every answe
   for (const auto& script : server.scripts) CHECK(script->sent.size() == 1);
 }
 
+TEST_CASE("what was answered is not asked again when the connection ends behind it") {
+  Server server;
+  server.connection().on_request(last_answer(value(7)));
+  server.connection().on_request(test::answer(tcp, 1ms, value(8)));
+  CHECK(word_of(server.session().transact(read(1))) == 7);
+  const auto nothing = server.session().next_spontaneous(server.clock.now() + 1s);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().code == Errc::closed);
+  CHECK(server.opened == 1);
+  CHECK(word_of(server.session().transact(read(2))) == 8);
+}
+
 TEST_CASE("a read whose answer does not come whole is sent once more") {
   Server server;
   SUBCASE("nothing came") { server.connection().on_request(hang_up()); }

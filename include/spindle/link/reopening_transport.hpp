@@ -34,6 +34,7 @@ class ReopeningTransport final : public Transport {
   Result<void> ask_again(Error why, TimePoint deadline);
   std::size_t hand_over(std::span<std::uint8_t> into, std::size_t size);
   [[nodiscard]] std::size_t whole() const;
+  void note_answer(ByteView frames);
 
   std::unique_ptr<Transport> transport_;  ///< empty: it could not be opened
   Open open_;
