@@ -98,16 +98,34 @@ Result<MotorState> MotorWatch::with(std::span<const Reading> readings) {
   return now;
 }
 
-/// What happened is told with the speed and load that are read at once; they may say already what
-/// happened behind it.
+/// Everything, read once more where the motor stopped or left its speed before speed and load were
+/// read: values of different moments make no state.
+Result<MotorState> MotorWatch::look(Device& device) const {
+  const catalogue::RunFacts& facts = motor_.facts();
+  std::vector<Parameter> status = motor_.parameters();
+  std::erase_if(status, [&](const Parameter& each) { return each.name != facts.status; });
+  auto seen = motor_.look(device);
+  if (!seen || !seen->running) return seen;
+  const auto behind = device.read_each(status, Limits::skip);
+  if (!behind) return tl::unexpected(behind.error());
+  const auto& value = behind->front().value;
+  if (!value) return tl::unexpected(value.error());
+  const std::int64_t word = value->number.mantissa();
+  const bool runs_on = has_bit(word, facts.running);
+  const bool keeps_speed = has_bit(word, facts.at_speed) || !seen->at_speed;
+  return runs_on && keeps_speed ? seen : motor_.look(device);
+}
+
+/// What happened is told with the speed and load that are read at once. They may say already what
+/// happened behind it: a speed that was reached, but is no longer, is then not told.
 Result<std::vector<MotorNews>> MotorWatch::take(Device& device, std::span<const Reading> readings) {
-  const auto now = with(readings);
-  if (!now) return tl::unexpected(now.error());
+  auto now = with(readings);
+  if (!now) return tl::unexpected(std::move(now.error()));
   std::vector<MotorNews> news;
   if (says_the_same(state_, *now)) return news;
   const Clock& clock = device.session().clock();
   const WallTime time = clock.wall();
-  auto later = motor_.look(device);
+  auto later = look(device);
   if (!later) return tl::unexpected(std::move(later.error()));  // told when it can be read again
   // What was never read by its turn is not judged by chance.
   if (!seen_.contains(motor_.facts().status)) {
@@ -116,6 +134,7 @@ Result<std::vector<MotorNews>> MotorWatch::take(Device& device, std::span<const 
   }
   if (!seen_.contains(motor_.facts().warning)) later->warning = state_.warning;
   if (!seen_.contains(motor_.facts().alarm)) later->alarm = state_.alarm;
+  now->at_speed = now->at_speed && later->at_speed;
   MotorState shown = *later;
   shown.running = now->running;
   shown.at_speed = now->at_speed;

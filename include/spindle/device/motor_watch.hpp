@@ -31,6 +31,7 @@ class MotorWatch {
 
  private:
   [[nodiscard]] const std::vector<catalogue::Parameter>& next_piece();
+  Result<MotorState> look(Device& device) const;
   [[nodiscard]] Result<MotorState> with(std::span<const Reading> readings);
 
   Motor motor_;
