@@ -33,9 +33,7 @@ Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
 
 bool leaves_open(const Result<device::StopResult>& stopped) {
   if (stopped) return *stopped == device::StopResult::unconfirmed;
-  const Errc code = stopped.error().code;
-  return code == Errc::no_answer || code == Errc::incomplete_answer ||
-         code == Errc::malformed_answer || code == Errc::bad_checksum;
+  return link::is_lost_answer(stopped.error());
 }
 
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,

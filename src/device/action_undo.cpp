@@ -27,7 +27,7 @@ class Undo {
       auto tried = connect(deadline).and_then([&] { return try_once(); });
       if (tried) return *std::move(tried);
       report_.trouble = message_of(tried.error());
-      lost_ = lost_ || tried.error().code != Errc::no_answer || ++silences_ > 1;
+      lost_ = lost_ || !link::is_lost_answer(tried.error()) || ++silences_ > 1;
       const TimePoint next = calm_->now() + pause;
       if (next > deadline || !calm_->sleep_until(next)) return report_;
     }

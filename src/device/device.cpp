@@ -179,9 +179,7 @@ bool is_exception(const Error& error, modbus::ExceptionCode code) {
 /// After a write: a missing or broken answer leaves open what the tool did, and so does a gateway
 /// that waited for it in vain, and a connection that ended.
 bool is_lost(const Error& error) {
-  return error.code == Errc::no_answer || error.code == Errc::closed || error.code == Errc::reset ||
-         error.code == Errc::incomplete_answer || error.code == Errc::malformed_answer ||
-         error.code == Errc::bad_checksum ||
+  return link::is_lost_answer(error) || error.code == Errc::closed || error.code == Errc::reset ||
          is_exception(error, modbus::ExceptionCode::gateway_target_failed_to_respond);
 }
 

@@ -251,7 +251,7 @@ Result<StopResult> MotorStopper::await_standstill(Device& device, Clock& clock,
   bool forgiving = true;  // of one lost answer: the stop itself was acknowledged
   while (true) {
     auto still = motor_->stands_still(device);
-    const bool lost = !still && still.error().code == Errc::no_answer;
+    const bool lost = !still && link::is_lost_answer(still.error());
     if (lost && std::exchange(forgiving, false)) continue;
     if (!still) return tl::unexpected(std::move(still.error()));
     if (*still == Shown::yes) return StopResult::confirmed;

@@ -34,7 +34,7 @@ class Follower {
     while (clock.now() < options_->deadline) {
       const bool nearly_over = limit_look();
       const auto state = motor_->look(*device_);
-      const bool silent = !state && state.error().code == Errc::no_answer;
+      const bool silent = !state && link::is_lost_answer(state.error());
       if (silent && nearly_over) {
         last_silence = state.error();
         continue;

@@ -39,7 +39,7 @@ PutBackReport Rollback::put_back(Attempt attempt, TimePoint& deadline) {
       return *std::move(tried);
     }
     const Error& error = tried.error();
-    lost_ = lost_ || error.code != Errc::no_answer || ++silences_ >= silences_allowed;
+    lost_ = lost_ || !link::is_lost_answer(error) || ++silences_ >= silences_allowed;
     const TimePoint next = calm_->now() + pause;
     if (next > deadline || !calm_->sleep_until(next)) {
       return {.write = *attempt.write, .found = attempt.found, .trouble = message_of(error)};

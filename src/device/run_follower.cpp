@@ -60,8 +60,7 @@ Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
 
 /// An answer that is not there, or not whole, when the time is over.
 bool RunFollower::is_cut_short(const Error& error, TimePoint deadline) const {
-  const bool unanswered = error.code == Errc::no_answer || error.code == Errc::incomplete_answer;
-  return unanswered && clock_->now() >= deadline;
+  return link::is_lost_answer(error) && clock_->now() >= deadline;
 }
 
 /// Listens for a while, then looks; empty while the run goes on.

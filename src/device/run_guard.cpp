@@ -141,7 +141,7 @@ Duration RunGuard::patience_of(unsigned attempt) const {
 /// A refusal says that the line works, and one lost answer does not say that it is gone.
 void RunGuard::judge_line(const Error& error) {
   if (error.code == Errc::exception_response) return;
-  const bool silent = error.code == Errc::no_answer && ++silences_ < silences_allowed;
+  const bool silent = link::is_lost_answer(error) && ++silences_ < silences_allowed;
   if (!silent) line_ = Line::lost;
 }
 

@@ -69,7 +69,7 @@ Duration with_margin(Duration period) { return period - period / 10; }
 template <typename Ask>
 Result<void> ask_twice(Ask ask) {
   Result<void> answered = ask();
-  if (!answered && answered.error().code == Errc::no_answer) answered = ask();
+  if (!answered && link::is_lost_answer(answered.error())) answered = ask();
   return answered;
 }
 

@@ -127,12 +127,6 @@ Error exception_error(const modbus::Pdu& request, std::uint8_t code) {
           .exception = code};
 }
 
-/// Whether it is worth asking again: the answer was lost, or what came of it was damaged.
-bool is_lost(const Error& error) {
-  return error.code == Errc::no_answer || error.code == Errc::incomplete_answer ||
-         error.code == Errc::malformed_answer || error.code == Errc::bad_checksum;
-}
-
 bool is_missing_register(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
@@ -144,6 +138,11 @@ std::size_t count_pieces(const std::vector<PlannedRead>& plan) {
 }
 
 }  // namespace
+
+bool is_lost_answer(const Error& error) {
+  return error.code == Errc::no_answer || error.code == Errc::incomplete_answer ||
+         error.code == Errc::malformed_answer || error.code == Errc::bad_checksum;
+}
 
 std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
                                     const ReadLimits& limits,
@@ -217,7 +216,7 @@ Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries,
                                 const std::vector<OtherRead>& others) {
   auto response = session_->transact(request, others);
   for (unsigned retry = 0;
-       retry < retries && !response && is_lost(response.error()) && !session_->is_out_of_step();
+       retry < retries && !response && is_lost_answer(response.error()) && !session_->is_out_of_step();
        ++retry) {
     session_->tell_retry(request);
     response = session_->transact(request, others);

@@ -73,7 +73,9 @@ Result<std::size_t> ReopeningTransport::receive(std::span<std::uint8_t> into, Ti
     auto taken = take(deadline);
     if (taken && *taken == 0) return hand_over(into, held_.size());
     if (taken) continue;
-    if (!is_closed(taken.error())) return taken;
+    // A look at what is there already waits for no answer, so there is nothing to ask for again.
+    const bool is_awaited = clock_->now() < deadline;
+    if (!is_closed(taken.error()) || !is_awaited) return taken;
     if (auto asked = ask_again(std::move(taken.error()), deadline); !asked) {
       return tl::unexpected(std::move(asked.error()));
     }

@@ -26,6 +26,10 @@ enum class Neighbours : std::uint8_t {
   anywhere,
 };
 
+/// Whether it is worth asking again on the same line: the answer was lost, or what came of it was
+/// damaged.
+bool is_lost_answer(const Error& error);
+
 /// What a server allows, from the profile.
 struct ReadLimits {
   std::uint16_t max_read = modbus::max_read_count;
