@@ -215,8 +215,8 @@ Client::Client(Session& session, ReadLimits limits, unsigned retries)
 Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries,
                                 const std::vector<OtherRead>& others) {
   auto response = session_->transact(request, others);
-  for (unsigned retry = 0;
-       retry < retries && !response && is_lost_answer(response.error()) && !session_->is_out_of_step();
+  for (unsigned retry = 0; retry < retries && !response && is_lost_answer(response.error()) &&
+                           !session_->is_out_of_step();
        ++retry) {
     session_->tell_retry(request);
     response = session_->transact(request, others);
