@@ -98,6 +98,31 @@ std::size_t part_distance(std::string_view word, std::string_view candidate) {
   return nearest;
 }
 
+std::string digits_of(std::string_view text) {
+  std::string digits;
+  std::copy_if(text.begin(), text.end(), std::back_inserter(digits),
+               [](char c) { return c >= '0' && c <= '9'; });
+  return digits;
+}
+
+/// A name with other numbers is another thing, not another spelling.
+bool names_another(std::string_view word, std::string_view candidate) {
+  const std::string typed = digits_of(word);
+  const std::string known = digits_of(candidate);
+  return !typed.empty() && !known.empty() && typed != known;
+}
+
+/// Sorted, so that swapped ones are the same.
+std::string letters_of(std::string_view text) {
+  std::string letters;
+  for (const char c : text) {
+    if (c >= 'A' && c <= 'Z') letters += static_cast<char>(c - 'A' + 'a');
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) letters += c;
+  }
+  std::sort(letters.begin(), letters.end());
+  return letters;
+}
+
 /// The first of the nearest candidates that is near enough. What both names share up to a dot says
 /// nothing about how near the rest is.
 template <typename Distance>
@@ -106,6 +131,7 @@ const std::string* nearest_by(std::string_view word, const std::vector<std::stri
   const std::string* nearest = nullptr;
   std::size_t best = word.size();
   for (const std::string& candidate : candidates) {
+    if (names_another(word, candidate)) continue;
     const std::size_t head = shared_head(word, candidate);
     const std::string_view rest = word.substr(head);
     const std::size_t far = distance_of(rest, std::string_view(candidate).substr(head));
@@ -156,6 +182,14 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& ca
   return nearest ? "did you mean '" + *nearest + "'?" : std::string{};
 }
 
+std::string same_word(std::string_view word, const std::vector<std::string>& candidates) {
+  const std::string letters = letters_of(word);
+  for (const std::string& candidate : candidates) {
+    if (letters_of(candidate) == letters) return "did you mean '" + candidate + "'?";
+  }
+  return {};
+}
+
 std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t maximum) {
   const bool hexadecimal = text.starts_with("0x");
   if (hexadecimal) text.remove_prefix(2);
@@ -180,6 +214,10 @@ std::string shell_word(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   return quoted + "'";
+}
+
+std::string shown_command(const std::string& command) {
+  return command.find('\'') == std::string::npos ? "'" + command + "'" : command;
 }
 
 std::vector<std::string_view> split(std::string_view text, char separator) {

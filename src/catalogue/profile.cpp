@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/document_number.hpp"
 
 namespace spindle::catalogue {
 namespace {
@@ -65,6 +66,8 @@ std::string hint_for(const Profile& profile, std::string_view name) {
     return fmt::format("numbers go from {0}{1} to {0}{2}", profile.numbered->prefix,
                        profile.numbered->from, profile.numbered->to);
   }
+  if (std::string hint = hint_for_document_number(name); !hint.empty()) return hint;
+  if (all_digits(name)) return fmt::format("a raw register is written @holding:{}", name);
   return suggestion(name, names_of(profile.parameters));
 }
 
@@ -134,6 +137,9 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
 }
 
 Error bad_raw_register(std::string_view text) {
+  if (std::string hint = hint_for_document_number(text); !hint.empty()) {
+    return unknown(text, "not a raw register", std::move(hint));
+  }
   return unknown(text, "not a raw register",
                  "write @holding:2 or @input:3204/i16, with u16, i16, u32 or i32 behind the slash");
 }

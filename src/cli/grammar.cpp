@@ -502,7 +502,8 @@ Result<std::vector<modbus::UnitId>> to_units(const std::string& text) {
 std::string scan_words() {
   return "The line is asked at the rate and parity of the target or profile, and at no others: a\n"
          "driver that hears three bad frames in a row stops its motor, and every frame at a wrong\n"
-         "rate is bad. A wrong unit costs one --timeout; nothing is asked twice.\n";
+         "rate is bad. A wrong unit costs one --timeout; nothing is asked twice. Behind a gateway\n"
+         "(tcp://) a unit that the gateway can not reach counts as absent.\n";
 }
 
 Result<Outcome> run_scan(TypedScan scan, Context& context) {
@@ -515,10 +516,11 @@ Result<Outcome> run_scan(TypedScan scan, Context& context) {
 
 void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {"scan", "BUS [--units 1-31]",
-                           "which units answer on a serial line, at the given settings",
+                           "which units answer on a serial line or behind a gateway",
                            "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
                            "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
-                           "spindle scan rtu+tcp://192.168.10.30:4001 --json",
+                           "spindle scan rtu+tcp://192.168.10.30:4001 --json\n"
+                           "spindle scan tcp://192.168.10.31 --units 1-5",
                            scan_words};
   add_command(app, draft, words, typed.scan, run_scan, [&typed](CLI::App* command) {
     command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");

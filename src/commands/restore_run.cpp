@@ -30,13 +30,16 @@ Error about(const Parameter& parameter, std::string message) {
           .register_address = parameter.address.value};
 }
 
-/// What can be typed to restore a file, all of it without patterns.
-std::string command_for(const Target& target, const std::string& file,
+/// What can be typed to restore a file, all of it without patterns, as it stands in a message.
+std::string command_for(const Target& target, const Context& context, const std::string& file,
                         const std::vector<std::string>& patterns = {}) {
   std::string command =
       fmt::format("spindle restore {} {}", shell_word(target.shown), shell_word(file));
   for (const std::string& pattern : patterns) command += " " + shell_word(pattern);
-  return command;
+  if (!context.common.profile.empty()) {
+    command += " --profile " + shell_word(context.common.profile);
+  }
+  return shown_command(command);
 }
 
 /// What the tool should hold after the restore: what it held before, with the plan laid over it.
@@ -171,7 +174,7 @@ void RestoreRun::compare_everything() {
                         fmt::format("holds {} after the restore, not {}: writing another "
                                     "parameter changed it",
                                     said(difference.b), said(difference.a)));
-    error.hint = fmt::format("'{}' writes what is left; what the tool held before is in {}",
+    error.hint = fmt::format("{} writes what is left; what the tool held before is in {}",
                              command_to_finish(), saved_);
     fail(tool_->target.blamed(error));
   }
@@ -226,8 +229,8 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
   Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
                                              before.to_string(), holds, report.trouble));
   if (report.result == PutBack::unknown) error.code = Errc::no_answer;
-  error.hint = fmt::format("'{}' puts everything back, '{}' finishes the restore",
-                           command_for(tool_->target, saved_), command_to_finish());
+  error.hint = fmt::format("{} puts everything back, {} finishes the restore",
+                           command_for(tool_->target, *context_, saved_), command_to_finish());
   fail(tool_->target.blamed(error));
 }
 
@@ -251,7 +254,8 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
     Error error = about(parameters[index],
                         fmt::format("holds {} after everything was put back, but held {} before",
                                     value->to_string(), before.to_string()));
-    error.hint = fmt::format("'{}' puts everything back", command_for(tool_->target, saved_));
+    error.hint =
+        fmt::format("{} puts everything back", command_for(tool_->target, *context_, saved_));
     fail(tool_->target.blamed(error));
   }
 }
@@ -267,7 +271,7 @@ void RestoreRun::fail(const Error& error) {
 }
 
 std::string RestoreRun::command_to_finish() const {
-  return command_for(tool_->target, options_->file, options_->patterns);
+  return command_for(tool_->target, *context_, options_->file, options_->patterns);
 }
 
 /// What was written and is not put back, because nobody wants it so.
@@ -278,7 +282,7 @@ void RestoreRun::tell_what_stays() {
   Error error = tool_->target.blamed(
       {.code = errors_.front().code,
        .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)});
-  error.hint = fmt::format("'{}' writes the rest", command_to_finish());
+  error.hint = fmt::format("{} writes the rest", command_to_finish());
   errors_.push_back(error);
 }
 

@@ -23,10 +23,6 @@ Result<Target> resolve_bus(const ScanOptions& options, const Context& context) {
     return tl::unexpected(
         bus->blamed({.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)}));
   };
-  if (bus->endpoint.medium == link::Medium::tcp) {
-    return refuse("there are no units to scan for behind Modbus TCP",
-                  "a bus is rtu:///dev/ttyUSB0 or rtu+tcp://HOST:PORT");
-  }
   if (bus->endpoint.unit && bus->shown == bus->endpoint.text) {
     return refuse("scan asks many units, and the target names one",
                   "leave unit out of the target; --units says which are asked");
@@ -60,6 +56,13 @@ report::Record unit_record(modbus::UnitId unit, const device::Probe& probe, cons
 /// Nothing came, or only what this side's own adapter said.
 bool is_silence(const Error& error) {
   return error.code == Errc::no_answer || error.code == Errc::local_echo;
+}
+
+/// A gateway says for a unit that it can not reach it.
+bool is_absence(const device::Probe& probe) {
+  using enum modbus::ExceptionCode;
+  return probe.exception == static_cast<std::uint8_t>(gateway_path_unavailable) ||
+         probe.exception == static_cast<std::uint8_t>(gateway_target_failed_to_respond);
 }
 
 /// Somebody speaks where one unit should, and can not be understood: two units of one address, a
@@ -96,6 +99,7 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
                       .total = options.units.size(),
                       .more = fmt::format("{} found", outcome.succeeded())});
     const auto probe = tool->device.probe(unit);
+    if (probe && is_absence(*probe)) continue;
     if (probe) {
       outcome.succeed();
       listing.add(unit_record(unit, *probe, *bus, context.clock));
@@ -106,6 +110,12 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
     }
   }
   if (outcome.succeeded() == 0) outcome.negate();
+  const bool one_for_all = bus->endpoint.medium == link::Medium::tcp && asked > 1 &&
+                           outcome.succeeded() == static_cast<std::size_t>(asked);
+  if (one_for_all) {
+    context.renderer.note(
+        "every unit that was asked answers: this may be one tool that does not look at the unit");
+  }
   return finish(listing, outcome,
                 {.counts = {{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
                  .sentence = fmt::format("{} asked, {} found", asked, outcome.succeeded()),

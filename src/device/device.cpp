@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "device/hints.hpp"
 #include "spindle/device/motor.hpp"
 #include "spindle/link/serial_settings.hpp"
 
@@ -20,11 +21,6 @@ constexpr int max_event_reads = 5;
 
 /// How often the status is read while the tool works by itself.
 constexpr Duration busy_interval = std::chrono::milliseconds(50);
-
-/// What keeps a serial line silent is not what keeps a network silent.
-constexpr std::string_view silent_line_hint =
-    "check power, unit address, wiring and termination, and that rate, parity and stop bits are "
-    "those of the device";
 
 using catalogue::Area;
 using catalogue::Parameter;
@@ -282,6 +278,7 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
                const LinkOptions& options, std::unique_ptr<link::Session> session)
     : target_(target_of(endpoint, options)),
       endpoint_(endpoint_beside(endpoint, options)),
+      at_(endpoint),
       profile_(&profile),
       session_(std::move(session)),
       retries_(options.retries.value_or(profile.link.retries)),
@@ -318,9 +315,13 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
 
 Error Device::located(Error error) const {
   error = with_exception_text(std::move(error));
-  const bool serial = session_->options().rules.framing == modbus::Framing::rtu;
-  const bool silent = error.code == Errc::no_answer && error.hint.empty();
-  if (serial && silent) error.hint = silent_line_hint;
+  const Asked asked{.endpoint = at_,
+                    .profile = *profile_,
+                    .unit = session_->options().unit,
+                    .answered_before = session_->last_round_trip() > Duration::zero()};
+  for (std::string hint : {hint_for_silence(error, asked), hint_for_absent_register(error)}) {
+    if (!hint.empty()) error.hint = std::move(hint);
+  }
   error.target = target_;
   error.endpoint = endpoint_;
   return error;
@@ -913,8 +914,9 @@ Result<Probe> Device::probe(modbus::UnitId unit) {
   session_->set_unit(unit);
   auto response = session_->transact(modbus::loopback_request(session_->fresh_word()));
   if (!response) return tl::unexpected(located(std::move(response.error())));
-  const bool refused = (response->function & modbus::exception_bit) != 0;
-  return Probe{refused ? Answered::exception : Answered::data, session_->last_round_trip()};
+  const auto exception = modbus::exception_of(*response);
+  return Probe{exception ? Answered::exception : Answered::data, session_->last_round_trip(),
+               exception};
 }
 
 }  // namespace spindle::device

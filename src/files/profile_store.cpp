@@ -239,7 +239,8 @@ struct OpenChain {
   [[nodiscard]] Result<void> check() const {
     if (findings.empty()) return {};
     Error error = findings.error();
-    error.hint = fmt::format("'spindle profile check {}' lists every fault", path);
+    error.hint = fmt::format("{} lists every fault",
+                             shown_command("spindle profile check " + shell_word(path)));
     return tl::unexpected(std::move(error));
   }
 };

@@ -94,7 +94,9 @@ std::optional<std::int64_t> parse_integer(std::string_view text) {
 
 std::string unknown_word(std::string_view what, std::string_view text,
                          const std::vector<std::string>& words) {
-  const std::string hint = suggestion(text, words);
+  // Another encoding or unit is another number, so only a spelling is mended.
+  const bool exact = what == "encoding" || what.ends_with("unit");
+  const std::string hint = exact ? same_word(text, words) : suggestion(text, words);
   if (!hint.empty()) return fmt::format("unknown {} '{}'; {}", what, text, hint);
   return fmt::format("unknown {} '{}'; known: {}", what, text, fmt::join(words, ", "));
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::link {
@@ -110,6 +111,29 @@ std::size_t whole_answer_size(const modbus::Pdu& request, ByteView begun) {
   return two_words;
 }
 
+using modbus::Framing;
+
+/// When what came is whole frames of the other framing: the target names the wrong one.
+/// An echo of an RTU request can look like a frame of Modbus TCP, but not like an answer to it.
+std::optional<Error> foreign_framing(Framing framing, ByteView heard,
+                                     std::optional<std::uint8_t> function = std::nullopt) {
+  const Framing other = framing == Framing::tcp ? Framing::rtu : Framing::tcp;
+  const auto found = modbus::deframe(other, modbus::Role::client, heard);
+  const auto* frame = std::get_if<modbus::Deframed>(&found);
+  if (frame == nullptr || frame->skipped > 0) return std::nullopt;
+  const unsigned exception = modbus::exception_bit;
+  const unsigned answered = frame->adu.pdu.function & ~exception;
+  if (function && answered != *function) return std::nullopt;
+  constexpr std::size_t protocol_at = 2;
+  if (other == Framing::tcp && get_u16(heard, protocol_at) != 0) return std::nullopt;
+  const bool rtu = other == Framing::rtu;
+  return Error{.code = Errc::malformed_answer,
+               .message = rtu ? "what came are RTU frames, not Modbus TCP"
+                              : "what came are frames of Modbus TCP, not RTU",
+               .hint = rtu ? "write the target as rtu+tcp://HOST:PORT"
+                           : "write the target as tcp://HOST:PORT"};
+}
+
 }  // namespace
 
 struct Session::Outstanding {
@@ -120,7 +144,10 @@ struct Session::Outstanding {
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
   std::optional<modbus::UnitId> other_unit = std::nullopt;  ///< that answered with our id
-  std::size_t echoes = 0;  ///< copies of the request that came back
+  std::size_t events = 0;     ///< frames that the tool sent unasked meanwhile
+  std::size_t strangers = 0;  ///< whole frames that answer nothing of ours
+  std::string stranger = {};  ///< the last of them
+  std::size_t echoes = 0;     ///< copies of the request that came back
 };
 
 Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -533,6 +560,7 @@ Result<std::optional<Spontaneous>> Session::next_spontaneous(TimePoint deadline)
 Result<void> Session::send(const modbus::Adu& adu, ByteView bytes) {
   ++counters_.requests;
   sent_.assign(bytes.begin(), bytes.end());
+  came_.clear();
   if (trace_.bytes) trace_.bytes(Direction::sent, bytes);
   decide(Decision::request, adu);
   const TimePoint began = clock_->now();
@@ -585,6 +613,7 @@ Result<bool> Session::fill(TimePoint deadline) {
   if (*count == 0) return false;
   const ByteView bytes = ByteView(chunk).first(*count);
   if (trace_.bytes) trace_.bytes(Direction::received, bytes);
+  if (came_.size() < modbus::max_adu_size) came_.insert(came_.end(), bytes.begin(), bytes.end());
   last_activity_ = std::max(last_activity_, clock_->now());
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
   return true;
@@ -608,6 +637,7 @@ Result<std::optional<modbus::Adu>> Session::take_frame(const Outstanding* outsta
       // Left in the buffer: every later attempt on this connection fails alike, until it is
       // reopened.
       out_of_step_ = true;
+      if (auto foreign = foreign_framing(Framing::tcp, came_)) return tl::unexpected(*foreign);
       return tl::unexpected(
           Error{.code = Errc::malformed_answer,
                 .message = fmt::format("what came is not Modbus TCP: {}", junk.reason),
@@ -668,6 +698,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       return;
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
+      if (outstanding != nullptr) ++outstanding->events;
       keep(received.pdu);
       return;
     case Verdict::broken:
@@ -683,6 +714,10 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
     case Verdict::stray:
       decide(is_late(received) ? Decision::late : Decision::stray, received);
       ++counters_.strays;
+      if (outstanding != nullptr) {
+        ++outstanding->strangers;
+        outstanding->stranger = describe_frame(received);
+      }
       return doubt_because_of(received);
   }
 }
@@ -848,9 +883,11 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
         fmt::format("if that is the tool, ask for it with ?unit={}", outstanding.other_unit->value);
     return error;
   }
+  const std::uint8_t function = outstanding.request.pdu.function;
+  if (auto foreign = foreign_framing(options_.rules.framing, came_, function)) return *foreign;
   if (!begins_answer(outstanding)) {
     if (outstanding.echoes > 0) error.code = Errc::local_echo;
-    return error;
+    return with_evidence(std::move(error), outstanding);
   }
   error.code = Errc::incomplete_answer;
   error.message = fmt::format("only part of an answer to '{}' came ({})", tried, to_hex(buffer_));
@@ -858,6 +895,26 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
     error.code = Errc::bad_checksum;
     error.message =
         fmt::format("no answer to '{}' with a right checksum ({})", tried, to_hex(buffer_));
+  }
+  return error;
+}
+
+/// Somebody speaks, so nothing is asleep.
+Error Session::with_evidence(Error error, const Outstanding& outstanding) const {
+  const std::string begin =
+      fmt::format("no answer to '{}' within {}", error.tried, to_text(options_.answer_timeout));
+  if (outstanding.strangers > 0) {
+    error.message = fmt::format(
+        "{}, but {} that {} it (the last: {})", begin, counted(outstanding.strangers, "frame"),
+        outstanding.strangers == 1 ? "does not answer" : "do not answer", outstanding.stranger);
+    error.hint = is_rtu()
+                     ? "is another master on the line, or does another unit answer? --verbose "
+                       "shows every frame"
+                     : "does another unit answer, or one too late? --verbose shows every frame";
+  } else if (outstanding.events > 0) {
+    error.message =
+        fmt::format("{}, but {} meanwhile", begin, counted(outstanding.events, "event"));
+    error.hint = "the tool is awake: try again, or with a longer --timeout";
   }
   return error;
 }

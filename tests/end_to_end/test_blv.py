@@ -97,6 +97,9 @@ class Bus:
     def unit(self, number):
         return re.sub(r"unit=\d+", f"unit={number}", self.url)
 
+    def told(self):
+        return self._log.read_text()
+
     def requests(self):
         """Whole requests in order, without their checksums."""
         found = re.findall(r" -> ([0-9A-Fa-f ]+)$", self._log.read_text(), re.MULTILINE)

@@ -173,7 +173,7 @@ TEST_CASE("several faults are all reported, in the order of the file") {
                      "7:5: key 'access' is missing",
                      "7:5: key 'evidence' is missing",
                      "7:5: key 'source' is missing",
-                     "7:38: unknown encoding 'u17'; did you mean 'u16'?",
+                     "7:38: unknown encoding 'u17'; known: u16, i16, u32, i32",
                  });
   const auto profile = shipped().load(path);
   REQUIRE_FALSE(profile.has_value());
@@ -219,7 +219,7 @@ TEST_CASE("rules are checked too where other entries could not be read, and find
         std::vector<std::string>{
             "2:5: id 'other' differs from the file name 'many'",
             "4:32: max-read must be 1 to 125",
-            "6:38: unknown encoding 'u17'; did you mean 'u16'?",
+            "6:38: unknown encoding 'u17'; known: u16, i16, u32, i32",
             "8:25: c shares register 1 with b; write 'overlaps: true' if this is meant",
             "9:5: key 'register' is missing",
             "13:92: 'x' is no parameter of this profile; did you mean 'b'?",

@@ -1373,3 +1373,44 @@ TEST_CASE("tcp: half a pushed frame is no part of an answer") {
     CHECK(line.events() == std::vector<std::uint16_t>{1962});
   }
 }
+
+// ---- what came and was no answer ----
+
+TEST_CASE("session: frames that came and did not fit are told, and nothing is called asleep") {
+  Line line(rtu());
+  line.script.on_request(say(20ms, rtu_frame(2, holding({7, 8}))));
+  const auto response = line.session.transact(read_two);
+  REQUIRE_FALSE(response);
+  CHECK(response.error().code == Errc::no_answer);
+  CHECK(message_of(response.error()).find("1 frame that does not answer it (the last: unit 2") !=
+        std::string::npos);
+  CHECK(hint_of(response.error()).find("asleep") == std::string::npos);
+
+  Line awake(tcp());
+  awake.script.on_request(say(20ms, event_frame(1, 1962)));
+  const auto missed = awake.session.transact(read_two);
+  REQUIRE_FALSE(missed);
+  CHECK(message_of(missed.error()).find("but 1 event meanwhile") != std::string::npos);
+  CHECK(hint_of(missed.error()).find("awake") != std::string::npos);
+
+  Line silent(tcp());
+  const auto nothing = silent.session.transact(read_two);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().message.empty());
+}
+
+TEST_CASE("session: frames of the other framing name the target that fits") {
+  Line line(tcp());
+  line.script.on_request(say(20ms, rtu_frame(1, two_values)));
+  const auto response = line.session.transact(read_two);
+  REQUIRE_FALSE(response);
+  CHECK(response.error().code == Errc::malformed_answer);
+  CHECK(hint_of(response.error()).find("rtu+tcp://HOST:PORT") != std::string::npos);
+
+  Line other(rtu());
+  other.script.on_request(say(20ms, modbus::frame(Framing::tcp, {{0x0103}, {1}, two_values})));
+  const auto foreign = other.session.transact(read_two);
+  REQUIRE_FALSE(foreign);
+  CHECK(foreign.error().code == Errc::malformed_answer);
+  CHECK(hint_of(foreign.error()).find("as tcp://HOST:PORT") != std::string::npos);
+}

@@ -109,6 +109,31 @@ TEST_CASE("a misspelt dotted name is compared behind the head that both share") 
   CHECK_FALSE(closest("preset.1.wxyz", names));
 }
 
+TEST_CASE("a name with other numbers is another thing, and is not proposed") {
+  CHECK_FALSE(closest("operation.8.speed", {"operation.0.speed", "operation.7.speed"}));
+  CHECK_FALSE(closest("conveyor3", {"conveyor1", "conveyor2"}));
+  CHECK_FALSE(closest("u15", {"u16", "i16"}));
+  CHECK_FALSE(closest("4-wire", {"2-wire", "3-wire"}));
+  CHECK(closest("staton1", {"station1"}) == "station1");
+  CHECK(closest("preset.1.sped", {"preset.2.speed", "preset.1.speed"}) == "preset.1.speed");
+}
+
+TEST_CASE("where nearly the same word means something else, only its spelling is mended") {
+  const std::vector<std::string> units = {"N.m", "kgf.cm", "lbf.in"};
+  CHECK(same_word("Nm", units) == "did you mean 'N.m'?");
+  CHECK(same_word("KGF-CM", units) == "did you mean 'kgf.cm'?");
+  for (const char* other : {"cN.m", "kgf.m", "lbf.ft", ""}) CHECK(same_word(other, units).empty());
+  CHECK(same_word("U16", {"i16", "u16"}) == "did you mean 'u16'?");
+  CHECK(same_word("rmp", {"rpm"}) == "did you mean 'rpm'?");
+  CHECK(same_word("f32", {"i32", "u32"}).empty());
+}
+
+TEST_CASE("a command in a message can be pasted: it has one level of quotes") {
+  CHECK(shown_command("spindle restore station1 a.yaml") == "'spindle restore station1 a.yaml'");
+  CHECK(shown_command("spindle restore " + shell_word("tcp://h?unit=1") + " a.yaml") ==
+        "spindle restore 'tcp://h?unit=1' a.yaml");
+}
+
 TEST_CASE("unsigned numbers are read completely or not at all") {
   struct Case {
     std::string_view text;

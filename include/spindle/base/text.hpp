@@ -19,12 +19,20 @@ bool is_pattern(std::string_view text);
 /// The candidate nearest to a misspelt word by Damerau-Levenshtein distance, when it is near enough
 /// to be worth suggesting: at most a third of the word's length (at least 1), counted behind the
 /// dotted head that both share. Failing that, one with a hyphenated part as near. The first of
-/// equals.
+/// equals. One with other numbers is another thing and is never meant.
 std::optional<std::string> closest(std::string_view word,
                                    const std::vector<std::string>& candidates);
 
 /// ", did you mean 'x'?"-style hint for errors: "did you mean 'x'?" or an empty string.
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
+
+/// The hint of suggestion(), but only for the same letters and digits in another order or case, or
+/// with other signs between them: where a word that is nearly the same means something else, as
+/// with units.
+std::string same_word(std::string_view word, const std::vector<std::string>& candidates);
+
+/// The command line as it stands in a message: in quotes, unless it has some itself.
+std::string shown_command(const std::string& command);
 
 /// Reads decimal digits, or hexadecimal ones behind "0x", completely. Empty when anything else is
 /// there or the number is above `maximum`. A leading zero ("010") is decimal ten, never octal.

@@ -109,6 +109,7 @@ enum class Answered : std::uint8_t { data, exception };
 struct Probe {
   Answered answered;
   Duration round_trip;
+  std::optional<std::uint8_t> exception = std::nullopt;  ///< its code
 };
 
 enum class EventOutput : std::uint8_t { on, off };
@@ -266,6 +267,7 @@ class Device {
 
   std::string target_;
   std::string endpoint_;  ///< empty: the target says it
+  link::Endpoint at_;
   const catalogue::Profile* profile_;
   std::unique_ptr<link::Session> session_;
   unsigned retries_;

@@ -204,6 +204,7 @@ class Session {
   [[nodiscard]] bool begins_answer(const Outstanding& outstanding) const;
   Error timeout_error(const Outstanding& outstanding) const;
   void note_noise(ByteView bytes);
+  Error with_evidence(Error error, const Outstanding& outstanding) const;
   void decide(Decision decision, const modbus::Adu& adu) const;
   void decide(Decision decision, std::string_view text) const;
   [[nodiscard]] std::string describe_address(const modbus::Adu& adu) const;
@@ -215,6 +216,7 @@ class Session {
   Trace trace_;
   SessionCounters counters_ = {};
   Bytes buffer_ = {};
+  Bytes came_ = {};  ///< since the last request, the beginning of it as it came
   std::deque<Spontaneous> queue_ = {};
   std::function<void(const Spontaneous&)> hear_ = {};
   std::uint16_t next_transaction_;
