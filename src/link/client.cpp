@@ -319,16 +319,12 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
     if (registers.error().code != Errc::exception_response) {
       return tl::unexpected(std::move(registers.error()));
     }
-    if (!is_missing_register(registers.error()) || part.wanted.size() == 1) {
+    // A hole that is refused is as the profile says.
+    const bool is_final = !is_missing_register(registers.error()) || part.wanted.size() == 1 ||
+                          !holes_of(part.range, limits_).empty();
+    if (is_final) {
       remember(part, registers.error(), image);
       settled(part);
-      continue;
-    }
-    if (!holes_of(part.range, limits_).empty()) {
-      // It is as was said, but some of them may be there all the same: each is asked for alone.
-      for (const RegisterRange& range : part.wanted) {
-        if (auto read = read_or_bisect({range, {range}}, image, settled); !read) return read;
-      }
       continue;
     }
     const auto [head, tail] = split_at(part, part.wanted.size() / 2);

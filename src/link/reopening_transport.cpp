@@ -16,6 +16,9 @@ constexpr std::size_t function_at = 7;
 constexpr std::size_t longest_rest = 254;
 constexpr std::size_t chunk_size = 512;
 
+/// A tool that never falls silent must not keep a request from being sent.
+constexpr int most_looks = 100;
+
 bool is_closed(const Error& error) {
   return error.code == Errc::closed || error.code == Errc::reset;
 }
@@ -46,7 +49,8 @@ ReopeningTransport::ReopeningTransport(std::unique_ptr<Transport> transport, Ope
 /// What has arrived is looked at first: where that is the end of the connection, the request can
 /// not have been sent on it.
 Result<void> ReopeningTransport::send(ByteView bytes, TimePoint deadline) {
-  while (true) {
+  asked_again_ = false;
+  for (int looks = 0; looks < most_looks; ++looks) {
     auto taken = take(clock_->now());
     if (taken && *taken > 0) continue;
     if (taken) break;
@@ -118,7 +122,8 @@ Result<void> ReopeningTransport::reopen(Error why) {
 }
 
 Result<void> ReopeningTransport::ask_again(Error why, TimePoint deadline) {
-  if (!changes_nothing(request_)) return tl::unexpected(std::move(why));
+  const bool again = std::exchange(asked_again_, true);
+  if (again || !changes_nothing(request_)) return tl::unexpected(std::move(why));
   return reopen(std::move(why)).and_then([&] { return transport_->send(request_, deadline); });
 }
 

@@ -36,9 +36,9 @@ struct ReadLimits {
   /// Areas in which registers that nobody asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
   Neighbours neighbours = Neighbours::contiguous;
-  /// Areas that are said not to exist. What is wanted there shares a request with nothing else, so
-  /// that no other answer is spoilt; where it is refused, each register is asked for alone, so that
-  /// a wrong saying loses nothing.
+  /// Areas that are said not to exist. What is wanted there shares a request with nothing but its
+  /// own hole, so that no other answer is spoilt. A hole that is answered is there all the same;
+  /// one that is refused with exception 02 is taken to be as was said.
   std::vector<RegisterRange> absent = {};
   /// Reads whose answers would look like a spontaneous frame; never issued.
   std::vector<RegisterRange> forbidden_shapes = {};  // table and count; `first` is ignored

@@ -12,7 +12,7 @@ namespace spindle::link {
 enum class Reopening : std::uint8_t { never, once };
 
 /// Modbus TCP to a server that hangs up, as some do behind every answer. A closed connection is
-/// opened anew, and what was asked is sent again: a read whenever its answer did not come whole;
+/// opened anew, and what was asked is sent again: a read whose answer did not come whole, once;
 /// anything else only where the connection was closed before it was sent, so that nothing is done
 /// twice. What changes something therefore gets a new connection, once the server was seen to hang
 /// up behind an answer. Gives up where the connection before brought nothing either; then the error
@@ -44,6 +44,7 @@ class ReopeningTransport final : public Transport {
   Bytes held_ = {};               ///< received, and not handed over: the last frame may be in part
   bool brought_nothing_ = false;  ///< this connection, which was opened anew
   bool hangs_up_ = false;         ///< the server has closed a connection behind an answer
+  bool asked_again_ = false;      ///< the last request
   bool shielded_ = false;
 };
 
