@@ -1232,7 +1232,13 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
-  if (!names_tools(*draft.chosen)) invocation.tools_use = Invocation::ToolsFile::only_found;
+  // One that the user names is read all the same, so that a wrong name is told; but no stop waits
+  // for it.
+  const bool told =
+      !draft.typed.tools.empty() && invocation.tools_use != Invocation::ToolsFile::salvaged;
+  if (!told && !names_tools(*draft.chosen)) {
+    invocation.tools_use = Invocation::ToolsFile::only_found;
+  }
   invocation.run = std::move(draft.run);
   return invocation;
 }

@@ -215,11 +215,17 @@ Client::Client(Session& session, ReadLimits limits, unsigned retries)
 Result<modbus::Pdu> Client::ask(const modbus::Pdu& request, unsigned retries,
                                 const std::vector<OtherRead>& others) {
   auto response = session_->transact(request, others);
+  std::optional<Error> damaged;
   for (unsigned retry = 0; retry < retries && !response && is_lost_answer(response.error()) &&
                            !session_->is_out_of_step();
        ++retry) {
+    if (response.error().code != Errc::no_answer) damaged = response.error();
     session_->tell_retry(request);
     response = session_->transact(request, others);
+  }
+  // What came once says more than that nothing came afterwards.
+  if (!response && damaged && response.error().code == Errc::no_answer) {
+    return tl::unexpected(std::move(*damaged));
   }
   if (!response) return response;
   if (const auto code = modbus::exception_of(*response)) {

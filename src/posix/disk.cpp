@@ -217,16 +217,25 @@ bool is_cut_off(const Descriptor& file) {
   return ends_within_line(file.number());
 }
 
-Result<void> append_line(const std::string& path, std::string_view text) {
+Result<void> append(const std::string& path, std::string_view text,
+                    bool (*begins_new_line)(const Descriptor& file)) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, usual_file));
   if (!file.valid()) return tl::unexpected(unwritable(path, errno));
   lock_for_a_while(file);
-  std::string line(text);
-  if (is_cut_off(file)) line.insert(line.begin(), '\n');
-  const int code = write_whole(file.number(), line, WhenFull::fail);
+  std::string added(text);
+  if (begins_new_line(file)) added.insert(added.begin(), '\n');
+  const int code = write_whole(file.number(), added, WhenFull::fail);
   if (code != 0) return tl::unexpected(unwritable(path, code));
   return {};
+}
+
+Result<void> append_line(const std::string& path, std::string_view line) {
+  return append(path, line, is_cut_off);
+}
+
+Result<void> append_bytes(const std::string& path, std::string_view bytes) {
+  return append(path, bytes, [](const Descriptor&) { return false; });
 }
 
 Result<void> make_folders(const std::string& folder, Privacy privacy) {
@@ -273,7 +282,8 @@ Disk local_disk(std::string_view trusted) {
       .absent = file_is_absent,
       .read = read_file,
       .write = write_file,
-      .append = append_line,
+      .append_line = append_line,
+      .append = append_bytes,
       .make_folders = make_folders,
       .user = user_name,
       .process = [] { return static_cast<std::uint64_t>(::getpid()); },

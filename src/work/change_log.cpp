@@ -57,7 +57,7 @@ Result<void> ChangeLog::append(const std::string& line) {
     if (auto made = disk_->make_folders(folder, Privacy::own); !made) return made;
     folder_made_ = true;
   }
-  return disk_->append(folder + "/changes.jsonl", line);
+  return disk_->append_line(folder + "/changes.jsonl", line);
 }
 
 }  // namespace spindle::work

@@ -56,7 +56,8 @@ def guardians_of(target):
 class KilledTest(unittest.TestCase):
     def assert_guarded(self, pid):
         (guardian,) = children_of(pid)
-        self.assertNotEqual(os.getsid(guardian), os.getsid(pid))
+        own = os.getsid(pid)
+        support.wait_until(lambda: os.getsid(guardian) != own, "the guardian has a session of its own")
         return guardian
 
     def assert_recorded(self, target):

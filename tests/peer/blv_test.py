@@ -187,7 +187,7 @@ class Wireshark(support.PeerTest):
         self.assertEqual({way for way, data in self.segments if data[0] == 0}, {"O"})
         pairs, *stops = [data[1:-2] for data in self.broadcasts]
         self.assertEqual(pairs, bytes.fromhex("10 048A 0002 04 0000 0384"))
-        self.assertEqual(set(stops), {bytes.fromhex("06 007D 0020")})
+        self.assertEqual(set(stops), {bytes.fromhex("06 007D 0000")})
 
     def test_requests_are_what_they_should_be(self):
         self.assertLessEqual({"3", "6", "8", "16"}, {row["function"] for row in self.rows})

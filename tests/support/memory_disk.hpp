@@ -19,10 +19,16 @@ class MemoryDisk {
             .read = [this](const std::string& path) { return read(path); },
             .write = [this](const std::string& path, std::string_view text, Overwrite overwrite,
                             Privacy) { return write(path, text, overwrite); },
-            .append = [this](const std::string& path, std::string_view line) -> Result<void> {
+            .append_line = [this](const std::string& path, std::string_view line) -> Result<void> {
               const std::lock_guard lock(mutex_);
               if (full_) return tl::unexpected(no_room(path));
               files_[plain(path)] += line;
+              return {};
+            },
+            .append = [this](const std::string& path, std::string_view bytes) -> Result<void> {
+              const std::lock_guard lock(mutex_);
+              if (full_) return tl::unexpected(no_room(path));
+              files_[plain(path)] += bytes;
               return {};
             },
             .make_folders = [this](const std::string& folder, Privacy) -> Result<void> {

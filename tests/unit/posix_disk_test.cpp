@@ -157,7 +157,7 @@ TEST_CASE("lines of several threads never mix") {
     for (int i = 0; i < 4; ++i) {
       writers.emplace_back([&] {
         for (int n = 0; n < 50; ++n) {
-          static_cast<void>(posix::local_disk().append(path, line + "\n"));
+          static_cast<void>(posix::local_disk().append_line(path, line + "\n"));
         }
       });
     }
@@ -168,19 +168,27 @@ TEST_CASE("lines of several threads never mix") {
   CHECK(lines == 200);
 }
 
+TEST_CASE("bytes that are no text are added as they are") {
+  const Folder folder;
+  const std::string path = folder / "frames.pcapng";
+  REQUIRE(posix::local_disk().append(path, "\x0A\x0D"));
+  REQUIRE(posix::local_disk().append(path, "\x01\x02"));
+  CHECK(posix::local_disk().read(path) == std::string("\x0A\x0D\x01\x02"));
+}
+
 TEST_CASE("behind a line that a crash cut off the next one stands on its own") {
   const Folder folder;
   const std::string path = folder / "log";
   const Disk disk = posix::local_disk();
-  REQUIRE(disk.append(path, "one\n"));
+  REQUIRE(disk.append_line(path, "one\n"));
   std::ofstream(path, std::ios::app) << "tw";
-  REQUIRE(disk.append(path, "three\n"));
-  REQUIRE(disk.append(path, "four\n"));
+  REQUIRE(disk.append_line(path, "three\n"));
+  REQUIRE(disk.append_line(path, "four\n"));
   CHECK(text_of(path) == "one\ntw\nthree\nfour\n");
 }
 
 TEST_CASE("a full disk is an error of the append") {
-  const auto appended = posix::local_disk().append("/dev/full", "line\n");
+  const auto appended = posix::local_disk().append_line("/dev/full", "line\n");
   REQUIRE_FALSE(appended);
   CHECK(appended.error().message.find("No space left") != std::string::npos);
   CHECK(appended.error().status() == ExitStatus::storage);
@@ -189,7 +197,7 @@ TEST_CASE("a full disk is an error of the append") {
 TEST_CASE("a line is added whole or not at all") {
   const Folder folder;
   const std::string path = folder / "log";
-  REQUIRE(posix::local_disk().append(path, "one\n"));
+  REQUIRE(posix::local_disk().append_line(path, "one\n"));
   std::fflush(nullptr);
   const pid_t child = ::fork();
   if (child == 0) {
@@ -197,7 +205,7 @@ TEST_CASE("a line is added whole or not at all") {
     const rlimit limit = {10, 10};
     ::setrlimit(RLIMIT_FSIZE, &limit);
     ::signal(SIGXFSZ, SIG_IGN);
-    const bool added = posix::local_disk().append(path, "a longer line\n").has_value();
+    const bool added = posix::local_disk().append_line(path, "a longer line\n").has_value();
     ::_exit(added ? 1 : 0);
   }
   int status = -1;

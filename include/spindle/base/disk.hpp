@@ -35,7 +35,9 @@ struct Disk {
   /// Adds a line (with its end), whole or not at all, in one piece, so that lines of several
   /// programs never mix, and behind a line that a crash cut off on a line of its own. Creates the
   /// file.
-  std::function<Result<void>(const std::string& path, std::string_view line)> append;
+  std::function<Result<void>(const std::string& path, std::string_view line)> append_line;
+  /// Adds bytes to a file that is no text, whole or not at all, in one piece. Creates the file.
+  std::function<Result<void>(const std::string& path, std::string_view bytes)> append;
   /// Makes a folder and those above it. Existing ones are left as they are.
   std::function<Result<void>(const std::string& folder, Privacy privacy)> make_folders;
   /// Who writes: the name of the program's user.
