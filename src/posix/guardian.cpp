@@ -88,12 +88,14 @@ void tell(const std::string& words, int terminal) {
   [[maybe_unused]] const ssize_t written = ::write(terminal, line.data(), line.size());
 }
 
-[[noreturn]] void guard(int pipe, const std::function<std::string()>& when_orphaned) {
+[[noreturn]] void guard(int pipe, const sigset_t& usual,
+                        const std::function<std::string()>& when_orphaned) {
   // Before the session is left; a terminal behind standard error needs no second way to it.
   const bool is_seen = ::isatty(STDERR_FILENO) == 1;
   const int terminal =
       is_seen ? no_descriptor : ::open("/dev/tty", O_WRONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   heed_no_signal();
+  ::pthread_sigmask(SIG_SETMASK, &usual, nullptr);
   ::setsid();
   ::prctl(PR_SET_NAME, "guardian");  // who ends all programs of a name does not mean this one
   close_all_but({pipe, terminal});
@@ -121,12 +123,18 @@ void tell_safe(int pipe, pid_t guardian) {
 Result<std::function<void()>> start_guardian(const std::function<std::string()>& when_orphaned) {
   std::array<int, 2> pipe = {};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) return tl::unexpected(no_guardian(errno));
+  // A signal to all processes of the terminal must not end the guardian before it heeds none.
+  sigset_t all = {};
+  sigset_t usual = {};
+  ::sigfillset(&all);
+  ::pthread_sigmask(SIG_SETMASK, &all, &usual);
   const pid_t guardian = ::fork();
   if (guardian == 0) {
     ::close(pipe[1]);
-    guard(pipe[0], when_orphaned);
+    guard(pipe[0], usual, when_orphaned);
   }
   const int failure = errno;
+  ::pthread_sigmask(SIG_SETMASK, &usual, nullptr);
   ::close(pipe[0]);
   if (guardian < 0) {
     ::close(pipe[1]);
