@@ -156,7 +156,9 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
                          ? link::SessionOptions::Others::none
                          : link::SessionOptions::Others::possible;
     session.in_use_until = now;
-    session.past = options.past;
+    // Who else uses a device server is not to be seen, so its first answers are proved.
+    const bool is_shared = endpoint.medium == link::Medium::rtu_over_tcp;
+    session.past = is_shared ? link::SessionOptions::Past::doubtful : options.past;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;

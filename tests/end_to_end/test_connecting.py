@@ -84,7 +84,7 @@ class NameTest(unittest.TestCase):
             self.assertEqual((record["target"], record["unit"]), ("station3", "N.m"))
             finished = support.run("identify", "@line1", environment={"SPINDLE_TOOLS": str(file)})
             self.assertEqual(finished.status, 0, finished)
-            finished = support.run("identify", "station4", "--tools", file)
+            finished = support.run("identify", "sttaion3", "--tools", file)
             self.assertEqual(finished.status, 2, finished)
             self.assertIn("station3", finished.stderr)
 
