@@ -158,7 +158,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
     session.in_use_until = now;
     // Who else uses a device server is not to be seen, so its first answers are proved.
     const bool is_shared = endpoint.medium == link::Medium::rtu_over_tcp;
-    session.past = is_shared ? link::SessionOptions::Past::doubtful : options.past;
+    session.past = is_shared ? link::SessionOptions::Past::shared : options.past;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;

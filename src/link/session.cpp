@@ -160,6 +160,7 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
+  if (options_.past == SessionOptions::Past::shared) doubt_answers(created_);
   if (options_.past == SessionOptions::Past::doubtful) {
     doubt_answers(created_);
     others_late_until_ = past_until_ = doubtful_until_;

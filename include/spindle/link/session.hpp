@@ -35,8 +35,9 @@ struct SessionOptions {
   LocalEcho echo = LocalEcho::automatic;
   /// RTU: until when others may have used the line; the first gap counts from then.
   TimePoint in_use_until = {};
-  /// RTU: whether a late answer may come that an earlier session on this line did not wait for.
-  enum class Past : std::uint8_t { clean, doubtful } past = Past::clean;
+  /// RTU: whether a late answer may come that an earlier session on this line did not wait for, or
+  /// other clients use the line that can not be seen.
+  enum class Past : std::uint8_t { clean, doubtful, shared } past = Past::clean;
   /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is
   /// listened to before the first read and behind the first answers.
   enum class Others : std::uint8_t { none, possible } others = Others::none;
