@@ -54,16 +54,17 @@ Error not_ready(const Target& target, std::string message, std::string hint) {
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
     : tool_(&tool), context_(&context), progress_(context), calm_line_(tool, context) {}
 
-Result<void> GuardedRun::set_guardian(catalogue::StopMode mode) {
+Result<void> GuardedRun::set_guardian(std::string settings, catalogue::StopMode mode) {
   const bool simulated = tool_->target.endpoint.medium == link::Medium::simulated;
   if (simulated || !context_->calm.start_guardian) return {};
-  auto tell_safe = context_->calm.start_guardian([this, mode] { return take_over(mode); });
+  auto tell_safe = context_->calm.start_guardian(
+      [this, mode, settings = std::move(settings)] { return take_over(settings, mode); });
   if (!tell_safe) return tl::unexpected(tool_->target.blamed(std::move(tell_safe.error())));
   tell_safe_ = std::move(*tell_safe);
   return {};
 }
 
-std::string GuardedRun::take_over(catalogue::StopMode mode) const {
+std::string GuardedRun::take_over(const std::string& settings, catalogue::StopMode mode) const {
   const Context calm = calm_context(*context_);
   StopPursuit pursuit(*tool_, mode, calm);
   const device::StopReport report = pursuit.stop();
@@ -74,12 +75,14 @@ std::string GuardedRun::take_over(catalogue::StopMode mode) const {
           {.name = "stop", .result = stopped ? "stopped" : "stop-not-confirmed"});
   const std::string who = fmt::format("{}: the program that ran it ended before it had stopped it",
                                       tool_->target.shown);
-  if (stopped) return fmt::format("{}; its guardian did, and the tool stands still", who);
+  const std::string left =
+      settings.empty() ? "" : fmt::format("; what this run set may not be set back: {}", settings);
+  if (stopped) return fmt::format("{}; its guardian did, and the tool stands still{}", who, left);
   return fmt::format(
       "{}. THE TOOL MAY STILL RUN: its guardian tried for {} s ({} times) and could "
-      "not confirm a stop: {}; stop it at the tool",
+      "not confirm a stop: {}; stop it at the tool{}",
       who, std::chrono::duration_cast<std::chrono::seconds>(report.tried).count(), report.attempts,
-      report.trouble);
+      report.trouble, left);
 }
 
 void GuardedRun::tell_guardian() {
@@ -118,7 +121,12 @@ void GuardedRun::fail(const Error& error) {
 }
 
 void GuardedRun::fail_following(const Error& error) {
-  if (error.code != Errc::closed_pipe) fail(tool_->target.blamed(error));
+  if (error.code != Errc::closed_pipe) {
+    fail(tool_->target.blamed(error));
+    return;
+  }
+  fail(not_ready(tool_->target,
+                 "the output has no reader any more, so the run was ended before its time", ""));
 }
 
 void GuardedRun::fail(const device::StopReport& unconfirmed) {
@@ -165,10 +173,14 @@ Result<Outcome> GuardedRun::end(Listing& listing, const device::StopReport& stop
   const auto listed = listing.end().and_then([&] { return drain(); });
   const auto told = tell_errors();
   tell_left();
-  if (outcome_.failed() == 0 && !listed) return tl::unexpected(listed.error());
-  if (!listed || !told) return outcome_;
-  const auto summarised = summarise(stop, run_end).and_then([&] { return drain(); });
-  if (outcome_.failed() == 0 && !summarised) return tl::unexpected(summarised.error());
+  if (!listed || !told) return ended_with(listed);
+  return ended_with(summarise(stop, run_end).and_then([&] { return drain(); }));
+}
+
+/// A reader that has gone changes nothing about how the run ended.
+Result<Outcome> GuardedRun::ended_with(const Result<void>& written) const {
+  const bool is_worse = !written && written.error().code != Errc::closed_pipe;
+  if (is_worse && outcome_.failed() == 0) return tl::unexpected(written.error());
   return outcome_;
 }
 

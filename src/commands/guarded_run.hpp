@@ -52,9 +52,11 @@ class GuardedRun {
   GuardedRun& operator=(const GuardedRun&) = delete;
 
   /// Starts the process that stops the tool when this one dies before it has done so itself. Comes
-  /// before everything that a run changes. An error means that there is none, so do not start. A
-  /// simulated tool ends with the program and needs none.
-  Result<void> set_guardian(catalogue::StopMode mode = catalogue::StopMode::decelerate);
+  /// before everything that a run changes; `settings` says what that is, in words or not at all:
+  /// nothing but the stop is done for a program that died. An error means that there is none, so
+  /// do not start. A simulated tool ends with the program and needs none.
+  Result<void> set_guardian(std::string settings,
+                            catalogue::StopMode mode = catalogue::StopMode::decelerate);
 
   /// Starts, follows and stops, whatever happens meanwhile: the pair of what `follow` says and how
   /// the stop went. `limit` is asked before the start is sent; `follow` gets what it says.
@@ -80,7 +82,7 @@ class GuardedRun {
 
   /// Remembers an error for the end; it also makes the outcome.
   void fail(const Error& error);
-  /// What ended the following of a run. That nobody reads any more is no failure of the run.
+  /// What ended the following of a run.
   void fail_following(const Error& error);
 
   /// Remembers what is left behind, to be told at the end.
@@ -93,7 +95,7 @@ class GuardedRun {
 
  private:
   /// In the guardian's process: stops the tool, and says in words what became of it.
-  std::string take_over(catalogue::StopMode mode) const;
+  std::string take_over(const std::string& settings, catalogue::StopMode mode) const;
   /// That all is safe.
   void tell_guardian();
   [[nodiscard]] std::string words_of_death() const;
@@ -106,6 +108,7 @@ class GuardedRun {
   void tell_left() const;
   /// Waits until what was told is taken.
   Result<void> drain();
+  [[nodiscard]] Result<Outcome> ended_with(const Result<void>& written) const;
   Result<void> summarise(const device::StopReport& stop, const RunEnd& run_end);
 
   OpenTool* tool_;

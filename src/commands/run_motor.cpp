@@ -1,6 +1,7 @@
 #include "run_motor.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <utility>
@@ -30,6 +31,18 @@ std::string_view words_of(Direction direction) {
   return direction == Direction::forward ? "forward" : "in reverse";
 }
 
+/// "operation.2.speed=500 r/min, communication.timeout=1000 ms".
+std::string settings_in_words(const MotorPlan& plan) {
+  std::vector<std::string> words;
+  const auto add = [&](const catalogue::Parameter& parameter, const catalogue::Value& value) {
+    words.push_back(fmt::format("{}={}{}{}", parameter.name, value.to_string(),
+                                parameter.unit.empty() ? "" : " ", parameter.unit));
+  };
+  for (const auto& [parameter, value] : plan.settings) add(parameter, value);
+  if (plan.watchdog) add(*plan.watchdog_parameter, *plan.watchdog);
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
 /// One run of a motor: what is told of it, and how it ended.
 class MotorRun {
  public:
@@ -48,7 +61,7 @@ class MotorRun {
 
   Result<Outcome> run() {
     const auto stop_mode = options_->stop.value_or(catalogue::StopMode::decelerate);
-    if (auto guarded = guarded_.set_guardian(stop_mode); !guarded) {
+    if (auto guarded = guarded_.set_guardian(settings_in_words(*plan_), stop_mode); !guarded) {
       return tl::unexpected(std::move(guarded.error()));
     }
     if (auto ready = setup_.prepare(); !ready) {

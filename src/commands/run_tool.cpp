@@ -1,6 +1,7 @@
 #include "run_tool.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <optional>
@@ -36,6 +37,13 @@ std::string to_text(std::optional<EventKind> kind) {
   return kind ? std::string(catalogue::to_text(*kind)) : std::string();
 }
 
+/// "select-preset=2, direction=loosening"; empty when nothing is selected.
+std::string settings_in_words(const ToolPlan& plan) {
+  std::vector<std::string> words;
+  for (const Deed& deed : plan.selections) words.push_back(words_of(deed));
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
 /// One remote start: what is told of it, and how it ended.
 class RemoteRun {
  public:
@@ -53,7 +61,7 @@ class RemoteRun {
                      .value_or(catalogue::CodeTables())) {}
 
   Result<Outcome> run() {
-    if (auto guarded = guarded_.set_guardian(); !guarded) {
+    if (auto guarded = guarded_.set_guardian(settings_in_words(*plan_)); !guarded) {
       return tl::unexpected(std::move(guarded.error()));
     }
     device::RunFollower follower(tool_->device, plan_->start, context_->clock,
@@ -134,11 +142,12 @@ class RemoteRun {
   }
 
   void judge(const Result<device::FollowedRun>& followed, std::optional<EventKind> kind) {
-    if (!followed) {
+    const bool tightened = kind == EventKind::fastening_ok;
+    if (!followed && !(tightened && followed.error().code == Errc::closed_pipe)) {
       guarded_.fail_following(followed.error());
       return;
     }
-    if (followed->ending == RunEnding::ignored && !kind) {
+    if (followed && followed->ending == RunEnding::ignored && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::mismatch,
                                 .message = "the tool acknowledged the start, but does not run",
@@ -146,7 +155,7 @@ class RemoteRun {
                                 .name = plan_->start.name}));
       return;
     }
-    if (followed->ending == RunEnding::ended && !kind) {
+    if (followed && followed->ending == RunEnding::ended && !kind) {
       guarded_.fail(
           tool_->target.blamed({.code = Errc::no_answer,
                                 .message = "the tool ran, but never sent a result",
@@ -155,7 +164,7 @@ class RemoteRun {
     }
     // Success is a screw that is tight, and nothing else.
     guarded_.outcome().succeed();
-    if (kind != EventKind::fastening_ok) guarded_.outcome().negate();
+    if (!tightened) guarded_.outcome().negate();
   }
 
   const RemoteStartOptions* options_;
@@ -172,9 +181,8 @@ class RemoteRun {
 
 /// Before the tool was asked anything.
 std::string start_in_words(const ToolPlan& plan, const Target& target) {
-  std::string words;
-  for (const Deed& deed : plan.selections) words += words_of(deed) + ", ";
-  return fmt::format("{}start on {}", words, target.shown);
+  const std::string settings = settings_in_words(plan);
+  return fmt::format("{}{}start on {}", settings, settings.empty() ? "" : ", ", target.shown);
 }
 
 /// What is going to happen, as far as it is known before it does.

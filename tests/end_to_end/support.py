@@ -12,6 +12,7 @@ import contextlib
 import dataclasses
 import decimal
 import fcntl
+import functools
 import json
 import os
 import pathlib
@@ -40,6 +41,12 @@ def binary():
     if not path:
         raise SystemExit("SPINDLE must name the spindle binary to test")
     return os.path.abspath(path)
+
+
+@functools.cache
+def is_sanitized():
+    """Whether the program is the one that is built with the address sanitizer."""
+    return b"__asan_init" in pathlib.Path(binary()).read_bytes()
 
 
 def sanitizer_options():

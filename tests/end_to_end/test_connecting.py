@@ -7,6 +7,7 @@ import unittest
 
 import hostile_server
 import support
+from register_server import RegisterServer
 
 TORQUE = "preset.1.target-torque"
 
@@ -44,6 +45,35 @@ class UnreachableTest(unittest.TestCase):
     def test_name_that_does_not_exist(self):
         # RFC 6761: never resolved by anybody.
         self.check("tcp://tool.invalid", "tool.invalid")
+
+
+class Gateway(RegisterServer):
+    """Units behind one address; for the others it says itself that it does not reach them."""
+
+    def __init__(self, absent):
+        super().__init__({})
+        self.absent = absent  # exception of the units that are not there
+
+    def _answer(self, request):
+        if request.unit in (2, 7):
+            return super()._answer(request)
+        exception = self.absent[request.unit % len(self.absent)]
+        return bytes([request.function | 0x80, exception])
+
+
+class GatewayTest(unittest.TestCase):
+    def test_units_that_it_does_not_reach_are_not_found(self):
+        for absent in ((0x0A,), (0x0B,), (0x0A, 0x0B)):
+            with self.subTest(absent), Gateway(absent) as gateway:
+                finished = support.run("scan", gateway.url, "--units", "1-9", "--json")
+                self.assertEqual(finished.status, 0, finished)
+                self.assertEqual([r["unit"] for r in finished.records("unit")], [2, 7], finished)
+
+    def test_units_that_refuse_are_found(self):
+        with Gateway((0x02,)) as gateway:
+            finished = support.run("scan", gateway.url, "--units", "1-3", "--json")
+            self.assertEqual(finished.status, 0, finished)
+            self.assertEqual([r["unit"] for r in finished.records("unit")], [1, 2, 3], finished)
 
 
 @unittest.skipUnless(has_ipv6(), "no IPv6 loopback on this machine")

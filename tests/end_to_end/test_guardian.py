@@ -117,7 +117,7 @@ class KilledTest(unittest.TestCase):
             told = support.home().path / "told"
             with open(told, "wb") as err:
                 process = subprocess.Popen(
-                    [support.binary(), "remote-start", station.url, *test_remote_start.GO],
+                    [support.binary(), "remote-start", station.url, *test_remote_start.GO, "--preset", "2"],
                     stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=err,
                     env=support.home().environment(), cwd=support.home().path)
             support.wait_until(station.has_started, "the tool runs")
@@ -125,6 +125,7 @@ class KilledTest(unittest.TestCase):
             support.wait_for_end(process)
             support.wait_until(lambda: "its guardian did" in told.read_text(), "the guardian tells it")
             self.assertEqual(told.read_text().count("\n"), 1)
+            self.assertIn("may not be set back: select-preset=2", told.read_text())
 
     def test_it_costs_little_and_leaves_nothing(self):
         with self.bm_run() as (station, run):
@@ -150,7 +151,7 @@ class SignalTest(unittest.TestCase):
         numbers = [signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF, signal.SIGXCPU,
                    signal.SIGIO, signal.SIGPWR, signal.SIGSTKFLT, signal.SIGABRT, signal.SIGSEGV, signal.SIGBUS,
                    signal.SIGFPE, signal.SIGILL, signal.SIGTRAP, signal.SIGSYS, signal.SIGRTMIN, signal.SIGRTMAX]
-        if os.environ.get("ASAN_OPTIONS"):  # the sanitizer keeps these for itself
+        if support.is_sanitized():  # the sanitizer keeps these for itself
             numbers = [n for n in numbers if n not in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE)]
         for number in numbers:
             with self.subTest(number), test_remote_start.Station(**SLOW) as station:

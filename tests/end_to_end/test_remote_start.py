@@ -293,7 +293,8 @@ class EndingTest(RemoteStartTest):
                 with support.Running("remote-start", station.url, *GO, "-o", form, stdout=writing) as run:
                     os.close(writing)
                     finished = run.finish()
-                self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+                self.assertEqual(finished.status, 1, finished)
+                self.assertIn("has no reader", finished.stderr)
                 self.assert_stopped(station, finished)
 
     def test_a_reader_that_goes(self):
@@ -303,7 +304,8 @@ class EndingTest(RemoteStartTest):
                 os.close(writing)
                 os.close(reading)
                 finished = run.finish()
-            self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
+            self.assertEqual(finished.status, 1, finished)  # no screw was tightened
+            self.assertIn("has no reader", finished.stderr)
             self.assert_stopped(station, finished)
 
     def test_cut_while_it_runs(self):

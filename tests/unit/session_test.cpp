@@ -720,6 +720,29 @@ TEST_CASE("rtu: a session behind one that had trouble believes only what is prov
   CHECK(line.session.transact(read_two) == two_values);
 }
 
+TEST_CASE("rtu: behind a device server that others may use the first answer is proved") {
+  SessionOptions options = rtu(SessionOptions::Proof::loopback);
+  options.past = SessionOptions::Past::shared;
+  SUBCASE("it was meant for this request") {
+    Line line(options);
+    line.script.on_request(rtu_answer(15ms, two_values));
+    line.script.otherwise = repeat;
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.session.counters().requests > 1);
+  }
+  SUBCASE("it was meant for another client") {
+    Line line(options);
+    line.script.on_request([](ByteView) {
+      return std::vector<Arrival>{{5ms, rtu_frame(1, holding({1, 1}))},
+                                  {15ms, rtu_frame(1, two_values)}};
+    });
+    line.script.otherwise = repeat;
+    const auto answered = line.session.transact(read_two);
+    if (answered) CHECK(*answered == two_values);
+    CHECK(line.session.counters().requests > 1);
+  }
+}
+
 TEST_CASE("rtu: bytes at the end of the quarantine prolong it until the line is silent") {
   Line line(rtu());
   line.script.on_request(say(2 * timeout - 1ms, rtu_frame(1, holding({1, 1}))));
