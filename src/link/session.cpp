@@ -21,6 +21,9 @@ constexpr Duration longest_settling = std::chrono::milliseconds(250);
 // Times the answer timeout, behind the quarantine: nobody knows how late an answer can be, but it
 // hardly is by more, and every proof takes time that a stop may be waiting for.
 constexpr Duration::rep longest_doubt = 2;
+/// For how long the next program on the line doubts, at least: it may ask much sooner than this one
+/// would have.
+constexpr Duration least_doubt_left = std::chrono::seconds(2);
 
 constexpr std::uint16_t smallest_transaction = 0x8000;
 
@@ -165,6 +168,12 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
     doubt_answers(created_);
     others_late_until_ = past_until_ = doubtful_until_;
   }
+  if (is_rtu()) {
+    const TimePoint late = transport_->late_until();
+    doubt_.raise(late);
+    past_until_ = std::max(past_until_, late);
+    others_late_until_ = std::max(others_late_until_, late);
+  }
   const std::string company = is_rtu() ? transport_->company() : std::string();
   if (company.empty()) return;
   doubt_.stay();
@@ -177,6 +186,10 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
 }
 
 Session::~Session() {
+  const TimePoint now = clock_->now();
+  if (!unanswered_.empty() && now < doubtful_until_) {
+    transport_->leave_late(std::max(doubtful_until_, now + least_doubt_left));
+  }
   if (trace_.bytes) trace_.bytes(Direction::received, {});
 }
 

@@ -39,6 +39,14 @@ class SharedLine::Share : public Transport {
     const std::lock_guard lock(line_->mutex_);
     return line_->transport_ ? line_->transport_->company() : std::string();
   }
+  [[nodiscard]] TimePoint late_until() const override {
+    const std::lock_guard lock(line_->mutex_);
+    return line_->transport_ ? line_->transport_->late_until() : TimePoint();
+  }
+  void leave_late(TimePoint until) override {
+    const std::lock_guard lock(line_->mutex_);
+    if (opened_ == line_->opened_ && line_->transport_) line_->transport_->leave_late(until);
+  }
   [[nodiscard]] bool is_private() const override {
     const std::lock_guard lock(line_->mutex_);
     return line_->transport_ && line_->transport_->is_private();

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "posix/descriptor.hpp"
+#include "spindle/base/clock.hpp"
 
 namespace spindle::posix {
 
@@ -17,5 +19,19 @@ struct LineLock {
 /// Takes the lock of this name (letters, digits, '.', ':', '-', '_', '%', '[' and ']'), or says who
 /// has it. Without a folder to keep it in there is no lock, and none is asked for.
 LineLock lock_line(const std::string& name);
+
+/// A line that programs have one after another.
+struct LineName {
+  std::string text = {};   ///< as for lock_line()
+  std::int64_t since = 0;  ///< differs when another device has got the name: a port plugged in anew
+};
+
+/// Until when an answer may come on this line that an earlier program of the user gave up; not
+/// after `now` when there is none. Times are those of one run of the system.
+TimePoint late_answers_until(const LineName& line, TimePoint now);
+
+/// Leaves that to the programs that have the line later. Without a folder to keep it in they do
+/// not learn it.
+void leave_late_answers(const LineName& line, TimePoint until);
 
 }  // namespace spindle::posix

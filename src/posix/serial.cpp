@@ -11,12 +11,14 @@
 #include <termios.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <optional>
 #include <system_error>
 #include <utility>
 
 #include "posix/baud.hpp"
 #include "posix/descriptor.hpp"
+#include "posix/line_lock.hpp"
 #include "posix/port_holder.hpp"
 #include "posix/wait.hpp"
 
@@ -220,15 +222,33 @@ Port::~Port() {
   ::tcsetattr(lock_.number(), TCSANOW, &before_);
 }
 
+/// The same by whatever name the port is called, and another one once it was plugged in anew.
+LineName name_of(const std::string& path) {
+  std::error_code unresolved;
+  const auto real = std::filesystem::canonical(path, unresolved);
+  struct stat port = {};
+  if (unresolved || ::stat(real.c_str(), &port) != 0) return {.text = path};
+  constexpr std::int64_t nanoseconds = 1'000'000'000;
+  return {.text = real.string(),
+          .since = std::int64_t{port.st_ctim.tv_sec} * nanoseconds + port.st_ctim.tv_nsec};
+}
+
 class SerialTransport final : public link::Transport {
  public:
-  SerialTransport(Port port, std::string company, const Clock& clock, const Interrupt& interrupt)
-      : port_(std::move(port)), company_(std::move(company)), wait_(clock, interrupt) {}
+  SerialTransport(Port port, LineName name, std::string company, const Clock& clock,
+                  const Interrupt& interrupt)
+      : port_(std::move(port)),
+        name_(std::move(name)),
+        company_(std::move(company)),
+        late_until_(late_answers_until(name_, clock.now())),
+        wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void shield() override { wait_.shield(); }
   [[nodiscard]] std::string company() const override { return company_; }
+  [[nodiscard]] TimePoint late_until() const override { return late_until_; }
+  void leave_late(TimePoint until) override { leave_late_answers(name_, until); }
 
  private:
   [[nodiscard]] bool hung_up() const;
@@ -236,7 +256,9 @@ class SerialTransport final : public link::Transport {
   Result<void> drain() const;
 
   Port port_;
+  LineName name_;
   std::string company_;
+  TimePoint late_until_;
   LineWait wait_;
 };
 
@@ -311,7 +333,8 @@ Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
   if (switching == link::LineSwitching::kernel) {
     if (auto done = port->switch_by_kernel(); !done) return tl::unexpected(std::move(done.error()));
   }
-  return std::make_unique<SerialTransport>(std::move(*port), port_company(path), clock, interrupt);
+  return std::make_unique<SerialTransport>(std::move(*port), name_of(path), port_company(path),
+                                           clock, interrupt);
 }
 
 }  // namespace spindle::posix

@@ -42,19 +42,30 @@ void set_options(const Descriptor& socket) {
   set_option(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, user_timeout_ms);
 }
 
+/// The serial line behind a device server. Of a tool on the network there is none.
+struct Line {
+  std::string name = {};
+  LineLock lock = {};
+  TimePoint late_until = {};
+};
+
 class TcpTransport final : public link::Transport {
  public:
-  TcpTransport(Descriptor socket, LineLock lock, const Clock& clock, const Interrupt& interrupt)
-      : socket_(std::move(socket)), lock_(std::move(lock)), wait_(clock, interrupt) {}
+  TcpTransport(Descriptor socket, Line line, const Clock& clock, const Interrupt& interrupt)
+      : socket_(std::move(socket)), line_(std::move(line)), wait_(clock, interrupt) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void shield() override { wait_.shield(); }
-  [[nodiscard]] std::string company() const override { return lock_.holder; }
+  [[nodiscard]] std::string company() const override { return line_.lock.holder; }
+  [[nodiscard]] TimePoint late_until() const override { return line_.late_until; }
+  void leave_late(TimePoint until) override {
+    if (!line_.name.empty()) leave_late_answers({line_.name}, until);
+  }
 
  private:
   Descriptor socket_;
-  LineLock lock_;
+  Line line_;
   LineWait wait_;
 };
 
@@ -137,7 +148,7 @@ struct Attempt {
 
 struct Connection {
   Descriptor socket;
-  LineLock lock = {};
+  Line line = {};
 };
 
 Error busy_error(const Address& address, const LineLock& lock) {
@@ -150,15 +161,17 @@ Error busy_error(const Address& address, const LineLock& lock) {
 /// Locked before it is connected: some device servers drop the older of two connections.
 Result<Connection> connect_line(const Address& address, const Attempt& attempt, TimePoint deadline,
                                 const Clock& clock, const Interrupt& interrupt) {
-  LineLock lock;
+  Line line;
   if (attempt.behind != Behind::tool) {
-    lock = lock_line(fmt::format("{}-{}", to_text(address), port_of(address)));
+    line.name = fmt::format("{}-{}", to_text(address), port_of(address));
+    line.lock = lock_line(line.name);
+    line.late_until = late_answers_until({line.name}, clock.now());
   }
-  if (attempt.behind == Behind::line && !lock.holder.empty()) {
-    return tl::unexpected(busy_error(address, lock));
+  if (attempt.behind == Behind::line && !line.lock.holder.empty()) {
+    return tl::unexpected(busy_error(address, line.lock));
   }
   return connect_to(address, deadline, clock, interrupt).map([&](Descriptor socket) {
-    return Connection{std::move(socket), std::move(lock)};
+    return Connection{std::move(socket), std::move(line)};
   });
 }
 
@@ -197,7 +210,7 @@ Result<std::unique_ptr<link::Transport>> open_tcp(const std::string& host, std::
   Result<Connection> connection = connect_to_any(*resolved, attempt, clock, interrupt);
   if (!connection) return tl::unexpected(std::move(connection.error()));
   set_options(connection->socket);
-  return std::make_unique<TcpTransport>(std::move(connection->socket), std::move(connection->lock),
+  return std::make_unique<TcpTransport>(std::move(connection->socket), std::move(connection->line),
                                         clock, interrupt);
 }
 

@@ -406,7 +406,8 @@ class EndingTest(MotorTest):
             with support.Running(*arguments_of_start(bus.url), stdout=writing) as started:
                 os.close(writing)
                 finished = started.finish()
-            self.assertEqual(finished.status, 0, finished)
+            self.assertEqual(finished.status, 1, finished)
+            self.assertIn("has no reader", finished.stderr)
             self.assert_stopped(bus, finished)
 
     def test_an_alarm_while_it_runs(self):
@@ -448,7 +449,10 @@ class EndingTest(MotorTest):
 
     def test_answers_that_get_lost(self):
         with Bus("--fault", "lost@every:5") as bus:
-            finished = start(bus.url, "--for", "1s", "--timeout", "250ms", "--json")
+            # Where the machine makes other answers late besides, a run may end before its start.
+            finished = support.first_good(
+                lambda: start(bus.url, "--for", "1s", "--timeout", "250ms", "--json"), lambda _: bus.has_started(),
+                attempts=5)
             self.assertIn(finished.status, (0, 5), finished)
             self.assertTrue(finished.records()[-1]["stop_confirmed"], finished)
             self.assert_stop_was_sent(bus, finished)

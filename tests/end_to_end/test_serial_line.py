@@ -5,14 +5,18 @@ import contextlib
 import os
 import pathlib
 import re
+import select
 import signal
+import struct
 import subprocess
 import tempfile
 import threading
 import time
+import tty
 import unittest
 
 import support
+import test_blv
 
 PROGRAMS = pathlib.Path(os.environ.get("SPINDLE_PEER_PROGRAMS", support.ROOT / "build/dev/tests"))
 BANK = PROGRAMS / "spindle_peer_serial_bank"
@@ -85,6 +89,63 @@ def run(*arguments):
     return support.run(*arguments, "--profile", str(DRIVE), "--json")
 
 
+class SlowUnit:
+    """A unit that is late at first: it says what it owes when it is asked again, and is deaf while it speaks,
+    as on a line of two wires. Its registers hold their numbers."""
+
+    def __init__(self):
+        self._line, terminal = os.openpty()
+        tty.setraw(terminal)
+        self.url = f"rtu://{os.ttyname(terminal)}?unit=1"
+        os.close(terminal)
+        self._owed = []
+        self._owes = True
+        self._ended = False
+        self._thread = threading.Thread(target=self._serve)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended = True
+        self._thread.join()
+        os.close(self._line)
+
+    def answers_late(self):
+        self._owes = False
+
+    def _serve(self):
+        request = b""
+        while not self._ended:
+            ready, _, _ = select.select([self._line], [], [], 0.02)
+            try:
+                request += os.read(self._line, 256) if ready else b""
+            except OSError:  # the port is not open
+                time.sleep(support.POLL)
+            if len(request) < 8:
+                continue
+            frame, request = request[:8], b""
+            if self._owes:
+                self._owed = [frame]
+                continue
+            for owed in self._owed:
+                os.write(self._line, self._answer(owed))
+                time.sleep(0.05)
+            os.write(self._line, self._answer(frame))
+            if self._owed and select.select([self._line], [], [], 0)[0]:
+                os.read(self._line, 256)
+            self._owed = []
+
+    @staticmethod
+    def _answer(frame):
+        if frame[1] == 8:
+            return frame
+        first, count = struct.unpack_from(">HH", frame, 2)
+        values = struct.pack(f">{count}H", *range(first, first + count))
+        return test_blv.with_checksum(bytes([frame[0], frame[1], 2 * count]) + values)
+
+
 class DialogueTest(unittest.TestCase):
     def test_values_on_a_terminal_and_behind_a_device_server(self):
         for where in ("--pty", "--port"):
@@ -144,6 +205,20 @@ class DialogueTest(unittest.TestCase):
                 finished = run("get", f"{bus.url}?unit=1", *names, "--timeout", "200ms", "--retries", "2")
                 for record in finished.records("value"):
                     self.assertEqual(record["value"], record["register"], finished)
+
+    def test_the_late_answer_to_a_program_that_ended_is_never_a_value(self):
+        for profile in (["--profile", str(DRIVE)], []):
+            with self.subTest(profile), SlowUnit() as unit:
+                gave_up = support.run("get", unit.url, "@holding:7", *profile, "--timeout", "200ms", "--retries", "0",
+                                      "--json")
+                self.assertEqual(gave_up.status, 5, gave_up)
+                unit.answers_late()
+                for _ in range(3):
+                    finished = support.run("get", unit.url, "@holding:24", "@holding:64", *profile, "--timeout", "400ms",
+                                           "--json")
+                    for record in finished.records("value"):
+                        self.assertEqual(record["value"], record["register"], finished)
+                self.assertEqual(finished.status, 0, finished)
 
     def test_trouble_on_the_line_never_gives_a_wrong_value(self):
         for fault in ("noise@every:2", "bad-crc@every:2", "foreign", "half@every:2", "split=3", "echo", "repeated",

@@ -57,7 +57,9 @@ struct Script {
   Bytes flood = {};
   Duration flood_every = std::chrono::milliseconds(1);
 
-  std::string company = {};  ///< another program that has the line open
+  std::string company = {};   ///< another program that has the line open
+  TimePoint late_until = {};  ///< what an earlier program left of late answers
+  std::optional<TimePoint> left_late = std::nullopt;  ///< what this one leaves
 
   std::vector<Sent> sent = {};
   std::size_t receives = 0;
@@ -97,6 +99,8 @@ class ScriptedTransport final : public link::Transport {
 
   void shield() override { script_->shielded = true; }
   [[nodiscard]] std::string company() const override { return script_->company; }
+  [[nodiscard]] TimePoint late_until() const override { return script_->late_until; }
+  void leave_late(TimePoint until) override { script_->left_late = until; }
 
  private:
   [[nodiscard]] bool interrupted() const {

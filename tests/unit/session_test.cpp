@@ -69,9 +69,15 @@ Bytes part(const Bytes& bytes, std::size_t from, std::size_t to) {
 
 /// A session, its peer and their clock.
 struct Line {
-  explicit Line(SessionOptions options)
-      : session(transport_to(script), clock, std::move(options), trace()) {
+  /// `late_for`: how long late answers to an earlier program may still come.
+  explicit Line(SessionOptions options, Duration late_for = {})
+      : session(with_late(late_for), clock, std::move(options), trace()) {
     script.interrupt = &interrupt;
+  }
+
+  std::unique_ptr<link::Transport> with_late(Duration late_for) {
+    if (late_for > Duration::zero()) script.late_until = clock.now() + late_for;
+    return transport_to(script);
   }
 
   Trace trace() {
@@ -718,6 +724,76 @@ TEST_CASE("rtu: a session behind one that had trouble believes only what is prov
   line.script.on_request(repeat);
   line.script.on_request(rtu_answer(15ms, two_values));
   CHECK(line.session.transact(read_two) == two_values);
+}
+
+TEST_CASE("rtu: what was given up is left to the next program on the line") {
+  test::FakeClock clock;
+  Script script{clock};
+  const auto run = [&](const auto& ask) {
+    Session session(transport_to(script), clock, rtu(SessionOptions::Proof::loopback));
+    ask(session);
+  };
+  const auto read = [](Session& session) { static_cast<void>(session.transact(read_two)); };
+  SUBCASE("an answer that is lost") {
+    script.on_request(silence());
+    run(read);
+    REQUIRE(script.left_late);
+    CHECK(*script.left_late >= clock.now() + 2s);
+  }
+  SUBCASE("nothing where all answers came") {
+    script.on_request(rtu_answer(15ms, two_values));
+    run(read);
+    CHECK_FALSE(script.left_late);
+  }
+  SUBCASE("nothing where the late one came, too") {
+    script.on_request(say(timeout + 10ms, rtu_frame(1, two_values)));
+    script.otherwise = repeat;
+    run([&](Session& session) {
+      read(session);
+      script.on_request(repeat);
+      script.on_request(rtu_answer(15ms, two_values));
+      read(session);
+    });
+    CHECK_FALSE(script.left_late);
+  }
+}
+
+TEST_CASE("rtu: behind a program that gave up an answer only what is proved is believed") {
+  SUBCASE("by a loop-back") {
+    Line line(rtu(SessionOptions::Proof::loopback), 2s);
+    line.script.on_request([](ByteView) {
+      return std::vector<Arrival>{{5ms, rtu_frame(1, holding({1, 1}))},
+                                  {35ms, rtu_frame(1, two_values)}};
+    });
+    line.script.on_request([](ByteView request) {  // units answer in order
+      return std::vector<Arrival>{{40ms, Bytes(request.begin(), request.end())}};
+    });
+    line.script.otherwise = repeat;
+    const auto answered = line.session.transact(read_two);
+    if (answered) CHECK(*answered == two_values);
+    line.script.on_request(repeat);
+    line.script.on_request(rtu_answer(15ms, two_values));
+    CHECK(line.session.transact(read_two) == two_values);
+  }
+  SUBCASE("by another read, where there is no loop-back") {
+    Line line(rtu(), 2s);
+    line.script.on_request([](ByteView) {
+      return std::vector<Arrival>{{5ms, rtu_frame(1, holding({1, 1}))},
+                                  {35ms, rtu_frame(1, two_values)}};
+    });
+    line.script.otherwise = [](ByteView) {
+      return std::vector<Arrival>{{15ms, rtu_frame(1, two_values)}};
+    };
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.script.sent.size() > 2);
+  }
+  SUBCASE("for so long as they may come") {
+    Line line(rtu(), 2s);
+    line.clock.advance(3s);
+    line.script.on_request(rtu_answer(15ms, two_values));
+    CHECK(line.session.transact(read_two) == two_values);
+    CHECK(line.script.sent.size() == 1);
+  }
 }
 
 TEST_CASE("rtu: behind a device server that others may use the first answer is proved") {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -31,6 +32,8 @@ class LineDoubt {
   /// The line is doubtful from now on, until it has been quiet for a while. True where this says
   /// more than what was found before.
   bool find(Evidence evidence, TimePoint now);
+  /// The line is doubtful until then, at least.
+  void raise(TimePoint until) { until_ = std::max(until_, until); }
   /// The line is doubtful for good: another program has it, too.
   void stay() { lasting_ = true; }
   [[nodiscard]] bool is_raised(TimePoint now) const { return lasting_ || now < until_; }

@@ -46,6 +46,11 @@ class Transport {
   /// empty when there is none.
   [[nodiscard]] virtual std::string company() const { return {}; }
 
+  /// Until when an answer may come that an earlier program on this line gave up.
+  [[nodiscard]] virtual TimePoint late_until() const { return {}; }
+  /// What programs that have the line later learn from late_until().
+  virtual void leave_late(TimePoint until) { static_cast<void>(until); }
+
   /// Whether nothing but this program can be on the line.
   [[nodiscard]] virtual bool is_private() const { return false; }
 };
