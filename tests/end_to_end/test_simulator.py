@@ -31,9 +31,9 @@ def tearDownModule():
     support.remove_home()
 
 
-def answer_from(line):
+def answer_from(line, patience=support.DEADLINE):
     answer = b""
-    while len(answer) < ANSWER_SIZE and support.is_readable(line):
+    while len(answer) < ANSWER_SIZE and support.is_readable(line, patience):
         answer += os.read(line, 64)
     return answer
 
@@ -43,11 +43,15 @@ class Simulator(unittest.TestCase):
         with Bus(units="1") as bus:
             line = os.open(bus.path, os.O_RDWR | os.O_NOCTTY)
             try:
-                os.write(line, READ_SPEED)
-                self.assertEqual(len(answer_from(line)), ANSWER_SIZE)
-                os.write(line, READ_SPEED)  # without the silence that a BLV needs
-                support.wait_until(lambda: re.search(r"ignored 01 03 04 84 .*: \d\.\d ms of silence, 5\.5 ms needed",
-                                                     bus.told()), "the reason is told")
+                def is_told():
+                    os.write(line, READ_SPEED)
+                    if len(answer_from(line)) == ANSWER_SIZE:
+                        os.write(line, READ_SPEED)  # without the silence that a BLV needs
+                    # Where the machine kept either side waiting there was silence, and this is answered, too.
+                    answer_from(line, 0.5)
+                    return re.search(r"ignored 01 03 04 84 .*: \d\.\d ms of silence, 5\.5 ms needed", bus.told())
+
+                support.wait_until(is_told, "the reason is told")
             finally:
                 os.close(line)
             spoilt = support.run("ping", bus.unit(7), *PROFILE, "--count", "1", "--timeout", "300ms")
