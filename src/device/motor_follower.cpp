@@ -16,6 +16,15 @@ constexpr unsigned retries_while_running = 1;
 /// the proof of the line, and the repetition.
 constexpr int timeouts_of_lost_look = 4;
 
+/// Neither "it ran" nor "it did not" would be true.
+Error not_seen() {
+  return {.code = Errc::negative,
+          .message =
+              "the time allowed was over before the motor could be looked at, so whether it "
+              "ran is not known",
+          .hint = "allow more time with --for"};
+}
+
 class Follower {
  public:
   Follower(Device& device, const Motor& motor, MotorStopper& stopper,
@@ -51,6 +60,7 @@ class Follower {
       if (auto paused = pause(); !paused) return tl::unexpected(std::move(paused.error()));
     }
     if (!seen_ && last_silence) return tl::unexpected(std::move(*last_silence));
+    if (!seen_) return tl::unexpected(not_seen());
     return has_run_ ? MotorEnding::elapsed : MotorEnding::ignored;
   }
 

@@ -586,7 +586,7 @@ class RoundTripTest(MotorTest):
         for where in PLACES:
             with self.subTest(where), Bus(where=where) as bus:
                 file = support.home().path / f"before{PLACES.index(where)}.yaml"
-                self.assertEqual(start(bus.url, "--for", "100ms").status, 0)
+                self.assertEqual(start(bus.url, "--for", "1s").status, 0)
                 ran = bus.commands()
                 saved = run("backup", bus.url, "-f", file)
                 self.assertEqual(saved.status, 0, saved)

@@ -317,6 +317,14 @@ TEST_CASE("following tells what happens, and why it is over") {
     options.deadline = bench.clock.now() + 200ms;
     CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::ignored);
   }
+  SUBCASE("over before it could be looked at") {
+    bench.write(command, 0x2A);
+    options.deadline = bench.clock.now();
+    const auto followed = follow_motor(device, motor, stopper, options);
+    REQUIRE_FALSE(followed);
+    CHECK(followed.error().code == Errc::negative);
+    CHECK(news.empty());
+  }
   SUBCASE("too fast") {
     options.fastest = 900;
     bench.write(command, 0x32);
