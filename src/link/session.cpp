@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <utility>
 
 #include "spindle/base/duration.hpp"
@@ -308,48 +309,60 @@ Result<std::optional<modbus::Pdu>> Session::prove(const modbus::Pdu& request,
     if (refutations_ > 0) return std::nullopt;
   }
   const bool is_exception = modbus::exception_of(answer).has_value();
-  const OtherRead* other = is_exception ? nullptr : own_shape_of(others);
-  // Units answer in order: had the answer been another's, ours would come in front of that of the
-  // loop-back. But where others read what comes for us, too, they may have taken ours.
-  const bool in_order = has_loopback() && order_ == Order::kept && transport_->company().empty();
-  if (in_order) {
+  std::vector<OtherRead> own = is_exception ? std::vector<OtherRead>() : with_own_shapes(others);
+  if (answers_come_in_order()) {
     contested_ = {request};
     auto proved = prove_by_loopback(answer);
-    if (!proved || *proved || other == nullptr) return proved;
+    if (!proved || *proved || own.empty()) return proved;
   }
-  if (other != nullptr) return prove_by_other(request, answer, *other);
+  if (!own.empty()) return prove_by_others(request, answer, std::move(own));
   contested_ = {request};
   auto again = exchange_contested(request, answer);
   if (!again) return tl::unexpected(std::move(again.error()));
-  if (*again != answer || refutations_ > 0) return std::nullopt;
+  const bool may_lose_ours = !transport_->company().empty();
+  if (*again != answer || refutations_ > 0 || may_lose_ours) return std::nullopt;
   if (!has_loopback()) return answer;
   contested_ = {request};
   return prove_by_loopback(answer);
 }
 
 /// What has an unusual shape is hardly the answer to another master's request. Two such answers
-/// that agree are proof even where the value changed since it was asked for first.
-Result<std::optional<modbus::Pdu>> Session::prove_by_other(const modbus::Pdu& request,
-                                                           const modbus::Pdu& answer,
-                                                           const OtherRead& other) {
-  constexpr int most_turns = 4;
-  modbus::Pdu before = answer;
+/// that agree are proof even where the value changed since it was asked for first. Where another
+/// program takes ours away, two of one shape may both be answers to its request: there they agree
+/// across shapes.
+Result<std::optional<modbus::Pdu>> Session::prove_by_others(const modbus::Pdu& request,
+                                                            const modbus::Pdu& answer,
+                                                            std::vector<OtherRead> reads) {
+  constexpr std::size_t most_turns = 4;
+  const bool may_lose_ours = !transport_->company().empty();
+  if (!may_lose_ours) reads.resize(1);
+  std::vector<modbus::Pdu> parts = {answer};  // of the request, then of the turns
+  const auto agrees = [&](const modbus::Pdu& part) {
+    if (!may_lose_ours) return part == parts.back();
+    for (std::size_t at = 0; at < parts.size(); ++at) {
+      const bool is_other_shape = at == 0 || (parts.size() - at) % reads.size() != 0;
+      if (is_other_shape && parts[at] == part) return true;
+    }
+    return false;
+  };
   modbus::Pdu accepted = answer;
-  for (int turn = 0; turn < most_turns; ++turn) {
+  for (std::size_t turn = 0; turn < most_turns; ++turn) {
+    const OtherRead& other = reads[turn % reads.size()];
     contested_ = {other.request};
     if (turn == 0) contested_.push_back(request);
     auto again = exchange_contested(other.request, accepted);
     if (!again) return tl::unexpected(std::move(again.error()));
     if (modbus::exception_of(*again)) return std::nullopt;
     modbus::Pdu part = part_of(*again, other.skip, answer);
-    if (part == before && refutations_ == 0) return part;
+    if (refutations_ == 0 && agrees(part)) return part;
     accepted = std::move(*again);
-    before = std::move(part);
+    parts.push_back(std::move(part));
   }
-  if (!has_loopback()) return std::nullopt;  // else a value that never stands still can be proved
-  contested_ = {other.request};
+  // Else a value that never stands still can be proved.
+  if (!has_loopback() || may_lose_ours) return std::nullopt;
+  contested_ = {reads.front().request};
   return prove_by_loopback(accepted).map([&](const std::optional<modbus::Pdu>& proved) {
-    return proved ? std::optional(before) : std::nullopt;
+    return proved ? std::optional(parts.back()) : std::nullopt;
   });
 }
 
@@ -381,12 +394,18 @@ void Session::note_refutation(const modbus::Adu& stray) {
   if (refutes) ++refutations_;
 }
 
-/// The first of them whose answers have a shape that nobody else's had here.
-const OtherRead* Session::own_shape_of(const Others& others) const {
-  const auto own = std::find_if(others.begin(), others.end(), [&](const OtherRead& other) {
-    return !doubt_.is_shape_taken(other.request);
-  });
-  return own == others.end() ? nullptr : &*own;
+/// Those whose answers have a shape that nothing else had here.
+std::vector<OtherRead> Session::with_own_shapes(const Others& others) const {
+  std::vector<OtherRead> own;
+  std::copy_if(others.begin(), others.end(), std::back_inserter(own),
+               [&](const OtherRead& other) { return !doubt_.is_shape_taken(other.request); });
+  return own;
+}
+
+/// Units answer in order: had an answer been another's, ours would come in front of that of a
+/// loop-back behind it. But where others read what comes for us, too, they may have taken ours.
+bool Session::answers_come_in_order() const {
+  return has_loopback() && order_ == Order::kept && transport_->company().empty();
 }
 
 /// The copy of the answer to an equal write is no answer to this one.

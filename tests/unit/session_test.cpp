@@ -1381,6 +1381,23 @@ TEST_CASE("rtu: a line that another program has open, too, is doubtful for good"
   CHECK(session.transact(read_two, others_of(2, 2)) == holding({2, 3}));
 }
 
+TEST_CASE("rtu: two answers of another program's shape prove nothing") {
+  FakeClock clock;
+  test::Script script(clock);
+  script.company = "minicom (process 4711)";
+  // It asks for two registers again and again, and takes our answers of that shape.
+  script.otherwise = [](ByteView request) {
+    const bool is_taken = test::request_of(Framing::rtu, request).pdu == read_holding(2, 2);
+    return is_taken ? std::vector<Arrival>{{15ms, foreign_answer}} : react_in_time(request);
+  };
+  Session session(transport_to(script), clock, shared(SessionOptions::Proof::none));
+  for (int i = 0; i < 10; ++i) {
+    CHECK(session.transact(read_holding(2, 1), others_of(2, 1)) == holding({2}));
+  }
+  // Where there is no other way to ask, nothing proves it.
+  CHECK_FALSE(session.transact(read_holding(2, 1)));
+}
+
 TEST_CASE("rtu: what can not be proved is an error") {
   Line line(shared(SessionOptions::Proof::none));
   std::uint16_t value = 0;

@@ -161,13 +161,14 @@ class Session {
   Result<void> let_copies_pass(const modbus::Pdu& write);
   Result<std::optional<modbus::Pdu>> prove(const modbus::Pdu& request, const modbus::Pdu& answer,
                                            const Others& others);
-  Result<std::optional<modbus::Pdu>> prove_by_other(const modbus::Pdu& request,
-                                                    const modbus::Pdu& answer,
-                                                    const OtherRead& other);
+  Result<std::optional<modbus::Pdu>> prove_by_others(const modbus::Pdu& request,
+                                                     const modbus::Pdu& answer,
+                                                     std::vector<OtherRead> reads);
   Result<std::optional<modbus::Pdu>> prove_by_loopback(const modbus::Pdu& answer);
   Result<modbus::Pdu> exchange_contested(const modbus::Pdu& request, const modbus::Pdu& accepted);
   void note_refutation(const modbus::Adu& stray);
-  [[nodiscard]] const OtherRead* own_shape_of(const Others& others) const;
+  [[nodiscard]] std::vector<OtherRead> with_own_shapes(const Others& others) const;
+  [[nodiscard]] bool answers_come_in_order() const;
   [[nodiscard]] bool has_loopback() const {
     return options_.proof == SessionOptions::Proof::loopback;
   }
