@@ -319,9 +319,11 @@ Result<std::optional<modbus::Pdu>> Session::prove(const modbus::Pdu& request,
   contested_ = {request};
   auto again = exchange_contested(request, answer);
   if (!again) return tl::unexpected(std::move(again.error()));
-  const bool may_lose_ours = !transport_->company().empty();
-  if (*again != answer || refutations_ > 0 || may_lose_ours) return std::nullopt;
-  if (!has_loopback()) return answer;
+  if (*again != answer || refutations_ > 0) return std::nullopt;
+  if (!has_loopback()) {
+    const bool may_lose_ours = !transport_->company().empty();
+    return may_lose_ours ? std::nullopt : std::optional(answer);
+  }
   contested_ = {request};
   return prove_by_loopback(answer);
 }

@@ -63,15 +63,20 @@ def writes_of(frame):
 
 
 class Bus:
-    """Simulated drivers on a pseudo terminal or behind a port, with what the simulator heard."""
+    """Simulated drivers on a pseudo terminal or behind a port, with what the simulator heard.
 
-    def __init__(self, *options, units="1-3", where="--pty"):
+    They hear frames also without silence before them, unless `silence` is asked for: a simulator that the
+    machine keeps from listening for some milliseconds sees none where there was enough. That the program
+    keeps it is shown in test_serial_line."""
+
+    def __init__(self, *options, units="1-3", where="--pty", silence=False):
         self._folder = tempfile.TemporaryDirectory(prefix="spindle-blv-")
         folder = pathlib.Path(self._folder.name)
         self.path = folder / "line"
         self._log = folder / "log"
         place = ["--pty", self.path] if where == "--pty" else ["--listen", where]
-        arguments = ["simulate", "orientalmotor-blv", *place, "--units", units, "-v", *options]
+        arguments = ["simulate", "orientalmotor-blv", *place, "--units", units, "-v",
+                     *([] if silence else ["--no-gap"]), *options]
         with open(self._log, "wb") as log:
             self.process = subprocess.Popen(
                 [support.binary(), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -263,7 +268,8 @@ class MotorTest(unittest.TestCase):
     def running(self, bus, *options, **how):
         """A remote start whose motor turns."""
         with support.Running(*arguments_of_start(bus.url, *options), **how) as started:
-            support.wait_until(bus.has_started, "the motor is started")
+            support.wait_until(lambda: bus.has_started() or started.process.poll() is not None, "the motor is started")
+            self.assertIsNone(started.process.poll(), f"it ended before it started the motor: {bus.told()}")
             yield started
 
 

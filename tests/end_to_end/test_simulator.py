@@ -40,7 +40,7 @@ def answer_from(line, patience=support.DEADLINE):
 
 class Simulator(unittest.TestCase):
     def test_what_is_not_answered_is_told_with_its_reason(self):
-        with Bus(units="1") as bus:
+        with Bus(units="1", silence=True) as bus:
             line = os.open(bus.path, os.O_RDWR | os.O_NOCTTY)
             try:
                 def is_told():
