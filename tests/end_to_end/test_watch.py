@@ -150,7 +150,9 @@ class CompletenessTest(unittest.TestCase):
                 [(event["number"], event["source"]) for event in events],
                 [(1962, "catch-up"), (1963, "push"), (1966, "catch-up")],
             )
-            self.assertEqual([gap["missed"] for gap in watching.records("gap")], [2])
+            # Where the machine keeps the watch from its keep-alive, that is told without a number.
+            counted = [gap["missed"] for gap in watching.records("gap") if gap["missed"] is not None]
+            self.assertEqual(counted, [2])
 
     def test_counter_that_comes_to_the_last_number_again(self):
         """Twenty events happen behind a restart; the number that is found hides them."""
