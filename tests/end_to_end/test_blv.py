@@ -614,13 +614,11 @@ class ScanTest(MotorTest):
         def scan():
             with Bus(units="17") as bus:
                 url = bus.url.partition("?")[0]
-                return run("scan", url, "--units", "1-31", "--timeout", "50ms", "--json"), bus.requests()
+                return run("scan", url, "--units", "1-31", "--timeout", "250ms", "--json"), bus.requests()
 
         # Each is asked once: the first by a reading, as a loop-back tells no echo of the adapter from an answer.
-        # A bus that the machine keeps from listening for 50 ms hears two requests as none.
         all_once = list(range(1, 32))
-        finished, requests = support.first_good(
-            scan, lambda scanned: scanned[0].status == 0 and [r[0] for r in scanned[1]] == all_once, attempts=5)
+        finished, requests = support.first_good(scan, lambda scanned: scanned[0].status == 0)
         self.assertEqual(finished.status, 0, finished)
         self.assertEqual([r["unit"] for r in finished.records("unit")], [17])
         self.assertEqual([r[0] for r in requests], all_once)
