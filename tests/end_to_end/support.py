@@ -180,6 +180,15 @@ def first_good(attempt, is_good, attempts=3):
     return attempt()
 
 
+def rtu_requests(data):
+    """The frames in what a bus heard at once: one that the machine kept from listening hears several. Reads,
+    loop-backs and writes of one register have eight bytes, writes of several say their length."""
+    while data:
+        length = 9 + data[6] if data[1] == 0x10 and len(data) > 6 else 8
+        yield data[:length]
+        data = data[length:]
+
+
 # --- the program ------------------------------------------------------------------------------
 
 

@@ -111,7 +111,7 @@ class Bus:
     def requests(self):
         """Whole requests in order, without their checksums."""
         found = re.findall(r" -> ([0-9A-Fa-f ]+)$", self._log.read_text(), re.MULTILINE)
-        return [bytes.fromhex(text)[:-2] for text in found]
+        return [frame[:-2] for text in found for frame in support.rtu_requests(bytes.fromhex(text))]
 
     def commands(self, unit=1):
         """What was written to the command register of a unit, in order."""

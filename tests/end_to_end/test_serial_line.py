@@ -68,7 +68,9 @@ class Bus:
     def heard(self):
         """Once it has ended: (nanoseconds, '>' or '<', bytes) in order."""
         found = re.findall(r"^(\d+) ([<>]) (.*)$", self._log.read_text(), re.MULTILINE)
-        return [(int(at), way, bytes.fromhex(text)) for at, way, text in found]
+        heard = [(int(at), way, bytes.fromhex(text)) for at, way, text in found]
+        return [(at, way, frame) for at, way, data in heard
+                for frame in (support.rtu_requests(data) if way == ">" else [data])]
 
     def is_open_in(self, pid):
         line = os.path.realpath(self.path)
