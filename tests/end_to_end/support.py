@@ -27,6 +27,7 @@ import tempfile
 import termios
 import threading
 import time
+import tty
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEADLINE = 20.0  # for what must happen at all; never waited out when things go well
@@ -178,6 +179,38 @@ def first_good(attempt, is_good, attempts=3):
         if is_good(outcome):
             return outcome
     return attempt()
+
+
+class SerialEnd:
+    """The far end of a serial port that the program opens by `url`, served by a thread as long as the with
+    statement lasts. A derived class says in `_serve` what happens there, until `_ended`."""
+
+    def __init__(self):
+        self._line, terminal = os.openpty()
+        tty.setraw(terminal)
+        self.url = f"rtu://{os.ttyname(terminal)}?unit=1"
+        os.close(terminal)
+        self._ended = False
+        self._thread = threading.Thread(target=self._serve)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended = True
+        self._thread.join()
+        os.close(self._line)
+
+    @staticmethod
+    def _arrived(line):
+        """What came within a moment, perhaps nothing."""
+        ready, _, _ = select.select([line], [], [], 0.02)
+        try:
+            return os.read(line, 256) if ready else b""
+        except OSError:  # the program has not opened its end, or has closed it
+            time.sleep(POLL)
+            return b""
 
 
 def rtu_requests(data):

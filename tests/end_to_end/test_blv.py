@@ -6,15 +6,12 @@ import dataclasses
 import os
 import pathlib
 import re
-import select
 import selectors
 import signal
 import struct
 import subprocess
 import tempfile
-import threading
 import time
-import tty
 import unittest
 
 import support
@@ -170,7 +167,7 @@ def starts_a_motor(request):
     return any(write.register == COMMAND and write.value & START_BITS for write in writes_of(request))
 
 
-class SpoiltStart:
+class SpoiltStart(support.SerialEnd):
     """A line between the program and a bus that carries everything, but spoils the answer to a start.
 
     A fault that the simulator counts would not do: how many requests go before the start depends on how
@@ -185,47 +182,32 @@ class SpoiltStart:
     }
 
     def __init__(self, bus, fault):
+        super().__init__()
         self._spoil = self.FAULTS[fault]
         self.spoilt = 0
-        self._program, terminal = os.openpty()
-        tty.setraw(terminal)
-        self.url = f"rtu://{os.ttyname(terminal)}?unit=1"
-        os.close(terminal)
         self._drivers = os.open(bus.path, os.O_RDWR | os.O_NOCTTY)
-        self._ended = False
-        self._thread = threading.Thread(target=self._carry)
-
-    def __enter__(self):
-        self._thread.start()
-        return self
 
     def __exit__(self, *_):
-        self._ended = True
-        self._thread.join()
+        super().__exit__()
         os.close(self._drivers)
-        os.close(self._program)
 
     def _frame(self, line):
         """The next whole frame, or nothing once the line is not needed any more."""
         frame = b""
         while not self._ended:
-            ready, _, _ = select.select([line], [], [], 0.02)
-            try:
-                frame += os.read(line, 256) if ready else b""
-            except OSError:  # the program has not opened its end, or has closed it
-                time.sleep(support.POLL)
+            frame += self._arrived(line)
             if len(frame) > 3 and with_checksum(frame[:-2]) == frame:
                 return frame
         return b""
 
-    def _carry(self):
-        while request := self._frame(self._program):
+    def _serve(self):
+        while request := self._frame(self._line):
             os.write(self._drivers, request)
             answer = self._frame(self._drivers)
             if answer and starts_a_motor(request):
                 self.spoilt += 1
                 answer = self._spoil(answer)
-            os.write(self._program, answer)
+            os.write(self._line, answer)
 
 
 def run(command, url, *arguments, **how):

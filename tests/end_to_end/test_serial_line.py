@@ -12,7 +12,6 @@ import subprocess
 import tempfile
 import threading
 import time
-import tty
 import unittest
 
 import support
@@ -93,28 +92,14 @@ def run(*arguments):
     return support.run(*arguments, "--profile", str(DRIVE), "--json")
 
 
-class SlowUnit:
+class SlowUnit(support.SerialEnd):
     """A unit that is late at first: it says what it owes when it is asked again, and is deaf while it speaks,
     as on a line of two wires. Its registers hold their numbers."""
 
     def __init__(self):
-        self._line, terminal = os.openpty()
-        tty.setraw(terminal)
-        self.url = f"rtu://{os.ttyname(terminal)}?unit=1"
-        os.close(terminal)
+        super().__init__()
         self._owed = []
         self._owes = True
-        self._ended = False
-        self._thread = threading.Thread(target=self._serve)
-
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._ended = True
-        self._thread.join()
-        os.close(self._line)
 
     def answers_late(self):
         self._owes = False
@@ -122,11 +107,7 @@ class SlowUnit:
     def _serve(self):
         request = b""
         while not self._ended:
-            ready, _, _ = select.select([self._line], [], [], 0.02)
-            try:
-                request += os.read(self._line, 256) if ready else b""
-            except OSError:  # the port is not open
-                time.sleep(support.POLL)
+            request += self._arrived(self._line)
             if len(request) < 8:
                 continue
             frame, request = request[:8], b""

@@ -2,10 +2,8 @@
 
 #include <doctest/doctest.h>
 #include <stdlib.h>
-#include <sys/stat.h>
 
 #include <filesystem>
-#include <fstream>
 
 using namespace std::chrono_literals;
 using namespace spindle;
