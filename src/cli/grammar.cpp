@@ -1105,8 +1105,8 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   invocation.format = *format;
   invocation.color = *color;
   invocation.talk = typed.quiet ? report::Talk::quiet : report::Talk::normal;
-  invocation.tools_file = typed.tools;
   common.profile = typed.profile;
+  common.tools_file = typed.tools;
   common.timeout = *timeout;
   common.connect_timeout = *connect_timeout;
   if (typed.no_input) common.consent = commands::Consent::no_input;

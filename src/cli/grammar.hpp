@@ -23,7 +23,6 @@ struct Invocation {
   report::Format format = report::Format::table;
   report::Talk talk = report::Talk::normal;
   ColorChoice color = ColorChoice::automatic;
-  std::string tools_file = {};  ///< --tools; empty: look for one
   /// Whether the command wants the tools file without a fault, makes do with what can be read of
   /// it, or is about its faults.
   enum class ToolsFile : std::uint8_t { loaded, salvaged, only_found };

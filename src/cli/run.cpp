@@ -57,7 +57,7 @@ std::vector<std::string> profile_folders(const World& world) {
 
 /// The tools file that counts; empty when there is none.
 std::string find_tools_file(const World& world, const Invocation& invocation) {
-  if (!invocation.tools_file.empty()) return invocation.tools_file;
+  if (!invocation.common.tools_file.empty()) return invocation.common.tools_file;
   if (std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) return named;
   std::vector<std::string> places = {"./spindle.yaml"};
   const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");

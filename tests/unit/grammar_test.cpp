@@ -195,7 +195,7 @@ TEST_CASE("common options work before and behind the command's name") {
     CHECK(typed.format == report::Format::csv);
     CHECK(typed.talk == report::Talk::quiet);
     CHECK(typed.color == cli::ColorChoice::never);
-    CHECK(typed.tools_file == "t.yaml");
+    CHECK(typed.common.tools_file == "t.yaml");
     CHECK(typed.common.profile == "doga-bm");
     CHECK(typed.common.timeout == std::chrono::milliseconds(250));
     CHECK(typed.common.connect_timeout == std::chrono::seconds(2));

@@ -33,7 +33,8 @@ enum class Verbosity : std::uint8_t { normal, frames };
 
 /// The options that every command takes (contract, section 2.2), as far as commands see them.
 struct CommonOptions {
-  std::string profile = {};  ///< --profile; empty: not given
+  std::string profile = {};     ///< --profile; empty: not given
+  std::string tools_file = {};  ///< --tools; empty: looked for
   std::optional<Duration> timeout = std::nullopt;
   std::optional<Duration> connect_timeout = std::nullopt;
   std::optional<unsigned> retries = std::nullopt;
