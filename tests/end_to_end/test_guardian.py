@@ -97,7 +97,7 @@ class KilledTest(unittest.TestCase):
 
     def test_a_motor(self):
         for where in test_blv.PLACES:
-            for options in ([], ["--watchdog", "1s"]):
+            for options in ([], ["--watchdog", "10s"]):  # that the driver does not stop first
                 with self.subTest(where, options=options), test_blv.Bus(where=where) as bus:
                     words = [bus.url, *test_blv.PROFILE, "--speed", "500", "--accept-unverified", "--yes"]
                     with support.Running("remote-start", *words, *options) as run:
