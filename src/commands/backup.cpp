@@ -1,14 +1,15 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <utility>
+#include <variant>
 
 #include "listing.hpp"
-#include "progress.hpp"
 #include "records.hpp"
+#include "run_verb.hpp"
 #include "shared_lines.hpp"
-#include "side_by_side.hpp"
 #include "snapshots.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/files/backup_file.hpp"
@@ -22,8 +23,7 @@ using report::Column;
 
 constexpr std::string_view standard_output = "-";
 
-const std::array<Column, 4> columns = {{{"TARGET", "target"},
-                                        {"FILE", "file"},
+const std::array<Column, 3> columns = {{{"FILE", "file"},
                                         {"PARAMETERS", "parameters", Align::right},
                                         {"MISSING", "missing", Align::right}}};
 
@@ -73,139 +73,142 @@ Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOption
   return paths;
 }
 
-/// Loads every profile once, however many tools have it.
-Result<std::map<std::string, catalogue::Profile>> load_profiles(const std::vector<Target>& targets,
-                                                                const Context& context) {
-  std::map<std::string, catalogue::Profile> profiles;
+/// A profile that can not be read is told before a tool is asked.
+Result<void> check_profiles(const std::vector<Target>& targets, const Context& context) {
   for (const Target& target : targets) {
-    if (profiles.contains(target.profile)) continue;
-    auto profile = load_profile(target, context);
-    if (!profile) return tl::unexpected(std::move(profile.error()));
-    profiles.emplace(target.profile, std::move(*profile));
+    if (auto profile = load_profile(target, context); !profile) {
+      return tl::unexpected(std::move(profile.error()));
+    }
   }
-  return profiles;
+  return {};
 }
 
-struct Saved {
-  Target target;
-  std::string path;
-  ToolSnapshot taken;
-
-  [[nodiscard]] std::size_t count(Missing why) const {
+report::Record saved_record(const Target& target, const std::string& path,
+                            const ToolSnapshot& taken, const Clock& clock) {
+  const auto missing = [&](Missing why) {
     return static_cast<std::size_t>(
         std::count_if(taken.snapshot.missing.begin(), taken.snapshot.missing.end(),
                       [why](const auto& entry) { return entry.why == why; }));
-  }
+  };
+  return {.type = "backup",
+          .target = target.shown,
+          .time = clock.wall(),
+          .fields = {{"file", path},
+                     {"parameters", count(taken.snapshot.entries.size())},
+                     {"missing", count(taken.snapshot.missing.size())},
+                     {"absent", count(missing(Missing::absent))},
+                     {"unreadable", count(missing(Missing::unreadable))},
+                     {"left_out", count(missing(Missing::left_out))}}};
+}
+
+/// Whether a file was written. A backup that lacks what could not be read is a failure all the
+/// same.
+struct Saved {
+  Outcome outcome = {};
+  bool is_written = false;
 };
 
-/// Backs tools up side by side; what it refers to does not change meanwhile.
-class Saving {
+/// What it refers to does not change while it runs.
+class Backup final : public Verb<std::monostate, Saved> {
  public:
-  Saving(const BackupOptions& options, const Paths& paths,
-         const std::map<std::string, catalogue::Profile>& profiles, ProgressLine& progress,
-         const Context& context)
-      : options_(&options),
-        paths_(&paths),
-        profiles_(&profiles),
-        progress_(&progress),
-        context_(&context) {}
+  Backup(const BackupOptions& options, const Paths& paths) : options_(&options), paths_(&paths) {}
 
-  Result<Saved> save(const Target& target) {
-    auto tool = open_tool(target, profiles_->at(target.profile), Need::named_registers, *context_);
-    if (!tool) return tl::unexpected(std::move(tool.error()));
-    auto taken = take_snapshot(*tool, options_->secrets, *context_, reading(target));
-    if (!taken) return tl::unexpected(std::move(taken.error()));
-    const std::string& path = paths_->at(target.shown);
-    auto written = write(path, files::render_backup(taken->snapshot));
-    if (!written) return tl::unexpected(tool->target.blamed(std::move(written.error())));
-    return Saved{tool->target, path, std::move(*taken)};
+  Result<Plan> plan(const catalogue::Profile& /*profile*/,
+                    const Target& /*target*/) const override {
+    return Plan();
+  }
+
+  Result<Done> perform(OpenTool& tool, const Plan& /*plan*/, Context& context) const override {
+    const auto taken = save(tool, context);
+    if (is_quiet()) return tell_quietly(taken);
+    if (!taken) return tell_failure(taken.error(), context);
+    Saved saved{.is_written = true};
+    Listing listing(context, columns);
+    listing.add(saved_record(tool.target, paths_->at(tool.target.shown), *taken, context.clock));
+    saved.outcome.succeed();
+    for (const Error& error : taken->unreadable) {
+      saved.outcome.fail(error);
+      listing.add(error);
+    }
+    return finish(listing, saved.outcome).map([&](const Outcome&) { return saved; });
+  }
+
+  Result<Done> give_up(const Target& /*target*/, const Plan* /*plan*/, const Error& error,
+                       Context& context) const override {
+    return tell_failure(error, context);
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    const auto saved = static_cast<std::size_t>(
+        std::count_if(all.done.begin(), all.done.end(),
+                      [](const auto& done) { return done && done->is_written; }));
+    const std::size_t failed = all.tools - saved;
+    return Summary{.counts = {{"saved", count(saved)}, {"failed", count(failed)}},
+                   .sentence = fmt::format("{} saved, {} failed", saved, failed)};
   }
 
  private:
-  Result<void> write(const std::string& path, const std::string& text) {
-    if (path == standard_output) return context_->io.out(text);
-    const Privacy privacy = options_->secrets == Secrets::include ? Privacy::own : Privacy::usual;
-    return context_->disk.write(path, text, options_->overwrite, privacy);
+  /// Standard output holds the backup and nothing else.
+  [[nodiscard]] bool is_quiet() const { return options_->file == standard_output; }
+
+  Result<ToolSnapshot> save(OpenTool& tool, const Context& context) const {
+    auto taken = read(tool, context);
+    if (!taken) return taken;
+    return write(paths_->at(tool.target.shown), files::render_backup(taken->snapshot), context)
+        .map([&] { return std::move(*taken); });
   }
 
   /// Of several tools it is shown how many are done.
-  link::Progress reading(const Target& target) {
-    if (paths_->size() > 1) return {};
-    return progress_->counter(target.shown + ": reading");
+  [[nodiscard]] Result<ToolSnapshot> read(OpenTool& tool, const Context& context) const {
+    if (paths_->size() > 1) return take_snapshot(tool, options_->secrets, context);
+    ProgressLine progress(context);
+    return take_snapshot(tool, options_->secrets, context,
+                         progress.counter(tool.target.shown + ": reading"));
+  }
+
+  [[nodiscard]] Result<void> write(const std::string& path, const std::string& text,
+                                   const Context& context) const {
+    if (path == standard_output) return context.io.out(text);
+    const Privacy privacy = options_->secrets == Secrets::include ? Privacy::own : Privacy::usual;
+    return context.disk.write(path, text, options_->overwrite, privacy);
+  }
+
+  static Result<Done> tell_quietly(const Result<ToolSnapshot>& taken) {
+    if (!taken) return tl::unexpected(taken.error());
+    if (!taken->unreadable.empty()) return tl::unexpected(taken->unreadable.front());
+    Saved saved{.is_written = true};
+    saved.outcome.succeed();
+    return saved;
+  }
+
+  /// A list without files has its columns all the same.
+  static Result<Done> tell_failure(const Error& error, Context& context) {
+    Saved saved;
+    saved.outcome.fail(error);
+    Listing listing(context, columns);
+    listing.add(error);
+    return finish(listing, saved.outcome).map([&](const Outcome&) { return saved; });
   }
 
   const BackupOptions* options_;
   const Paths* paths_;
-  const std::map<std::string, catalogue::Profile>* profiles_;
-  ProgressLine* progress_;
-  const Context* context_;
 };
-
-report::Record saved_record(const Saved& saved, const Clock& clock) {
-  return {.type = "backup",
-          .target = saved.target.shown,
-          .time = clock.wall(),
-          .fields = {{"file", saved.path},
-                     {"parameters", count(saved.taken.snapshot.entries.size())},
-                     {"missing", count(saved.taken.snapshot.missing.size())},
-                     {"absent", count(saved.count(Missing::absent))},
-                     {"unreadable", count(saved.count(Missing::unreadable))},
-                     {"left_out", count(saved.count(Missing::left_out))}}};
-}
-
-/// Tells how every tool came out. A backup that lacks what could not be read is a failure.
-Result<Outcome> tell(const std::vector<Result<Saved>>& results, Context& context) {
-  Outcome outcome;
-  Listing listing(context, columns);
-  const auto fail = [&](const Error& error) {
-    outcome.fail(error);
-    listing.add(error);
-  };
-  for (const Result<Saved>& result : results) {
-    if (!result) {
-      fail(result.error());
-      continue;
-    }
-    listing.add(saved_record(*result, context.clock));
-    outcome.succeed();
-    for (const Error& error : result->taken.unreadable) fail(error);
-  }
-  const auto saved = static_cast<std::size_t>(std::count_if(
-      results.begin(), results.end(), [](const auto& result) { return result.has_value(); }));
-  return finish(listing, outcome,
-                {.counts = {{"saved", count(saved)}, {"failed", count(results.size() - saved)}},
-                 .sentence = fmt::format("{} saved, {} failed", saved, results.size() - saved)},
-                context);
-}
-
-/// Standard output holds the backup and nothing else.
-Result<Outcome> tell_quietly(const Result<Saved>& result) {
-  if (!result) return tl::unexpected(result.error());
-  if (!result->taken.unreadable.empty()) return tl::unexpected(result->taken.unreadable.front());
-  Outcome outcome;
-  outcome.succeed();
-  return outcome;
-}
 
 }  // namespace
 
 Result<Outcome> backup(const BackupOptions& options, Context& context) {
-  const auto targets = resolve_compatible_targets(options.targets, context);
-  if (!targets) return tl::unexpected(targets.error());
-  const auto paths = check_paths(*targets, options, context);
+  auto tools = resolve_compatible_targets(options.targets, context);
+  if (!tools) return tl::unexpected(std::move(tools.error()));
+  const auto paths = check_paths(*tools, options, context);
   if (!paths) return tl::unexpected(paths.error());
-  const auto profiles = load_profiles(*targets, context);
-  if (!profiles) return tl::unexpected(profiles.error());
+  if (auto known = check_profiles(*tools, context); !known) return tl::unexpected(known.error());
   if (!options.folder.empty()) {
     auto made = context.disk.make_folders(options.folder, Privacy::usual);
     if (!made) return tl::unexpected(std::move(made.error()));
   }
-  ProgressLine progress(context);
-  Saving saving(options, *paths, *profiles, progress, context);
-  const auto results = side_by_side(
-      *targets, options.jobs, [&](const Target& target) { return saving.save(target); }, &progress);
-  if (options.file == standard_output) return tell_quietly(results.front());
-  return tell(results, context);
+  const bool is_listed = options.file != standard_output;
+  return run_verb(Backup(options, *paths), {.tools = std::move(*tools), .is_group = is_listed},
+                  options.jobs, context);
 }
 
 }  // namespace spindle::commands

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <utility>
 
 #include "consent.hpp"
-#include "group.hpp"
+#include "driver.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
@@ -206,19 +207,17 @@ bool is_told_by_question(const Deed& deed, const Context& context) {
 
 }  // namespace
 
-Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
-                           std::size_t of, const Context& context) {
+Result<void> ask_for_group(const PlannedDeeds& planned, std::size_t of, const Context& context) {
   std::vector<std::string> names;
   Question question;
-  for (const Target& target : targets) {
+  for (const auto& [target, deeds] : planned) {
     names.push_back(target.shown);
-    for (const Deed& deed : deeds.at(target.shown)) {
+    for (const Deed& deed : deeds) {
       if (!is_told_by_question(deed, context)) tell_notes(deed, target, context);
       question.add(deed);
     }
   }
-  const std::string tools = tools_in_words(names, of);
-  return question.ask(tools, context);
+  return question.ask(tools_in_words(names, of), context);
 }
 
 std::string_view to_text(device::ActionResult result) {

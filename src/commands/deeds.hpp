@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/target.hpp"
 #include "spindle/report/renderer.hpp"
+#include "verb.hpp"
 
 namespace spindle::commands {
 
@@ -37,13 +37,12 @@ Result<void> check_evidence(const catalogue::Action& action, const Target& targe
 Result<void> ask_for_hazards(const std::vector<Deed>& deeds, const Target& target,
                              const Context& context);
 
-/// What is to be done on each tool of a group, by its name.
-using GroupDeeds = std::map<std::string, std::vector<Deed>>;
+/// What is to be done on each tool of a group.
+using PlannedDeeds = std::vector<Planned<std::vector<Deed>>>;
 
 /// Asks once for a whole group of `of` tools, whatever the hazard; tells first what the notes of
 /// the deeds say.
-Result<void> ask_for_group(const std::vector<Target>& targets, const GroupDeeds& deeds,
-                           std::size_t of, const Context& context);
+Result<void> ask_for_group(const PlannedDeeds& planned, std::size_t of, const Context& context);
 
 std::string_view to_text(device::ActionResult result);
 

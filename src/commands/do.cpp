@@ -5,12 +5,11 @@
 
 #include "change_log.hpp"
 #include "deeds.hpp"
-#include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "run_verb.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -83,109 +82,88 @@ std::optional<Error> failure_of(const Deed& deed, const Result<device::ActionRes
   if (result == device::ActionResult::not_confirmed) return not_confirmed(deed, target);
   if (result) return std::nullopt;
   Error error = result.error();
-  if (is_interruption(error)) {
+  if (work::is_interruption(error)) {
     error.name = deed.action.name;
     error.hint = "whether it was done is not known: look at the tool";
   }
   return error;
 }
 
-/// Whether their notes were told when somebody was asked.
-enum class Notes : std::uint8_t { to_tell, told };
+/// Carries actions out in order and stops at the first that fails: later ones may rest on it.
+class Do final : public Verb<std::vector<Deed>, Outcome> {
+ public:
+  Do(const DoOptions& options, bool is_group) : options_(&options), is_group_(is_group) {}
 
-/// Carries the deeds out in order and stops at the first that fails: later ones may rest on it.
-Result<Outcome> carry_out(const std::vector<Deed>& deeds, OpenTool& tool, Notes notes,
-                          Context& context) {
-  Outcome outcome;
-  Listing listing(context, deed_columns());
-  work::ChangeLog log = change_log("do", tool, context);
-  for (const Deed& deed : deeds) {
-    std::optional<Error> error;
-    if (context.interrupt.signalled()) {
-      error = tool.target.blamed(context.interrupt.error());
-    } else {
-      if (notes == Notes::to_tell) tell_notes(deed, tool.target, context);
-      const auto result = perform_recorded(deed, tool, log, context);
-      if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
-      error = failure_of(deed, result, tool.target);
-    }
-    if (error) {
-      outcome.fail(*error);
-      listing.add(*error);
-      break;
-    }
-    outcome.succeed();
+  [[nodiscard]] bool changes_tools() const override { return true; }
+
+  Result<Plan> plan(const Profile& profile, const Target& target) const override {
+    return check_deeds(*options_, profile, target);
   }
-  return finish(listing, outcome, summary_of(outcome, tool.target.reach, tool.target.shown),
-                context);
-}
 
-Result<Outcome> perform_on_one(const Target& target, const DoOptions& options, Context& context) {
-  auto opened = open_prepared(target, Need::named_registers, context, [&](const Profile& profile) {
-    return check_deeds(options, profile, target).and_then([&](std::vector<Deed> deeds) {
-      return ask_for_hazards(deeds, target, context).map([&] { return std::move(deeds); });
-    });
-  });
-  if (!opened) return tl::unexpected(std::move(opened.error()));
-  return carry_out(opened->prepared, opened->tool, Notes::to_tell, context);
-}
+  Result<void> ask(const AllPlanned& planned, std::size_t of, Context& context) const override {
+    if (is_group_) return ask_for_group(planned, of, context);
+    return ask_for_hazards(planned.front().plan, planned.front().target, context);
+  }
 
-Result<Outcome> list_for_group(const std::vector<Target>& targets, const DoOptions& options,
-                               Context& context) {
-  const auto performances =
-      tape_each(targets, options.jobs, context,
-                [](const Target& target, Context& own) { return list_actions(target, own); });
-  const Outcome outcome = outcome_of_all(performances);
-  Summary summary = listed(outcome, {});
-  summary.sentence += " of " + counted(targets.size(), "tool");
-  return play(performances, context)
-      .and_then([&] { return tell(std::move(summary), outcome, context); })
-      .map([&] { return outcome; });
-}
+  Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    Outcome outcome;
+    Listing listing(context, deed_columns());
+    work::ChangeLog log = change_log("do", tool, context);
+    for (const Deed& deed : plan) {
+      if (const auto error = carry_out(deed, tool, log, listing, context)) {
+        outcome.fail(*error);
+        listing.add(*error);
+        break;
+      }
+      outcome.succeed();
+    }
+    return finish(listing, outcome, summary_of(outcome, tool.target.reach, tool.target.shown),
+                  context);
+  }
 
-/// Nothing is sent to any tool before all of it is known to fit, and somebody agreed.
-Result<Outcome> perform_on_group(const std::vector<Target>& targets, const DoOptions& options,
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    Summary summary = summary_of(all.outcome, Reach::one, {});
+    summary.sentence += " on " + counted(all.tools, "tool");
+    return summary;
+  }
+
+ private:
+  /// Why it did not succeed. The notes about a group were told when it was asked about.
+  std::optional<Error> carry_out(const Deed& deed, OpenTool& tool, work::ChangeLog& log,
+                                 Listing& listing, const Context& context) const {
+    if (context.interrupt.signalled()) return context.interrupt.error();
+    if (!is_group_) tell_notes(deed, tool.target, context);
+    const auto result = perform_recorded(deed, tool, log, context);
+    if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
+    return failure_of(deed, result, tool.target);
+  }
+
+  const DoOptions* options_;
+  bool is_group_;
+};
+
+Result<Outcome> list_all_actions(const Targets& targets, const DoOptions& options,
                                  Context& context) {
-  auto ready = make_ready(targets, options.jobs, context, [&](const Target& target, Context& own) {
-    return plan_by_profile(
-        target, own, [&](const Profile& profile) { return check_deeds(options, profile, target); });
-  });
-  if (!ready) return tl::unexpected(std::move(ready.error()));
-  if (ready->refused.failed() > 0) {
-    return refuse_all(ready->refused, summary_of(ready->refused, Reach::one, {}), targets.size(),
-                      context);
-  }
-  auto agreed = ask_for_group(ready->targets, ready->plans, targets.size(), context);
-  if (!agreed) return tl::unexpected(std::move(agreed.error()));
-  const auto perform_one = [&](const Target& target, Context& own) -> Result<Outcome> {
-    auto profile = load_profile(target, own);
-    if (!profile) return tl::unexpected(std::move(profile.error()));
-    auto tool = open_tool(target, std::move(*profile), Need::named_registers, own);
-    if (!tool) return tl::unexpected(std::move(tool.error()));
-    return carry_out(ready->plans.at(target.shown), *tool, Notes::told, own);
-  };
-  const auto performances = tape_each(ready->targets, options.jobs, context, perform_one);
-  Outcome outcome = outcome_of_all(performances);
-  outcome.add(ready->lost);
-  Summary summary = summary_of(outcome, Reach::one, {});
-  summary.sentence += " on " + counted(targets.size(), "tool");
-  return play(performances, context)
-      .and_then([&] { return tell(std::move(summary), outcome, context); })
-      .map([&] { return outcome; });
+  if (!targets.is_group) return list_actions(targets.tools.front(), context);
+  RecordedOutput output(targets.tools.size(), context.renderer);
+  const auto results = for_each_told(
+      targets.tools, options.jobs, output, context, [](const Target& target, Context& own) {
+        return begin_turn(target, own).and_then([&] { return list_actions(target, own); });
+      });
+  const Outcome outcome = outcome_of_all(results);
+  Summary summary = listed(outcome, {});
+  summary.sentence += " of " + counted(targets.tools.size(), "tool");
+  return end_group(output, std::move(summary), outcome, context);
 }
 
 }  // namespace
 
 Result<Outcome> perform(const DoOptions& options, Context& context) {
-  const auto targets = resolve_one_or_group(options.target, options.reach, context);
-  if (!targets) return tl::unexpected(targets.error());
-  const bool listing = options.actions.empty();
-  if (is_group(options.target, options.reach)) {
-    return listing ? list_for_group(*targets, options, context)
-                   : perform_on_group(*targets, options, context);
-  }
-  return listing ? list_actions(targets->front(), context)
-                 : perform_on_one(targets->front(), options, context);
+  return resolve_one_or_group(options.target, options.reach, context)
+      .and_then([&](const Targets& targets) {
+        if (options.actions.empty()) return list_all_actions(targets, options, context);
+        return run_verb(Do(options, targets.is_group), targets, options.jobs, context);
+      });
 }
 
 }  // namespace spindle::commands

@@ -2,14 +2,13 @@
 
 #include <array>
 #include <utility>
+#include <variant>
 
 #include "listing.hpp"
-#include "progress.hpp"
 #include "records.hpp"
+#include "run_verb.hpp"
 #include "shared_lines.hpp"
-#include "side_by_side.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
 #include "spindle/device/motor.hpp"
 
 namespace spindle::commands {
@@ -18,8 +17,7 @@ namespace {
 using report::Cell;
 using report::Column;
 
-const std::array<Column, 6> columns = {{{"TARGET", "target"},
-                                        {"MODEL", "tool_model"},
+const std::array<Column, 5> columns = {{{"MODEL", "tool_model"},
                                         {"SERIAL", "serial"},
                                         {"FIRMWARE", "firmware"},
                                         {"PROFILE", "profile"},
@@ -64,10 +62,9 @@ report::Record identity_record(const OpenTool& tool, const Identification& found
 
 std::optional<Error> misfit_of(const Target& target, const Identification& found) {
   if (target.profile.empty() || !found.candidates.empty()) return std::nullopt;
-  return target.blamed(
-      {.code = Errc::mismatch,
-       .message = fmt::format("this is not what profile {} describes: {}", target.profile,
-                              fmt::join(found.identity.notes, "; "))});
+  return Error{.code = Errc::mismatch,
+               .message = fmt::format("this is not what profile {} describes: {}", target.profile,
+                                      fmt::join(found.identity.notes, "; "))};
 }
 
 /// The table has no room for notes, so people get them as sentences.
@@ -121,52 +118,77 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
   return Identified{identity_record(tool, found, *round_trip, clock), std::nullopt};
 }
 
-Result<Identified> identify_one(const Target& target, const Context& context) {
-  auto profile = load_profile(target, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  const std::string only = profile->id;
-  auto tool = connect(target, std::move(*profile), context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
+Result<Identified> identify_one(OpenTool& tool, const Context& context) {
+  const Target& target = tool.target;
   // What says nothing of an identity can not be contradicted by one.
   const bool named = !target.profile.empty();
-  if (named && !tool->profile->identity) return meet(*tool, context.clock);
-  if (target.profile.empty() && target.endpoint.medium != link::Medium::tcp) {
-    return tl::unexpected(unproven(tool->target));
+  if (named && !tool.profile->identity) return meet(tool, context.clock);
+  if (!named && target.endpoint.medium != link::Medium::tcp) {
+    return tl::unexpected(unproven(target));
   }
-  const auto answer = tool->device.report_server_id();
+  const auto answer = tool.device.report_server_id();
   if (!answer) return tl::unexpected(answer.error());
-  const Duration round_trip = tool->device.session().last_round_trip();
+  const Duration round_trip = tool.device.session().last_round_trip();
   const auto found = match_identity(*answer, target.profile, context);
   if (!found) return tl::unexpected(found.error());
-  return Identified{identity_record(*tool, *found, round_trip, context.clock),
-                    misfit_of(tool->target, *found)};
+  return Identified{identity_record(tool, *found, round_trip, context.clock),
+                    misfit_of(target, *found)};
 }
+
+class Identify final : public Verb<std::monostate, Outcome> {
+ public:
+  [[nodiscard]] Need need() const override { return Need::raw_registers; }
+
+  Result<Plan> plan(const catalogue::Profile& /*profile*/,
+                    const Target& /*target*/) const override {
+    return Plan();
+  }
+
+  Result<Done> perform(OpenTool& tool, const Plan& /*plan*/, Context& context) const override {
+    const auto identified = identify_one(tool, context);
+    if (!identified) return tell_failure(identified.error(), context);
+    Outcome outcome;
+    Listing listing(context, columns);
+    listing.add(identified->record);
+    tell_notes(*identified, context);
+    if (identified->misfit) {
+      outcome.fail(*identified->misfit);
+      listing.add(*identified->misfit);
+    } else {
+      outcome.succeed();
+    }
+    return finish(listing, outcome);
+  }
+
+  Result<Done> give_up(const Target& /*target*/, const Plan* /*plan*/, const Error& error,
+                       Context& context) const override {
+    Error wanted = error;
+    if (!wanted.asked_of.empty()) {  // it is about a profile, and about no tool
+      wanted.target.clear();
+      wanted.endpoint.clear();
+    }
+    return tell_failure(wanted, context);
+  }
+
+ private:
+  /// A list without tools has its columns all the same.
+  static Result<Outcome> tell_failure(const Error& error, Context& context) {
+    Outcome outcome;
+    outcome.fail(error);
+    Listing listing(context, columns);
+    listing.add(error);
+    return finish(listing, outcome);
+  }
+};
 
 }  // namespace
 
 Result<Outcome> identify(const IdentifyOptions& options, Context& context) {
-  const auto targets = resolve_compatible_targets(options.targets, context);
-  if (!targets) return tl::unexpected(targets.error());
-  ProgressLine progress(context);
-  const auto results = side_by_side(
-      *targets, options.jobs, [&](const Target& target) { return identify_one(target, context); },
-      &progress);
-  Outcome outcome;
-  Listing listing(context, columns);
-  for (const Result<Identified>& result : results) {
-    if (result) {
-      listing.add(result->record);
-      tell_notes(*result, context);
-    }
-    const std::optional<Error> error = result ? result->misfit : result.error();
-    if (error) {
-      outcome.fail(*error);
-      listing.add(*error);
-    } else {
-      outcome.succeed();
-    }
-  }
-  return finish(listing, outcome);
+  return resolve_compatible_targets(options.targets, context)
+      .and_then([&](std::vector<Target> tools) {
+        return run_verb(Identify(), {.tools = std::move(tools), .is_group = true}, options.jobs,
+                        context);
+      });
 }
 
 }  // namespace spindle::commands

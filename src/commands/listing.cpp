@@ -6,6 +6,13 @@
 
 namespace spindle::commands {
 
+void Listing::add(const Error& error) {
+  if (!drawn_) return;
+  const Target* about = context_->about;
+  drawn_ = context_->renderer.error(about != nullptr ? with_target(error, *about) : error,
+                                    context_->clock.wall());
+}
+
 Result<void> tell(Summary summary, const Outcome& outcome, Context& context) {
   return context.renderer.summary(
       summary_record(std::move(summary.counts), outcome.status(), summary.target, context.clock),

@@ -18,9 +18,8 @@ class Listing {
   void add(const report::Record& record) {
     if (drawn_) drawn_ = context_->renderer.record(record);
   }
-  void add(const Error& error) {
-    if (drawn_) drawn_ = context_->renderer.error(error, context_->clock.wall());
-  }
+  /// As one of the tool that the context is about.
+  void add(const Error& error);
   /// Whether anybody still reads.
   [[nodiscard]] bool open() const { return drawn_.has_value(); }
   Result<void> end() {

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "group.hpp"
 #include "guarded_run.hpp"
 #include "spindle/catalogue/value.hpp"
 
@@ -175,7 +174,7 @@ Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& valu
 Result<void> MotorSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
     if (auto written = write_one(parameter, value); !written) {
-      return tl::unexpected(of_write(parameter.name, std::move(written.error())));
+      return tl::unexpected(work::of_write(parameter.name, std::move(written.error())));
     }
     const bool is_stop =
         parameter.name == catalogue::numbered_name(facts().deceleration, plan_->operation);

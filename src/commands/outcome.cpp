@@ -32,6 +32,12 @@ Context with_renderer(const Context& context, report::Renderer& renderer) {
   return {waiting, surroundings, {.renderer = renderer}};
 }
 
+Context about(const Context& context, const Target& target) {
+  Context same = context;
+  same.about = &target;
+  return same;
+}
+
 void Outcome::fail(const Error& error) { note_failures(1, error.status()); }
 
 void Outcome::add(const Outcome& other) {

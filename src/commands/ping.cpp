@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <mutex>
 #include <numeric>
+#include <variant>
 
-#include "group.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "run_verb.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -76,113 +75,87 @@ report::Record ping_record(unsigned sequence, Duration round_trip, const Target&
                      {"round_trip_ms", milliseconds(round_trip), in_milliseconds(round_trip)}}};
 }
 
-/// Trouble after which asking again on this connection is pointless.
-bool ends_ping(const Error& error) { return error.code != Errc::no_answer; }
-
-/// The one list, which several threads tell what comes.
-class Stage {
+class Ping final : public Verb<std::monostate, Statistics> {
  public:
-  Stage(std::span<const report::Column> shown, Context& context) : listing_(context, shown) {}
+  explicit Ping(const PingOptions& options) : options_(&options) {}
 
-  template <typename News>
-  void add(const News& news) {
-    const std::lock_guard lock(mutex_);
-    listing_.add(news);
+  [[nodiscard]] Need need() const override { return Need::raw_registers; }
+  [[nodiscard]] std::vector<report::Column> live_columns() const override {
+    return {group_columns.begin(), group_columns.end()};
   }
-  [[nodiscard]] bool open() {
-    const std::lock_guard lock(mutex_);
-    return listing_.open();
+
+  Result<Plan> plan(const catalogue::Profile& /*profile*/,
+                    const Target& /*target*/) const override {
+    return Plan();
   }
-  /// Once all threads are done.
-  Listing& listing() { return listing_; }
+
+  Result<Done> perform(OpenTool& tool, const Plan& /*plan*/, Context& context) const override {
+    Statistics counted;
+    Listing listing(context, columns);
+    while (listing.open() && counted.sent < options_->count) {
+      const TimePoint next = context.clock.now() + options_->interval;
+      const bool goes_on = ask_once(tool, counted, listing, context.clock);
+      if (!goes_on || counted.sent == options_->count) break;
+      if (auto slept = context.clock.sleep_until(next); !slept) {
+        counted.outcome.fail(slept.error());
+        break;
+      }
+    }
+    return end(listing, counted, tool.target, context);
+  }
+
+  /// A tool that can not be reached keeps none of the others from being asked, and is counted.
+  Result<Done> give_up(const Target& target, const Plan* /*plan*/, const Error& error,
+                       Context& context) const override {
+    Statistics none;
+    none.outcome.fail(error);
+    Listing listing(context, columns);
+    listing.add(error);
+    return end(listing, none, target, context);
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    Statistics sum;
+    for (const Result<Done>& done : all.done) {
+      if (done) sum.add(*done);
+    }
+    Summary summary = summary_of(sum, {});
+    summary.sentence = fmt::format("{}: {}", counted(all.tools, "tool"), summary.sentence);
+    return summary;
+  }
 
  private:
-  std::mutex mutex_ = {};
-  Listing listing_;
-};
-
-Result<OpenTool> connect_one(const Target& target, const Context& context) {
-  auto profile = load_profile(target, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  return connect(target, std::move(*profile), context);
-}
-
-Statistics ping_tool(OpenTool& tool, const Target& target, const PingOptions& options, Stage& stage,
-                     const Context& context) {
-  Statistics counted;
-  while (stage.open() && counted.sent < options.count) {
-    const TimePoint next = context.clock.now() + options.interval;
+  /// False: asking again on this connection is pointless.
+  static bool ask_once(OpenTool& tool, Statistics& counted, Listing& listing, const Clock& clock) {
     ++counted.sent;
     const auto round_trip = tool.device.ping();
     if (round_trip) {
       counted.times.push_back(*round_trip);
       counted.outcome.succeed();
-      stage.add(ping_record(counted.sent, *round_trip, target, context.clock));
-    } else {
-      counted.outcome.fail(round_trip.error());
-      stage.add(round_trip.error());
-      if (ends_ping(round_trip.error())) break;
+      listing.add(ping_record(counted.sent, *round_trip, tool.target, clock));
+      return true;
     }
-    if (counted.sent == options.count) break;
-    if (auto slept = context.clock.sleep_until(next); !slept) {
-      counted.outcome.fail(slept.error());
-      break;
-    }
+    counted.outcome.fail(round_trip.error());
+    listing.add(round_trip.error());
+    return round_trip.error().code == Errc::no_answer;
   }
-  return counted;
-}
 
-Result<Outcome> ping_one(const Target& target, const PingOptions& options, Context& context) {
-  auto tool = connect_one(target, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
-  Stage stage(columns, context);
-  const Statistics counted = ping_tool(*tool, target, options, stage, context);
-  return finish(stage.listing(), counted.outcome, summary_of(counted, target.shown), context);
-}
-
-/// A tool that can not be reached keeps nobody from the others.
-Statistics ping_member(const Target& target, const PingOptions& options, Stage& stage,
-                       const Context& context) {
-  auto tool = context.interrupt.signalled()
-                  ? Result<OpenTool>(tl::unexpected(not_begun(target, context)))
-                  : connect_one(target, context);
-  if (tool) return ping_tool(*tool, target, options, stage, context);
-  Statistics none;
-  none.outcome.fail(tool.error());
-  stage.add(of_tool(target, tool.error()));
-  return none;
-}
-
-/// Each tool's own summary, then that of all.
-Result<Outcome> ping_group(const std::vector<Target>& targets, const PingOptions& options,
-                           Context& context) {
-  Stage stage(group_columns, context);
-  const auto parts = side_by_side(targets, options.jobs, [&](const Target& target) {
-    return ping_member(target, options, stage, context);
-  });
-  if (auto ended = stage.listing().end(); !ended) return tl::unexpected(std::move(ended.error()));
-  Statistics all;
-  for (std::size_t index = 0; index < targets.size(); ++index) {
-    const std::string& name = targets[index].shown;
-    Summary summary = summary_of(parts[index], name);
-    summary.sentence = fmt::format("{}: {}", name, summary.sentence);
-    if (auto told = tell(std::move(summary), parts[index].outcome, context); !told) {
-      return tl::unexpected(std::move(told.error()));
-    }
-    all.add(parts[index]);
+  static Result<Done> end(Listing& listing, const Statistics& counted, const Target& target,
+                          Context& context) {
+    return finish(listing, counted.outcome, summary_of(counted, target.shown), context)
+        .map([&](const Outcome&) { return counted; });
   }
-  Summary summary = summary_of(all, {});
-  summary.sentence = fmt::format("{}: {}", counted(targets.size(), "tool"), summary.sentence);
-  return tell(std::move(summary), all.outcome, context).map([&] { return all.outcome; });
-}
+
+  const PingOptions* options_;
+};
 
 }  // namespace
 
 Result<Outcome> ping(const PingOptions& options, Context& context) {
-  const auto targets = resolve_one_or_group(options.target, Reach::one, context);
-  if (!targets) return tl::unexpected(targets.error());
-  return is_group(options.target, Reach::one) ? ping_group(*targets, options, context)
-                                              : ping_one(targets->front(), options, context);
+  return resolve_one_or_group(options.target, Reach::one, context)
+      .and_then([&](const Targets& targets) {
+        return run_verb(Ping(options), targets, options.jobs, context);
+      });
 }
 
 }  // namespace spindle::commands

@@ -1,16 +1,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "consent.hpp"
-#include "group.hpp"
-#include "set_group.hpp"
+#include "run_verb.hpp"
 #include "set_plan.hpp"
 #include "set_records.hpp"
 #include "set_writer.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
 #include "storing.hpp"
 
 namespace spindle::commands {
@@ -18,61 +18,159 @@ namespace {
 
 using catalogue::Profile;
 
-/// What has to be asked before anything is written.
-Result<void> ask_first(const SetOptions& options, const Profile& profile, const Target& target,
-                       const Context& context) {
-  std::vector<std::string> what;
-  if (options.reach == Reach::everybody) what.emplace_back("set");
-  if (auto storing = check_storing(options.storing, profile); !storing) return storing;
-  if (options.storing == Storing::yes) what.emplace_back(store_action);
-  if (what.empty() || options.execution == Execution::dry_run) return {};
-  return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), target.shown), context);
-}
+class Set final : public Verb<SetPlan, SetResult> {
+ public:
+  Set(const SetOptions& options, bool is_group) : options_(&options), is_group_(is_group) {}
 
-Result<Outcome> end_dry_run(const std::vector<SetStep>& steps, const Target& target,
-                            Context& context) {
-  Outcome outcome;
-  Listing listing(context, set_plan_columns());
-  for (const SetStep& step : steps) {
-    listing.add(step_record(step, Ending::planned, step.assignment.value, target, context.clock));
-    outcome.succeed();
-  }
-  Summary summary = plan_summary(counts_of(steps), target.shown);
-  summary.sentence += "; nothing was written (dry run)";
-  return finish(listing, outcome, std::move(summary), context);
-}
+  [[nodiscard]] Fit fit() const override { return Fit::all; }
+  [[nodiscard]] bool changes_tools() const override { return true; }
+  [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
-Result<Outcome> set_one(const Target& target, const SetOptions& options, Context& context) {
-  const auto prepare = [&](const Profile& profile) {
-    return parse_assignments(options.assignments, profile)
+  Result<Plan> plan(const Profile& profile, const Target& /*target*/) const override {
+    return parse_assignments(options_->assignments, profile)
         .and_then([&](std::vector<Assignment> assignments) {
-          return ask_first(options, profile, target, context).map([&] {
-            return std::move(assignments);
+          return check_storing(options_->storing, profile).map([&] {
+            return SetPlan{.assignments = std::move(assignments)};
           });
         });
-  };
-  auto opened = open_prepared(reopening(target), Need::named_registers, context, prepare);
-  if (!opened) return tl::unexpected(std::move(opened.error()));
-  OpenTool& tool = opened->tool;
-  const bool everybody = options.reach == Reach::everybody;
-  const auto steps = everybody ? steps_for_everybody(std::move(opened->prepared))
-                               : check_against_tool(std::move(opened->prepared), tool.device);
-  if (!steps) return tl::unexpected(steps.error());
-  if (options.execution == Execution::dry_run) return end_dry_run(*steps, tool.target, context);
-  SetWriter writer(tool, options.storing, context);
-  tell_risks(*steps, tool.target, context);
-  return (everybody ? writer.send(*steps) : writer.write(*steps)).map([](const SetResult& result) {
-    return result.outcome;
-  });
-}
+  }
+
+  Result<Plan> examine(OpenTool& tool, Plan plan) const override {
+    auto steps = options_->reach == Reach::everybody
+                     ? steps_for_everybody(plan.assignments)
+                     : check_against_tool(plan.assignments, tool.device);
+    if (!steps) return tl::unexpected(std::move(steps.error()));
+    plan.steps = std::move(*steps);
+    plan.serial = serial_of(tool.device);
+    return plan;
+  }
+
+  Result<void> ask(const AllPlanned& planned, std::size_t of, Context& context) const override {
+    if (is_dry_run()) return {};
+    if (is_group_) return ask_for_group(planned, of, context);
+    std::vector<std::string_view> what;
+    if (options_->reach == Reach::everybody) what.emplace_back("set");
+    if (stores()) what.emplace_back(store_action);
+    if (what.empty()) return {};
+    return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
+                       context);
+  }
+
+  Result<Plan> confirm(OpenTool& tool, const Plan& plan) const override {
+    return confirm_plan(plan, tool.device);
+  }
+
+  [[nodiscard]] bool needs_tool(const Plan& plan) const override {
+    return !is_dry_run() && (stores() || plan.changes() || options_->reach == Reach::everybody);
+  }
+
+  Result<Done> conclude(const Target& target, const Plan& plan, Context& context) const override {
+    const bool planned = is_dry_run();
+    SetResult result{.counts = counts_of(plan.steps)};
+    Listing listing(context, planned ? set_plan_columns() : set_columns());
+    for (const SetStep& step : plan.steps) {
+      listing.add(planned
+                      ? planned_record(step, target, context.clock)
+                      : step_record(step, Ending::unchanged, *step.before, target, context.clock));
+      result.outcome.succeed();
+    }
+    Summary summary = planned ? plan_summary(result.counts, target.shown)
+                              : set_summary(result.counts, target.shown);
+    if (planned && !is_group_) summary.sentence += nothing_written;
+    return finish(listing, result.outcome, std::move(summary), context).map([&](const Outcome&) {
+      return result;
+    });
+  }
+
+  Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    SetWriter writer(tool, options_->storing, context);
+    if (!is_group_) tell_risks(plan.steps, tool.target, context);
+    return options_->reach == Reach::everybody ? writer.send(plan.steps) : writer.write(plan.steps);
+  }
+
+  /// Nothing was written to this tool; its summary says so, too.
+  Result<Done> give_up(const Target& target, const Plan* plan, const Error& error,
+                       Context& context) const override {
+    SetResult result;
+    result.counts.left = plan != nullptr ? plan->steps.size() : options_->assignments.size();
+    result.outcome.fail(error);
+    Listing listing(context, set_columns());
+    listing.add(error);
+    return finish(listing, result.outcome, set_summary(result.counts, target.shown), context)
+        .map([&](const Outcome&) { return result; });
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    SetCounts counts;
+    std::size_t failed = all.tools - all.planned.size();
+    const bool planned = is_dry_run() && !all.is_rejected;
+    if (!planned) counts.left = failed * options_->assignments.size();
+    for (std::size_t index = 0; index < all.done.size(); ++index) {
+      const Result<SetResult>& done = all.done[index];
+      done ? counts.add(done->counts) : counts.add({.left = all.planned[index].plan.steps.size()});
+      if (!done || done->outcome.failed() > 0) ++failed;
+    }
+    Summary summary = planned ? plan_summary(counts, {}) : set_summary(counts, {});
+    summary.sentence +=
+        fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
+    if (planned) summary.sentence += nothing_written;
+    return summary;
+  }
+
+ private:
+  static constexpr std::string_view nothing_written = "; nothing was written (dry run)";
+
+  [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
+  [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
+
+  static report::Record planned_record(const SetStep& step, const Target& target,
+                                       const Clock& clock) {
+    return step_record(step, Ending::planned, step.assignment.value, target, clock);
+  }
+
+  static Result<void> show_plans(const AllPlanned& planned, Context& context) {
+    Listing listing(context, with_target_column(set_plan_columns()));
+    for (const auto& [target, plan] : planned) {
+      for (const SetStep& step : plan.steps) {
+        listing.add(planned_record(step, target, context.clock));
+      }
+    }
+    return listing.end();
+  }
+
+  /// The user sees first what the question is about.
+  Result<void> ask_for_group(const AllPlanned& planned, std::size_t of, Context& context) const {
+    SetCounts counts;
+    std::vector<std::string> names;
+    for (const auto& [target, plan] : planned) {
+      tell_risks(plan.steps, target, context);
+      counts.add(counts_of(plan.steps));
+      if (stores() || plan.changes()) names.push_back(target.shown);
+    }
+    if (names.empty()) return {};
+    if (can_ask(context)) {
+      if (auto shown = show_plans(planned, context); !shown) return shown;
+    }
+    return ask_consent(fmt::format("write {} to {}{}", counted(counts.changed, "value"),
+                                   tools_in_words(names, of), stores() ? ", and save" : ""),
+                       context);
+  }
+
+  const SetOptions* options_;
+  bool is_group_;
+};
 
 }  // namespace
 
+/// In a group all tools are read and checked before the first write, one question stands for all,
+/// and each is opened again to be written if it is still as it was shown: no line is held while the
+/// user thinks about the question.
 Result<Outcome> set(const SetOptions& options, Context& context) {
-  const auto targets = resolve_one_or_group(options.target, options.reach, context);
-  if (!targets) return tl::unexpected(targets.error());
-  return is_group(options.target, options.reach) ? set_group(*targets, options, context)
-                                                 : set_one(targets->front(), options, context);
+  return resolve_one_or_group(options.target, options.reach, context)
+      .and_then([&](Targets targets) {
+        const Set verb(options, targets.is_group);
+        return run_verb(verb, reopening(std::move(targets)), options.jobs, context);
+      });
 }
 
 }  // namespace spindle::commands

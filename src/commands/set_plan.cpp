@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "spindle/catalogue/danger.hpp"
@@ -104,7 +105,51 @@ Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading
   return {};
 }
 
+/// Whether a tool is still the one that was planned for, and holds what it held.
+Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
+  const auto moved = [&](std::string message) {
+    return tl::unexpected(
+        Error{.code = Errc::mismatch,
+              .message = std::move(message) + ", so nothing was written to this tool",
+              .hint = "look why, then give the command again"});
+  };
+  if (now.serial != plan.serial) {
+    return moved(fmt::format("serial {} answers now, and it was {} that was planned for",
+                             now.serial, plan.serial));
+  }
+  for (std::size_t index = 0; index < now.steps.size(); ++index) {
+    const SetStep& step = now.steps[index];
+    const SetStep& planned = plan.steps[index];
+    const bool same =
+        step.before == planned.before && step.assignment.value == planned.assignment.value;
+    if (same) continue;
+    return moved(fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
+                             planned.before->to_string(), step.before->to_string()));
+  }
+  return {};
+}
+
 }  // namespace
+
+bool SetPlan::changes() const {
+  return std::any_of(steps.begin(), steps.end(),
+                     [](const SetStep& step) { return step.changes(); });
+}
+
+std::string serial_of(const device::Device& device) {
+  const auto& identity = device.identity();
+  return identity ? identity->serial : std::string();
+}
+
+Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device) {
+  SetPlan now;
+  for (const SetStep& step : plan.steps) now.assignments.push_back(step.assignment);
+  auto steps = check_against_tool(now.assignments, device);
+  if (!steps) return tl::unexpected(std::move(steps.error()));
+  now.steps = std::move(*steps);
+  now.serial = serial_of(device);
+  return check_unchanged(plan, now).map([&] { return std::move(now); });
+}
 
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const Profile& profile) {

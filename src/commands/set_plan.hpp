@@ -25,6 +25,18 @@ struct SetStep {
   [[nodiscard]] bool changes() const { return before != assignment.value; }
 };
 
+/// What is meant for one tool, and which tool it was.
+struct SetPlan {
+  std::vector<Assignment> assignments = {};
+  std::vector<SetStep> steps = {};  ///< the assignments, once the tool was read
+  std::string serial = {};          ///< empty: the product does not say it
+
+  [[nodiscard]] bool changes() const;
+};
+
+/// The serial number by the tool's identity; empty: the product does not say it.
+std::string serial_of(const device::Device& device);
+
 /// What can be known from the profile: names, access, types, ranges, and that none starts a motor.
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const catalogue::Profile& profile);
@@ -33,6 +45,10 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
 /// only.
 Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
                                                 device::Device& device);
+
+/// The plan with what the tool holds now. Reads only. Error `mismatch` where the tool is not the
+/// one that was planned for, or does not hold what it held then.
+Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device);
 
 /// For everybody on a line. Everybody may have another setting, so only names of bits that always
 /// count can be sent.

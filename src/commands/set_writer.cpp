@@ -4,7 +4,6 @@
 
 #include <utility>
 
-#include "group.hpp"
 #include "records.hpp"
 #include "storing.hpp"
 
@@ -29,7 +28,7 @@ Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
   for (const SetStep& step : steps) {
     if (result_.outcome.failed() > 0) break;
     if (context_->interrupt.signalled()) {
-      fail(tool_->target.blamed(context_->interrupt.error()));
+      fail(context_->interrupt.error());
     } else if (step.changes()) {
       write_one(step);
     } else {
@@ -78,7 +77,7 @@ void SetWriter::write_one(const SetStep& step) {
   if (written.done()) return succeed(step, Ending::written, *written.now);
   ++result_.counts.failed;
   note(step, ending_of(written.result), written.now.value_or(value));
-  fail(of_write(parameter.name, *written.error));
+  fail(work::of_write(parameter.name, *written.error));
 }
 
 Result<SetResult> SetWriter::end(Summary summary) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <map>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -12,43 +12,59 @@
 #include <utility>
 #include <vector>
 
-#include "progress.hpp"
 #include "spindle/commands/target.hpp"
 
 namespace spindle::commands {
 
-/// Places of the targets that share a line, line by line.
-std::vector<std::vector<std::size_t>> by_line(const std::vector<Target>& targets);
+inline const Target& target_of(const Target& target) { return target; }
 
-/// Shows how many of several tools have come to an end, where anybody wants to see it.
-class FinishedTools {
+/// Places of the items whose lines have the same name, line by line; one without a name is a line
+/// of its own.
+std::vector<std::vector<std::size_t>> by_line(const std::vector<std::string>& lines);
+
+/// Places of what is done on tools that share a line, line by line.
+template <typename Item>
+std::vector<std::vector<std::size_t>> by_line(const std::vector<Item>& items) {
+  std::vector<std::string> lines;
+  for (const Item& item : items) lines.push_back(shared_line(target_of(item).endpoint));
+  return by_line(lines);
+}
+
+/// How many of several tools have come to an end.
+struct Finished {
+  std::size_t done = 0;
+  std::size_t total = 0;
+  std::size_t at_once = 1;  ///< how many are under way side by side
+};
+using OnFinished = std::function<void(const Finished&)>;
+
+/// Counts what comes to an end, and tells it at once, by one thread at a time.
+class FinishedCounter {
  public:
-  FinishedTools(ProgressLine* progress, std::size_t tools, std::size_t at_once);
+  FinishedCounter(Finished finished, OnFinished tell);
   void add();
 
  private:
-  void show();
-
-  ProgressLine* progress_;
   std::mutex mutex_ = {};
-  report::Step step_;
+  Finished finished_;
+  OnFinished tell_;
 };
 
-/// Calls `handle(target)` for every target, at most `jobs` (from 1) at a time, each in a thread of
-/// its own when there are several, and returns the results in the order of the targets. The units
-/// of one serial line take turns: only one at a time can have it. Threads share nothing that
-/// changes but the place of the next line, and `progress`.
-template <typename Handle>
-auto side_by_side(const std::vector<Target>& targets, std::size_t jobs, Handle handle,
-                  ProgressLine* progress = nullptr) {
-  using Handled = std::invoke_result_t<Handle, const Target&>;
-  std::vector<std::optional<Handled>> slots(targets.size());
-  const auto lines = by_line(targets);
+/// Calls `handle(item)` for every item, at most `jobs` (from 1) at a time, each in a thread of its
+/// own when there are several, and returns the results in the order of the items. `target_of(item)`
+/// is the tool that it is about: the units of one serial line take turns, as only one at a time can
+/// have it. Threads share nothing that changes but the place of the next line, and `tell`.
+template <typename Item, typename Handle>
+auto side_by_side(const std::vector<Item>& items, std::size_t jobs, Handle handle,
+                  OnFinished tell = {}) {
+  using Handled = std::invoke_result_t<Handle, const Item&>;
+  std::vector<std::optional<Handled>> slots(items.size());
+  const auto lines = by_line(items);
   const std::size_t threads_wanted = std::max<std::size_t>(std::min(jobs, lines.size()), 1);
-  FinishedTools finished(progress, targets.size(), threads_wanted);
+  FinishedCounter finished({.total = items.size(), .at_once = threads_wanted}, std::move(tell));
   const auto fill = [&](const std::vector<std::size_t>& line) {
     for (const std::size_t index : line) {
-      slots[index] = handle(targets[index]);
+      slots[index] = handle(items[index]);
       finished.add();
     }
   };

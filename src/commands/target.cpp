@@ -228,6 +228,10 @@ Error Target::blamed(Error error) const {
   return error;
 }
 
+Error with_target(Error error, const Target& target) {
+  return error.target.empty() ? target.blamed(std::move(error)) : error;
+}
+
 Target reopening(Target target) {
   target.reopening = link::Reopening::once;
   return target;

@@ -1,6 +1,5 @@
 #include "spindle/work/change.hpp"
 
-#include <string>
 #include <utility>
 
 namespace spindle::work {
@@ -11,6 +10,17 @@ using device::PutBack;
 using device::PutBackReport;
 using device::TriedWrite;
 using device::Written;
+
+bool is_interruption(const Error& error) {
+  return error.code == Errc::interrupted || error.code == Errc::terminated;
+}
+
+Error of_write(const std::string& parameter, Error error) {
+  if (!is_interruption(error)) return error;
+  error.name = parameter;
+  error.hint = "whether it was written is not known: read it again";
+  return error;
+}
 
 /// Where it is not known what the tool holds, the record names both candidates.
 Written Changer::make(const Parameter& parameter, const Value& before, const Value& value) {

@@ -19,6 +19,8 @@
 
 namespace spindle::commands {
 
+struct Target;
+
 /// Whether a question may be asked before something is changed.
 enum class Consent : std::uint8_t {
   ask,       ///< on a terminal; refused elsewhere
@@ -86,6 +88,7 @@ struct Surroundings {
 /// The part of a context that differs from one tool of a group to the next.
 struct Telling {
   report::Renderer& renderer;
+  const Target* about = nullptr;  ///< whose the errors are that are told; null: they say it
 };
 
 /// Everything a command may touch.
@@ -96,6 +99,9 @@ Context calm_context(const Context& context);
 
 /// The same context with another renderer, which must outlive it.
 Context with_renderer(const Context& context, report::Renderer& renderer);
+
+/// The same context, in which errors that are told are those of this tool, which must outlive it.
+Context about(const Context& context, const Target& target);
 
 /// The same context with other lines, which must outlive it.
 Context with_lines(const Context& context, const device::OpenTransport& open);

@@ -26,6 +26,10 @@ struct Target {
   [[nodiscard]] Error blamed(Error error) const;
 };
 
+/// The error as one of this tool, with its address beside its name, unless it is one of a tool
+/// already.
+Error with_target(Error error, const Target& target);
+
 /// The same target, whose connection is opened once more where the tool closes it: for commands
 /// that ask for one thing and end, while the context lives.
 Target reopening(Target target);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "spindle/device/device.hpp"
@@ -7,6 +8,11 @@
 #include "spindle/work/change_log.hpp"
 
 namespace spindle::work {
+
+bool is_interruption(const Error& error);
+
+/// The error of a write; of one that was cut off it also says that its effect is not known.
+Error of_write(const std::string& parameter, Error error);
 
 /// Changes values of one tool, by the same rule whatever the command: the intent is recorded, the
 /// value is written, what became of it is read back and recorded, and all of it can be put back.

@@ -1,4 +1,4 @@
-#include "commands/tape.hpp"
+#include "commands/recording.hpp"
 
 #include <doctest/doctest.h>
 
@@ -6,7 +6,7 @@
 #include <vector>
 
 using namespace spindle;
-using commands::Tape;
+using commands::RecordingRenderer;
 using report::Column;
 using report::Record;
 
@@ -49,31 +49,31 @@ Record summary(std::string target) {
 }
 
 /// A tool that is set and then stores it.
-void tell_all(Tape& tape, const std::string& tool) {
-  REQUIRE(tape.begin(values));
-  tape.note("takes effect later");
-  REQUIRE(tape.record(value(tool, "torque", 2)));
-  REQUIRE(tape.record(value(tool, "speed", 1000)));
-  REQUIRE(tape.end());
-  REQUIRE(tape.begin(actions));
-  tape.note(tool + ": wears out");
-  REQUIRE(tape.record(action(tool, "save")));
-  REQUIRE(tape.end());
-  REQUIRE(tape.summary(summary(tool), "2 written"));
+void tell_all(RecordingRenderer& recording, const std::string& tool) {
+  REQUIRE(recording.begin(values));
+  recording.note("takes effect later");
+  REQUIRE(recording.record(value(tool, "torque", 2)));
+  REQUIRE(recording.record(value(tool, "speed", 1000)));
+  REQUIRE(recording.end());
+  REQUIRE(recording.begin(actions));
+  recording.note(tool + ": wears out");
+  REQUIRE(recording.record(action(tool, "save")));
+  REQUIRE(recording.end());
+  REQUIRE(recording.summary(summary(tool), "2 written"));
 }
 
 }  // namespace
 
-TEST_CASE("tape: tools are shown one after the other, list by list") {
-  Tape one;
-  Tape gone;
-  Tape two;
+TEST_CASE("recording: tools are shown one after the other, list by list") {
+  RecordingRenderer one;
+  RecordingRenderer gone;
+  RecordingRenderer two;
   tell_all(one, "one");
   REQUIRE(gone.error({.code = Errc::connection_refused, .hint = "look", .target = "gone"}, {}));
   tell_all(two, "two");
-  const std::vector<const Tape*> tapes = {&one, &gone, &two};
+  const std::vector<const RecordingRenderer*> recordings = {&one, &gone, &two};
   Screen screen;
-  REQUIRE(play(tapes, *screen.renderer));
+  REQUIRE(replay(recordings, *screen.renderer));
   CHECK(screen.shown ==
         "! takes effect later\n"
         "! spindle: gone: connection refused; look\n"
@@ -92,51 +92,51 @@ TEST_CASE("tape: tools are shown one after the other, list by list") {
         "! two: 2 written\n");
 }
 
-TEST_CASE("tape: what was said before the first list belongs to it") {
-  Tape tape;
-  tape.note("first");
-  REQUIRE(tape.begin(values));
-  REQUIRE(tape.record(value("one", "torque", 2)));
-  CHECK(tape.sections().size() == 1);
-  const std::vector<const Tape*> tapes = {&tape};
+TEST_CASE("recording: what was said before the first list belongs to it") {
+  RecordingRenderer recording;
+  recording.note("first");
+  REQUIRE(recording.begin(values));
+  REQUIRE(recording.record(value("one", "torque", 2)));
+  CHECK(recording.sections().size() == 1);
+  const std::vector<const RecordingRenderer*> recordings = {&recording};
   Screen screen;
-  REQUIRE(play(tapes, *screen.renderer));
+  REQUIRE(replay(recordings, *screen.renderer));
   CHECK(screen.shown == "! first\nTARGET  NAME    VALUE\none     torque      2\n");
 }
 
-TEST_CASE("tape: errors alone need no table") {
-  Tape tape;
-  REQUIRE(tape.error({.code = Errc::no_route, .hint = "look", .target = "gone"}, {}));
-  const std::vector<const Tape*> tapes = {&tape};
+TEST_CASE("recording: errors alone need no table") {
+  RecordingRenderer recording;
+  REQUIRE(recording.error({.code = Errc::no_route, .hint = "look", .target = "gone"}, {}));
+  const std::vector<const RecordingRenderer*> recordings = {&recording};
   Screen table;
-  REQUIRE(play(tapes, *table.renderer));
+  REQUIRE(replay(recordings, *table.renderer));
   CHECK(table.shown == "! spindle: gone: no route to the tool; look\n");
   Screen json(report::Format::json);
-  REQUIRE(play(tapes, *json.renderer));
+  REQUIRE(replay(recordings, *json.renderer));
   CHECK(json.shown.find(R"("type":"error")") != std::string::npos);
   CHECK(json.shown.find(R"("target":"gone")") != std::string::npos);
 }
 
-TEST_CASE("tape: lines that stand for themselves stay what they are") {
-  Tape tape;
-  REQUIRE(tape.line(action("one", "save"), "saved"));
-  const std::vector<const Tape*> tapes = {&tape};
+TEST_CASE("recording: lines that stand for themselves stay what they are") {
+  RecordingRenderer recording;
+  REQUIRE(recording.line(action("one", "save"), "saved"));
+  const std::vector<const RecordingRenderer*> recordings = {&recording};
   Screen screen;
-  REQUIRE(play(tapes, *screen.renderer));
+  REQUIRE(replay(recordings, *screen.renderer));
   CHECK(screen.shown == "saved\n");
 }
 
-TEST_CASE("tape: nothing is shown any more where nobody reads") {
-  Tape one;
-  Tape two;
+TEST_CASE("recording: nothing is shown any more where nobody reads") {
+  RecordingRenderer one;
+  RecordingRenderer two;
   tell_all(one, "one");
   tell_all(two, "two");
-  const std::vector<const Tape*> tapes = {&one, &two};
+  const std::vector<const RecordingRenderer*> recordings = {&one, &two};
   for (int lasts = 0; lasts < 2; ++lasts) {
     Screen screen(report::Format::table, lasts);
-    const auto played = play(tapes, *screen.renderer);
-    REQUIRE_FALSE(played);
-    CHECK(played.error().code == Errc::closed_pipe);
+    const auto drawn = replay(recordings, *screen.renderer);
+    REQUIRE_FALSE(drawn);
+    CHECK(drawn.error().code == Errc::closed_pipe);
     CHECK(screen.shown.find("2 written") == std::string::npos);
   }
 }

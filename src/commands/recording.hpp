@@ -11,12 +11,12 @@ namespace spindle::commands {
 
 /// A renderer that keeps what it is told of one tool, so that tools which are handled side by side
 /// are shown one after the other. Never fails.
-class Tape final : public report::Renderer {
+class RecordingRenderer final : public report::Renderer {
  public:
-  Tape() = default;
-  Tape(const Tape&) = delete;
-  Tape& operator=(const Tape&) = delete;
-  ~Tape() override = default;
+  RecordingRenderer() = default;
+  RecordingRenderer(const RecordingRenderer&) = delete;
+  RecordingRenderer& operator=(const RecordingRenderer&) = delete;
+  ~RecordingRenderer() override = default;
 
   Result<void> begin(std::span<const report::Column> columns) override;
   Result<void> record(const report::Record& record) override;
@@ -51,12 +51,16 @@ class Tape final : public report::Renderer {
   std::vector<Line> summaries_ = {};
 };
 
-/// The columns with one for the tool's name in front.
-std::vector<report::Column> with_target(std::span<const report::Column> columns);
+/// Tells the summary of one of several tools, with its name in front of the sentence.
+Result<void> tell_under_name(const RecordingRenderer::Line& summary, report::Renderer& renderer);
 
-/// Shows the tapes of several tools: list by list, each with the tools in the order given and a
-/// column for their names; a note that several tools have is told once. Then their summaries, each
-/// under the tool's name.
-Result<void> play(std::span<const Tape* const> tapes, report::Renderer& renderer);
+/// The columns with one for the tool's name in front.
+std::vector<report::Column> with_target_column(std::span<const report::Column> columns);
+
+/// Shows the recordings of several tools: list by list, each with the tools in the order given and
+/// a column for their names; a note that several tools have is told once. Then their summaries,
+/// each under the tool's name.
+Result<void> replay(std::span<const RecordingRenderer* const> recordings,
+                    report::Renderer& renderer);
 
 }  // namespace spindle::commands

@@ -1,0 +1,85 @@
+#include "driver.hpp"
+
+#include <fmt/ranges.h>
+
+#include "shared_lines.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::commands {
+
+Result<Targets> resolve_one_or_group(const std::string& text, Reach reach, const Context& context) {
+  auto tools = resolve_compatible_targets({text}, context);
+  if (!tools) return tl::unexpected(std::move(tools.error()));
+  if (reach == Reach::everybody && tools->size() > 1) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = fmt::format("--broadcast is for everybody on one serial line, and '{}' is "
+                                     "{} tools",
+                                     text, tools->size()),
+              .hint = "name the line, as in rtu:///dev/ttyUSB0?unit=0, or leave out --broadcast"});
+  }
+  for (Target& target : *tools) target.reach = reach;
+  return Targets{.tools = std::move(*tools), .is_group = names_group(text) && reach == Reach::one};
+}
+
+Targets reopening(Targets targets) {
+  for (Target& target : targets.tools) target = reopening(std::move(target));
+  return targets;
+}
+
+Result<void> begin_turn(const Target& target, const Context& context) {
+  if (!context.interrupt.signalled()) return {};
+  Error error = context.interrupt.error();
+  error.message = "interrupted before its turn came, nothing was sent";
+  return tl::unexpected(with_target(std::move(error), target));
+}
+
+std::string tools_in_words(const std::vector<std::string>& names, std::size_t of) {
+  const std::string some = names.size() == of ? "" : fmt::format("{} of ", names.size());
+  return fmt::format("{}{} ({})", some, counted(of, "tool"), fmt::join(names, ", "));
+}
+
+std::string failed_in_words(std::size_t failed, std::size_t of) {
+  return failed == 0 ? "" : fmt::format("; {} of {} failed", failed, counted(of, "tool"));
+}
+
+bool rejects_all(const Error& error) {
+  switch (error.status()) {
+    case ExitStatus::unreachable:
+    case ExitStatus::no_answer:
+    case ExitStatus::refused:
+    case ExitStatus::malformed:
+      return false;
+    default:
+      return true;
+  }
+}
+
+bool is_of_stream(const Error& error) {
+  return error.code == Errc::closed_pipe || error.code == Errc::storage;
+}
+
+OnFinished show_finished(ProgressLine& progress) {
+  return [&progress](const Finished& finished) {
+    progress.advance({.what = "tools done:",
+                      .done = finished.done,
+                      .total = finished.total,
+                      .at_once = finished.at_once});
+  };
+}
+
+std::unique_ptr<GroupOutput> make_output(std::size_t tools,
+                                         const std::vector<report::Column>& live_columns,
+                                         report::Renderer& renderer) {
+  if (live_columns.empty()) return std::make_unique<RecordedOutput>(tools, renderer);
+  return std::make_unique<SharedOutput>(tools, live_columns, renderer);
+}
+
+Result<Outcome> end_group(GroupOutput& output, std::optional<Summary> summary,
+                          const Outcome& outcome, Context& context) {
+  auto shown = output.end();
+  if (shown && summary) shown = tell(std::move(*summary), outcome, context);
+  return shown.map([&] { return outcome; });
+}
+
+}  // namespace spindle::commands
