@@ -11,8 +11,8 @@
 #include "help.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
-#include "spindle/commands/target.hpp"
 #include "spindle/sim/fault_plan.hpp"
+#include "spindle/work/connect.hpp"
 #include "version.hpp"
 
 namespace spindle::cli {
@@ -1099,7 +1099,7 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   if (!timeout) return tl::unexpected(timeout.error());
   const auto connect_timeout = to_duration("--connect-timeout", typed.connect_timeout);
   if (!connect_timeout) return tl::unexpected(connect_timeout.error());
-  commands::CommonOptions& common = invocation.common;
+  work::CommonOptions& common = invocation.common;
   auto retries = fill_number("--retries", typed.retries, 100, common.retries);
   if (!retries) return retries;
   invocation.format = *format;
@@ -1109,11 +1109,11 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
   common.tools_file = typed.tools;
   common.timeout = *timeout;
   common.connect_timeout = *connect_timeout;
-  if (typed.no_input) common.consent = commands::Consent::no_input;
-  if (typed.yes) common.consent = commands::Consent::given;
+  if (typed.no_input) invocation.user.consent = commands::Consent::no_input;
+  if (typed.yes) invocation.user.consent = commands::Consent::given;
   common.trace_file = typed.trace;
-  if (typed.verbose) common.verbosity = commands::Verbosity::frames;
-  if (typed.quiet || typed.verbose) common.progress = report::Showing::unwanted;
+  if (typed.verbose) invocation.user.verbosity = commands::Verbosity::frames;
+  if (typed.quiet || typed.verbose) invocation.user.progress = report::Showing::unwanted;
   return {};
 }
 

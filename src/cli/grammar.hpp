@@ -27,7 +27,8 @@ struct Invocation {
   /// it, or is about its faults.
   enum class ToolsFile : std::uint8_t { loaded, salvaged, only_found };
   ToolsFile tools_use = ToolsFile::loaded;
-  commands::CommonOptions common = {};
+  work::CommonOptions common = {};
+  commands::UserOptions user = {};
   std::function<Result<commands::Outcome>(commands::Context&)> run = {};
 };
 

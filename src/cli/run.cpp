@@ -9,6 +9,7 @@
 #include "complete.hpp"
 #include "grammar.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/commands/show_frames.hpp"
 #include "spindle/files/capture.hpp"
 #include "version.hpp"
 
@@ -113,18 +114,20 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles(profile_folders(world), world.disk.read_trusted);
   const std::string state = state_folder(world);
+  const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.verbosity);
   commands::Context context{
-      {.clock = world.clock, .interrupt = world.interrupt, .open = world.open},
-      {.io = world.io,
+      {.clock = world.clock,
+       .interrupt = world.interrupt,
+       .open = world.open,
        .calm = world.calm,
-       .serve = world.serve,
-       .end_waits = world.end_waits,
        .disk = world.disk,
        .state_folder = state,
        .version = version,
        .profiles = profiles,
        .tools = *tools,
+       .show_frames = show_frames,
        .common = invocation.common},
+      {.io = world.io, .serve = world.serve, .end_waits = world.end_waits, .user = invocation.user},
       {.renderer = renderer}};
   if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
     return tl::unexpected(std::move(begun.error()));
@@ -180,7 +183,7 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
   const report::Talk talk = invocation ? invocation->talk : report::Talk::normal;
   if (invocation) world.io.color = color_of(world, invocation->color);
-  if (invocation && is_dumb(world)) invocation->common.progress = report::Showing::unwanted;
+  if (invocation && is_dumb(world)) invocation->user.progress = report::Showing::unwanted;
   const auto renderer = report::make_renderer(format, world.io, talk);
   if (!invocation) return tell(invocation.error(), world, *renderer);
   if (invocation->asks == Invocation::Asks::version) {

@@ -5,7 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

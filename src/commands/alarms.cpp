@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
+#include "actions.hpp"
 #include "alarm_report.hpp"
 #include "change_log.hpp"
-#include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
@@ -16,7 +16,7 @@ using catalogue::Profile;
 
 struct AlarmPlan {
   std::vector<AlarmSource> sources;
-  std::optional<Deed> reset = std::nullopt;
+  std::optional<ActionRequest> reset = std::nullopt;
 };
 
 /// Nothing that is sent ends such an alarm, and its cause has to be dealt with first.
@@ -34,7 +34,8 @@ Summary summary_of(report::Cell present, const Outcome& outcome, std::string sen
           .target = target};
 }
 
-Result<Deed> plan_reset(const Profile& profile, const Target& target, Acceptance acceptance) {
+Result<ActionRequest> plan_reset(const Profile& profile, const Target& target,
+                                 Acceptance acceptance) {
   if (!profile.find_action(alarm_reset_action)) {
     return tl::unexpected(
         Error{.code = Errc::usage,
@@ -42,9 +43,12 @@ Result<Deed> plan_reset(const Profile& profile, const Target& target, Acceptance
               .hint = fmt::format("an action '{}' in the profile does it, see spindle-profile(5)",
                                   alarm_reset_action)});
   }
-  return parse_deed(std::string(alarm_reset_action), profile).and_then([&](Deed deed) {
-    return check_evidence(deed.action, target, acceptance).map([&] { return std::move(deed); });
-  });
+  return parse_action(std::string(alarm_reset_action), profile)
+      .and_then([&](ActionRequest request) {
+        return check_evidence(request.action, target, acceptance).map([&] {
+          return std::move(request);
+        });
+      });
 }
 
 /// How many tools of a group had an alarm, have one still, do not say, and could not be examined or
@@ -91,14 +95,14 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
     if (!sources) return tl::unexpected(std::move(sources.error()));
     AlarmPlan plan{std::move(*sources)};
     if (!changes_tools()) return plan;
-    return plan_reset(profile, target, options_->acceptance).map([&](Deed reset) {
+    return plan_reset(profile, target, options_->acceptance).map([&](ActionRequest reset) {
       plan.reset = std::move(reset);
       return std::move(plan);
     });
   }
 
   Result<void> ask(const AllPlanned& planned, std::size_t of, Context& context) const override {
-    PlannedDeeds resets;
+    PlannedRequests resets;
     for (const auto& [target, plan] : planned) {
       if (plan.reset) resets.push_back({target, {*plan.reset}});
     }
@@ -127,20 +131,20 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
 
  private:
   /// The notes about a group were told when it was asked about.
-  Result<void> reset(const Deed& deed, OpenTool& tool, AlarmReport& report,
+  Result<void> reset(const ActionRequest& request, OpenTool& tool, AlarmReport& report,
                      Context& context) const {
     if (report.is_present() && report.resettable == catalogue::Resettable::no) {
       return tl::unexpected(not_resettable(report));
     }
-    if (!is_group_) tell_notes(deed, tool.target, context);
+    if (!is_group_) tell_notes(request, tool.target, context);
     work::ChangeLog log = change_log("alarms", tool, context);
-    const auto result = perform_recorded(deed, tool, log, context);
+    const auto result = perform_recorded(request, tool, log, context);
     if (!result) return tl::unexpected(result.error());
-    Listing listing(context, deed_columns());
-    listing.add(deed_record(deed, *result, tool.target, context.clock));
+    Listing listing(context, performed_columns());
+    listing.add(performed_record(request, *result, tool.target, context.clock));
     report.reset = AlarmReport::Reset::done;
     if (result == device::ActionResult::not_confirmed) {
-      const Error error = not_confirmed(deed, tool.target);
+      const Error error = not_confirmed(request);
       report.reset = AlarmReport::Reset::failed;
       report.outcome = {};  // the reset is what was asked for
       report.outcome.fail(error);

@@ -9,10 +9,10 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
-#include "shared_lines.hpp"
-#include "snapshots.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/files/backup_file.hpp"
+#include "spindle/work/shared_lines.hpp"
+#include "spindle/work/snapshot.hpp"
 
 namespace spindle::commands {
 namespace {

@@ -7,7 +7,7 @@
 namespace spindle::commands {
 
 bool can_ask(const Context& context) {
-  return context.common.consent == Consent::ask && context.io.in_is_terminal &&
+  return context.user.consent == Consent::ask && context.io.in_is_terminal &&
          context.io.err_is_terminal;
 }
 
@@ -22,7 +22,7 @@ Error unanswerable(std::string_view what) {
 /// What the user typed; empty: --yes answers.
 Result<std::optional<std::string>> ask(std::string_view what, std::string_view question,
                                        const Context& context) {
-  if (context.common.consent == Consent::given) return std::nullopt;
+  if (context.user.consent == Consent::given) return std::nullopt;
   if (!can_ask(context)) return tl::unexpected(unanswerable(what));
   context.io.err(fmt::format("{}. {} ", what, question));
   const auto answer = context.io.read_line();
@@ -58,7 +58,7 @@ Result<void> ask_typed_consent(std::string_view what, std::string_view word,
 }
 
 Result<void> require_answer(std::string_view what, const Context& context) {
-  if (context.common.consent == Consent::given || can_ask(context)) return {};
+  if (context.user.consent == Consent::given || can_ask(context)) return {};
   return tl::unexpected(unanswerable(what));
 }
 

@@ -2,7 +2,8 @@
 
 #include <string_view>
 
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

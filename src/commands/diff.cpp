@@ -7,10 +7,10 @@
 #include "listing.hpp"
 #include "progress.hpp"
 #include "records.hpp"
-#include "snapshots.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/files/backup_file.hpp"
+#include "spindle/work/snapshot.hpp"
 
 namespace spindle::commands {
 namespace {

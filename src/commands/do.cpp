@@ -3,8 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include "actions.hpp"
 #include "change_log.hpp"
-#include "deeds.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
@@ -19,29 +19,29 @@ using catalogue::Hazard;
 using catalogue::Profile;
 
 /// A started motion needs somebody who stops it again, and this command ends at once.
-Result<void> check_guard(const Deed& deed) {
-  const bool starts = deed.action.motion == catalogue::Motion::start ||
-                      (deed.action.stop_value && deed.value != *deed.action.stop_value);
-  if (deed.action.hazard != Hazard::moves || !starts) return {};
+Result<void> check_guard(const ActionRequest& request) {
+  const bool starts = request.action.motion == catalogue::Motion::start ||
+                      (request.action.stop_value && request.value != *request.action.stop_value);
+  if (request.action.hazard != Hazard::moves || !starts) return {};
   return tl::unexpected(
       Error{.code = Errc::usage,
             .message = "it starts a motion, and 'do' does not stay to stop it",
             .hint = "'spindle remote-start' starts it under a guard that always ends in a stop",
-            .name = deed.action.name});
+            .name = request.action.name});
 }
 
-Result<std::vector<Deed>> check_deeds(const DoOptions& options, const Profile& profile,
-                                      const Target& target) {
-  std::vector<Deed> deeds;
+Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const Profile& profile,
+                                               const Target& target) {
+  std::vector<ActionRequest> requests;
   for (const std::string& text : options.actions) {
-    auto deed = parse_deed(text, profile);
-    if (!deed) return tl::unexpected(std::move(deed.error()));
-    auto allowed = check_guard(*deed).and_then(
-        [&] { return check_evidence(deed->action, target, options.acceptance); });
+    auto request = parse_action(text, profile);
+    if (!request) return tl::unexpected(std::move(request.error()));
+    auto allowed = check_guard(*request).and_then(
+        [&] { return check_evidence(request->action, target, options.acceptance); });
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    deeds.push_back(std::move(*deed));
+    requests.push_back(std::move(*request));
   }
-  return deeds;
+  return requests;
 }
 
 Summary listed(const Outcome& outcome, const std::string& target) {
@@ -76,21 +76,21 @@ Summary summary_of(const Outcome& outcome, Reach reach, const std::string& targe
           .target = target};
 }
 
-/// Why a deed that was begun did not succeed.
-std::optional<Error> failure_of(const Deed& deed, const Result<device::ActionResult>& result,
-                                const Target& target) {
-  if (result == device::ActionResult::not_confirmed) return not_confirmed(deed, target);
+/// Why a request that was begun did not succeed.
+std::optional<Error> failure_of(const ActionRequest& request,
+                                const Result<device::ActionResult>& result) {
+  if (result == device::ActionResult::not_confirmed) return not_confirmed(request);
   if (result) return std::nullopt;
   Error error = result.error();
   if (work::is_interruption(error)) {
-    error.name = deed.action.name;
+    error.name = request.action.name;
     error.hint = "whether it was done is not known: look at the tool";
   }
   return error;
 }
 
 /// Carries actions out in order and stops at the first that fails: later ones may rest on it.
-class Do final : public Verb<std::vector<Deed>, Outcome> {
+class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
  public:
   Do(const DoOptions& options, bool is_group) : options_(&options), is_group_(is_group) {}
 
@@ -107,10 +107,10 @@ class Do final : public Verb<std::vector<Deed>, Outcome> {
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
     Outcome outcome;
-    Listing listing(context, deed_columns());
+    Listing listing(context, performed_columns());
     work::ChangeLog log = change_log("do", tool, context);
-    for (const Deed& deed : plan) {
-      if (const auto error = carry_out(deed, tool, log, listing, context)) {
+    for (const ActionRequest& request : plan) {
+      if (const auto error = carry_out(request, tool, log, listing, context)) {
         outcome.fail(*error);
         listing.add(*error);
         break;
@@ -129,13 +129,13 @@ class Do final : public Verb<std::vector<Deed>, Outcome> {
 
  private:
   /// Why it did not succeed. The notes about a group were told when it was asked about.
-  std::optional<Error> carry_out(const Deed& deed, OpenTool& tool, work::ChangeLog& log,
+  std::optional<Error> carry_out(const ActionRequest& request, OpenTool& tool, work::ChangeLog& log,
                                  Listing& listing, const Context& context) const {
     if (context.interrupt.signalled()) return context.interrupt.error();
-    if (!is_group_) tell_notes(deed, tool.target, context);
-    const auto result = perform_recorded(deed, tool, log, context);
-    if (result) listing.add(deed_record(deed, *result, tool.target, context.clock));
-    return failure_of(deed, result, tool.target);
+    if (!is_group_) tell_notes(request, tool.target, context);
+    const auto result = perform_recorded(request, tool, log, context);
+    if (result) listing.add(performed_record(request, *result, tool.target, context.clock));
+    return failure_of(request, result);
   }
 
   const DoOptions* options_;

@@ -2,8 +2,8 @@
 
 #include <fmt/ranges.h>
 
-#include "shared_lines.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
 

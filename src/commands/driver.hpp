@@ -10,11 +10,13 @@
 
 #include "group_output.hpp"
 #include "progress.hpp"
-#include "side_by_side.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/work/side_by_side.hpp"
 #include "verb.hpp"
 
-/// The one way to run a verb on one tool or on several. Whose turn it is, is known here alone: so
-/// errors become errors of a tool here, and an interrupt is told of each tool that it kept waiting.
+/// The one way to run a verb on one tool or on several. Whose turn it is, is known here alone:
+/// so errors become errors of a tool here, and an interrupt is told of each tool that it kept
+/// waiting.
 namespace spindle::commands {
 
 /// What one name, @group or URL means; a broadcast has one target, which is everybody.

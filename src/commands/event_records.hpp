@@ -6,9 +6,10 @@
 #include <vector>
 
 #include "spindle/catalogue/event_layout.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
 #include "spindle/report/renderer.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

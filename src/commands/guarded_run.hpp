@@ -7,13 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "calm_line.hpp"
 #include "last_words.hpp"
 #include "listing.hpp"
 #include "patient_out.hpp"
 #include "progress.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/run_guard.hpp"
+#include "spindle/work/connect.hpp"
+#include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
@@ -116,7 +117,7 @@ class GuardedRun {
   ProgressLine progress_;
   /// From the start on: a motor must not run on because its reader is slow.
   std::optional<PatientOut> out_ = std::nullopt;
-  CalmLine calm_line_;
+  UninterruptibleLine calm_line_;
   std::function<void()> tell_safe_ = {};  ///< empty: there is no guardian, or it knows
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};

@@ -7,9 +7,10 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
-#include "shared_lines.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/device/motor.hpp"
+#include "spindle/work/identification.hpp"
+#include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
 namespace {

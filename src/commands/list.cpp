@@ -1,7 +1,7 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "deeds.hpp"
+#include "actions.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/catalogue/value.hpp"
 

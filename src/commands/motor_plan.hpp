@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
 #include "spindle/device/motor.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

@@ -6,9 +6,10 @@
 
 #include "event_records.hpp"
 #include "spindle/catalogue/profile.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/motor_follower.hpp"
 #include "spindle/report/renderer.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "calm_line.hpp"
 #include "change_log.hpp"
 #include "guarded_run.hpp"
 #include "motor_plan.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/rollback.hpp"
+#include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
@@ -31,8 +32,8 @@ class MotorSetup {
   /// on its line tell it; empty where it belongs to none. Only reads.
   Result<std::string> group_in_words();
 
-  /// Looks, and then writes the operation data and the watchdog: by function 06, which the drivers
-  /// of a group do not hear. The motor does not turn.
+  /// Looks, and then writes the operation data and the watchdog: by function 06, which the
+  /// drivers of a group do not hear. The motor does not turn.
   Result<void> prepare();
 
   /// Of a motor that stands still, also after prepare() failed: sets back what was written. Not
@@ -87,7 +88,7 @@ class MotorSetup {
   OpenTool* tool_;
   Context* context_;
   work::Changer changer_;
-  CalmLine calm_line_;
+  UninterruptibleLine calm_line_;
   Found found_ = {};
   bool cleared_word_ = false;  ///< it had a run bit, which stays cleared
 };

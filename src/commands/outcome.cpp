@@ -11,25 +11,22 @@ bool ends_all(ExitStatus status) {
 }  // namespace
 
 Context calm_context(const Context& context) {
-  const Calm& calm = context.calm;
   const Surroundings& surroundings = context;
   const Telling& telling = context;
-  return {
-      {.clock = calm.clock, .interrupt = calm.interrupt, .open = calm.open}, surroundings, telling};
+  return {uninterruptible(context), surroundings, telling};
 }
 
 Context with_lines(const Context& context, const device::OpenTransport& open) {
+  const Environment& environment = context;
   const Surroundings& surroundings = context;
   const Telling& telling = context;
-  return {{.clock = context.clock, .interrupt = context.interrupt, .open = open},
-          surroundings,
-          telling};
+  return {work::with_lines(environment, open), surroundings, telling};
 }
 
 Context with_renderer(const Context& context, report::Renderer& renderer) {
-  const Waiting& waiting = context;
+  const Environment& environment = context;
   const Surroundings& surroundings = context;
-  return {waiting, surroundings, {.renderer = renderer}};
+  return {environment, surroundings, {.renderer = renderer}};
 }
 
 Context about(const Context& context, const Target& target) {

@@ -12,7 +12,7 @@ namespace spindle::commands {
 class ProgressLine : public report::Progress {
  public:
   explicit ProgressLine(const Context& context)
-      : Progress(context.io, context.clock, context.common.progress) {}
+      : Progress(context.io, context.clock, context.user.progress) {}
 
   /// For what reads one tool.
   [[nodiscard]] link::Progress counter(std::string what) {

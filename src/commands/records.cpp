@@ -82,10 +82,6 @@ std::string type_of(const catalogue::Encoding& encoding) {
 
 }  // namespace
 
-std::string unit_of(const Parameter& parameter, const Target& target) {
-  return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit;
-}
-
 Cell milliseconds(Duration duration) {
   const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(duration);
   return Decimal(micros.count(), -3);

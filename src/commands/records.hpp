@@ -5,16 +5,13 @@
 #include <vector>
 
 #include "spindle/commands/context.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/snapshot.hpp"
 
 namespace spindle::commands {
 
 using report::count;
 using report::number;
 using report::text_or_null;
-
-/// The unit as shown: the tool's own torque unit where a parameter is a torque, empty when unknown.
-std::string unit_of(const catalogue::Parameter& parameter, const Target& target);
 
 /// Milliseconds with microseconds behind the point.
 report::Cell milliseconds(Duration duration);

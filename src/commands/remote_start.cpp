@@ -3,7 +3,7 @@
 #include "run_motor.hpp"
 #include "run_tool.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 namespace {

@@ -36,7 +36,7 @@ std::string command_for(const Target& target, const Context& context, const std:
   std::string command =
       fmt::format("spindle restore {} {}", shell_word(target.shown), shell_word(file));
   for (const std::string& pattern : patterns) command += " " + shell_word(pattern);
-  const CommonOptions& common = context.common;
+  const work::CommonOptions& common = context.common;
   if (!common.profile.empty()) command += " --profile " + shell_word(common.profile);
   if (!common.tools_file.empty()) command += " --tools " + shell_word(common.tools_file);
   return shown_command(command);

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "calm_line.hpp"
 #include "change_log.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
 #include "set_records.hpp"
-#include "snapshots.hpp"
 #include "spindle/commands/commands.hpp"
+#include "spindle/work/snapshot.hpp"
+#include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
@@ -64,7 +64,7 @@ class RestoreRun {
   const RestoreTask* task_;
   OpenTool* tool_;
   Context* context_;
-  CalmLine calm_line_;
+  UninterruptibleLine calm_line_;
   work::ChangeLog log_;
   work::Changer changer_;
   ProgressLine progress_;

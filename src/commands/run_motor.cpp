@@ -247,7 +247,7 @@ Result<void> ask_to_run(const MotorPlan& plan, const RemoteStartOptions& options
                         Context& context) {
   work::ChangeLog log = change_log("remote-start", tool, context);
   MotorSetup setup(plan, tool, context, log);
-  const bool agreed = context.common.consent == Consent::given;
+  const bool agreed = context.user.consent == Consent::given;
   const auto group =
       (agreed ? Result<void>() : setup.look()).and_then([&] { return setup.group_in_words(); });
   if (!group) return tl::unexpected(group.error());

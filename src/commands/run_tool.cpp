@@ -40,7 +40,7 @@ std::string to_text(std::optional<EventKind> kind) {
 /// "select-preset=2, direction=loosening"; empty when nothing is selected.
 std::string settings_in_words(const ToolPlan& plan) {
   std::vector<std::string> words;
-  for (const Deed& deed : plan.selections) words.push_back(words_of(deed));
+  for (const ActionRequest& request : plan.selections) words.push_back(words_of(request));
   return fmt::format("{}", fmt::join(words, ", "));
 }
 
@@ -200,7 +200,7 @@ Result<std::string> foresee(const ToolPlan& plan, const RemoteStartOptions& opti
 /// Asks with what the tool itself says, and makes sure that it is still so behind the answer.
 Result<void> ask_to_start(const ToolPlan& plan, const RemoteStartOptions& options, OpenTool& tool,
                           Context& context) {
-  if (context.common.consent == Consent::given) return {};
+  if (context.user.consent == Consent::given) return {};
   const auto asked = foresee(plan, options, tool, context);
   if (!asked) return tl::unexpected(asked.error());
   if (auto agreed = ask_away_from(tool, *asked, context); !agreed) return agreed;

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

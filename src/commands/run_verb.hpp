@@ -4,6 +4,7 @@
 
 #include "driver.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/work/change.hpp"
 
 namespace spindle::commands {
@@ -28,8 +29,8 @@ class VerbRun {
   VerbRun(const V& verb, std::size_t jobs, Context& context)
       : verb_(&verb), jobs_(jobs), context_(&context) {}
 
-  /// One tool is told of at once; a group in the order of its tools, with a column for their names.
-  /// Errors: what ended the command before anything was told of a tool.
+  /// One tool is told of at once; a group in the order of its tools, with a column for their
+  /// names. Errors: what ended the command before anything was told of a tool.
   Result<Outcome> on_one(const Target& target);
   Result<Outcome> on_group(const std::vector<Target>& tools);
 

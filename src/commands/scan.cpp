@@ -6,7 +6,7 @@
 #include "progress.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 namespace {

@@ -8,7 +8,8 @@
 
 #include "listing.hpp"
 #include "set_plan.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

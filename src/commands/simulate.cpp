@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "listing.hpp"
-#include "open_sim.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
+#include "spindle/work/simulated_tool.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -276,7 +276,7 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   };
   serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     traffic.count(heard);
-    if (context.common.verbosity == Verbosity::frames) tell(heard, connection, bytes, context);
+    if (context.user.verbosity == Verbosity::frames) tell(heard, connection, bytes, context);
   };
   serve.ignored = [&](std::uint32_t connection, ByteView bytes, std::string_view reason) {
     tell_ignored(connection, bytes, reason, context);

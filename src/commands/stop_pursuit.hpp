@@ -3,9 +3,10 @@
 #include <memory>
 #include <optional>
 
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/motor.hpp"
 #include "spindle/device/run_guard.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

@@ -1,6 +1,6 @@
 #include "storing.hpp"
 
-#include "deeds.hpp"
+#include "actions.hpp"
 #include "listing.hpp"
 
 namespace spindle::commands {
@@ -14,15 +14,16 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile) {
 }
 
 Result<void> store(OpenTool& tool, work::ChangeLog& log, Outcome& outcome, Context& context) {
-  auto deed = parse_deed(std::string(store_action), *tool.profile);
-  if (!deed) return tl::unexpected(std::move(deed.error()));
-  tell_notes(*deed, tool.target, context);
-  const auto result = perform_recorded(*deed, tool, log, context);
-  Listing listing(context, deed_columns());
-  if (result) listing.add(deed_record(*deed, *result, tool.target, context.clock));
+  auto request = parse_action(std::string(store_action), *tool.profile);
+  if (!request) return tl::unexpected(std::move(request.error()));
+  tell_notes(*request, tool.target, context);
+  const auto result = perform_recorded(*request, tool, log, context);
+  Context own = about(context, tool.target);
+  Listing listing(own, performed_columns());
+  if (result) listing.add(performed_record(*request, *result, tool.target, context.clock));
   std::optional<Error> error;
   if (!result) error = result.error();
-  if (result == device::ActionResult::not_confirmed) error = not_confirmed(*deed, tool.target);
+  if (result == device::ActionResult::not_confirmed) error = not_confirmed(*request);
   if (error) {
     outcome.fail(*error);
     listing.add(*error);

@@ -2,7 +2,7 @@
 
 #include "change_log.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 
@@ -12,7 +12,7 @@ inline constexpr std::string_view store_action = "save";
 /// Refuses --save where the product stores everything by itself.
 Result<void> check_storing(Storing storing, const catalogue::Profile& profile);
 
-/// The last deed of --save, told as a list of its own and recorded. A failure is noted in the
+/// The last request of --save, told as a list of its own and recorded. A failure is noted in the
 /// outcome; the result is that of the stream.
 Result<void> store(OpenTool& tool, work::ChangeLog& log, Outcome& outcome, Context& context);
 

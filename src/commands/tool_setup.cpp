@@ -58,11 +58,11 @@ Result<ToolPlan> plan_tool(const RemoteStartOptions& options, const Profile& pro
   for (const auto& [name, value] :
        {std::pair(select_preset, &options.preset), std::pair(direction, &options.direction)}) {
     if (value->empty()) continue;
-    auto deed = parse_deed(fmt::format("{}={}", name, *value), profile);
-    if (!deed) return tl::unexpected(std::move(deed.error()));
-    auto allowed = check_evidence(deed->action, target, options.acceptance);
+    auto request = parse_action(fmt::format("{}={}", name, *value), profile);
+    if (!request) return tl::unexpected(std::move(request.error()));
+    auto allowed = check_evidence(request->action, target, options.acceptance);
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    plan.selections.push_back(std::move(*deed));
+    plan.selections.push_back(std::move(*request));
   }
   return check_evidence(plan.start, target, options.acceptance).map([&] {
     return std::move(plan);
@@ -86,10 +86,10 @@ Result<void> ToolSetup::look() {
                   "wait until it stands still, or stop it with 'spindle remote-stop'"));
   }
   selected_.clear();
-  for (const Deed& deed : plan_->selections) {
-    const auto before = shown_by(deed.action);
+  for (const ActionRequest& request : plan_->selections) {
+    const auto before = shown_by(request.action);
     if (!before) return tl::unexpected(before.error());
-    selected_.push_back({deed, std::nullopt});
+    selected_.push_back({request, std::nullopt});
     if (*before) selected_.back().before = (*before)->number.mantissa();
   }
   return {};
@@ -120,8 +120,9 @@ Result<std::string> ToolSetup::describe() {
 Result<std::optional<std::string>> ToolSetup::describe(std::string_view name) {
   const auto known = tool_->profile->find_action(name);
   if (!known) return std::nullopt;
-  const auto selected = std::find_if(plan_->selections.begin(), plan_->selections.end(),
-                                     [&](const Deed& deed) { return deed.action.name == name; });
+  const auto selected =
+      std::find_if(plan_->selections.begin(), plan_->selections.end(),
+                   [&](const ActionRequest& request) { return request.action.name == name; });
   if (selected != plan_->selections.end()) return describe_value(*selected);
   const auto shown = shown_by(*known);
   if (!shown) return tl::unexpected(shown.error());
@@ -129,14 +130,14 @@ Result<std::optional<std::string>> ToolSetup::describe(std::string_view name) {
   return describe_value({.action = *known, .value = (*shown)->number.mantissa()});
 }
 
-Result<std::string> ToolSetup::describe_value(const Deed& deed) {
-  const std::string value = value_words(deed.action, deed.value);
-  std::string words = deed.action.labels.empty()
-                          ? fmt::format("{} {}", last_words(deed.action.confirm), value)
+Result<std::string> ToolSetup::describe_value(const ActionRequest& request) {
+  const std::string value = value_words(request.action, request.value);
+  std::string words = request.action.labels.empty()
+                          ? fmt::format("{} {}", last_words(request.action.confirm), value)
                           : value;
-  if (deed.action.tells.empty() || deed.value < 0) return words;
+  if (request.action.tells.empty() || request.value < 0) return words;
   const auto parameter = tool_->profile->find(
-      catalogue::numbered_name(deed.action.tells, static_cast<std::uint16_t>(deed.value)));
+      catalogue::numbered_name(request.action.tells, static_cast<std::uint16_t>(request.value)));
   if (!parameter) return words;
   const auto readings = tool_->device.read_each({*parameter}, device::Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
@@ -150,12 +151,12 @@ Result<std::string> ToolSetup::describe_value(const Deed& deed) {
 
 Result<void> ToolSetup::select() {
   for (Selected& selected : selected_) {
-    const Deed& deed = selected.deed;
+    const ActionRequest& request = selected.request;
     selected.tried = true;
-    const auto result = perform_recorded(deed, *tool_, *log_, *context_);
+    const auto result = perform_recorded(request, *tool_, *log_, *context_);
     if (!result) return tl::unexpected(result.error());
     if (result == device::ActionResult::not_confirmed) {
-      return tl::unexpected(not_confirmed(deed, tool_->target));
+      return tl::unexpected(with_target(not_confirmed(request), tool_->target));
     }
   }
   return {};
@@ -164,20 +165,20 @@ Result<void> ToolSetup::select() {
 std::vector<Left> ToolSetup::put_back() {
   std::vector<Left> left;
   for (auto selected = selected_.rbegin(); selected != selected_.rend(); ++selected) {
-    const auto& [deed, before, tried] = *selected;
-    if (!tried || before == deed.value) continue;
-    if (!before || !takes(deed.action, *before)) {
+    const auto& [request, before, tried] = *selected;
+    if (!tried || before == request.value) continue;
+    if (!before || !takes(request.action, *before)) {
       left.push_back(left_of(*selected, before ? "no command selects that" : ""));
       continue;
     }
     if (context_->calm.stay_awake) context_->calm.stay_awake();
-    work::LoggedChange change{.name = deed.action.name,
-                              .register_address = deed.action.address.value,
-                              .old_value = Decimal(deed.value),
+    work::LoggedChange change{.name = request.action.name,
+                              .register_address = request.action.address.value,
+                              .old_value = Decimal(request.value),
                               .new_value = Decimal(*before)};
     const std::string id = log_->begin(change);
     const auto report = device::undo(
-        {deed.action, deed.value, *before}, tool_->device,
+        {request.action, request.value, *before}, tool_->device,
         [this](Duration patience) { return calm_line_.connect(patience); }, context_->calm.clock);
     if (report.found) change.old_value = Decimal(*report.found);
     const bool done =
@@ -193,16 +194,16 @@ std::vector<Left> ToolSetup::put_back() {
 std::vector<Left> ToolSetup::left() const {
   std::vector<Left> left;
   for (const Selected& selected : selected_) {
-    if (!selected.tried || selected.before == selected.deed.value) continue;
+    if (!selected.tried || selected.before == selected.request.value) continue;
     left.push_back(left_of(selected, "the tool may still run"));
   }
   return left;
 }
 
 Left ToolSetup::left_of(const Selected& selected, std::string trouble) {
-  const Action& action = selected.deed.action;
+  const Action& action = selected.request.action;
   return {.name = action.name,
-          .set = value_words(action, selected.deed.value),
+          .set = value_words(action, selected.request.value),
           .before = selected.before ? value_words(action, *selected.before) : std::string(),
           .trouble = std::move(trouble)};
 }

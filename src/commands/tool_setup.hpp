@@ -5,17 +5,18 @@
 #include <string>
 #include <vector>
 
-#include "calm_line.hpp"
+#include "actions.hpp"
 #include "change_log.hpp"
-#include "deeds.hpp"
 #include "guarded_run.hpp"
+#include "spindle/commands/commands.hpp"
 #include "spindle/device/action_undo.hpp"
+#include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
 /// Everything about the run of a tool with events that is decided before it is touched.
 struct ToolPlan {
-  std::vector<Deed> selections;  ///< preset and direction, as far as they were given
+  std::vector<ActionRequest> selections;  ///< preset and direction, as far as they were given
   catalogue::Action start;
   catalogue::Action alarm_reset;  ///< its confirming parameter tells whether there is an alarm
 };
@@ -35,8 +36,8 @@ class ToolSetup {
   /// every product), and reads what is going to be changed. Only reads.
   Result<void> look();
 
-  /// With what the tool would be started now, for the question: "preset 2 (target torque 1.20 N.m),
-  /// forward". Only reads.
+  /// With what the tool would be started now, for the question: "preset 2 (target torque 1.20
+  /// N.m), forward". Only reads.
   Result<std::string> describe();
 
   /// Selects what was asked for, each proven by reading back.
@@ -52,21 +53,21 @@ class ToolSetup {
  private:
   /// A selection and what the tool showed before it.
   struct Selected {
-    Deed deed;
+    ActionRequest request;
     std::optional<std::int64_t> before;  ///< empty: it can not be read
     bool tried = false;
   };
 
   Result<std::optional<catalogue::Value>> shown_by(const catalogue::Action& action);
   Result<std::optional<std::string>> describe(std::string_view action);
-  Result<std::string> describe_value(const Deed& deed);
+  Result<std::string> describe_value(const ActionRequest& request);
   [[nodiscard]] static Left left_of(const Selected& selected, std::string trouble);
 
   const ToolPlan* plan_;
   OpenTool* tool_;
   Context* context_;
   work::ChangeLog* log_;
-  CalmLine calm_line_;
+  UninterruptibleLine calm_line_;
   std::vector<Selected> selected_ = {};
 };
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "listing.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

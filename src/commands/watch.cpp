@@ -13,10 +13,10 @@
 #include "patient_out.hpp"
 #include "progress.hpp"
 #include "records.hpp"
-#include "shared_lines.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
+#include "spindle/work/shared_lines.hpp"
 #include "watched_tool.hpp"
 
 namespace spindle::commands {
@@ -196,7 +196,7 @@ class Stage {
 
   /// Under the stream, where both are one terminal.
   void show_status() {
-    const bool alone = context_->common.verbosity == Verbosity::normal;
+    const bool alone = context_->user.verbosity == Verbosity::normal;
     if (!context_->io.out_is_terminal || !alone) return;
     out_.settle();
     status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "shared_lines.hpp"
+#include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
 

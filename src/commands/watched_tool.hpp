@@ -7,8 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "spindle/commands/target.hpp"
+#include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
 

@@ -22,6 +22,10 @@ Error of_write(const std::string& parameter, Error error) {
   return error;
 }
 
+std::string_view result_of_failure(const Error& error) {
+  return device::is_refusal(error) ? "refused" : "unknown";
+}
+
 /// Where it is not known what the tool holds, the record names both candidates.
 Written Changer::make(const Parameter& parameter, const Value& before, const Value& value) {
   const std::string id = log_->begin(logged(parameter, before, value, {}));

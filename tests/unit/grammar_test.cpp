@@ -200,8 +200,8 @@ TEST_CASE("common options work before and behind the command's name") {
     CHECK(typed.common.timeout == std::chrono::milliseconds(250));
     CHECK(typed.common.connect_timeout == std::chrono::seconds(2));
     CHECK(typed.common.retries == 3U);
-    CHECK(typed.common.consent == commands::Consent::given);
-    CHECK(typed.common.verbosity == commands::Verbosity::frames);
+    CHECK(typed.user.consent == commands::Consent::given);
+    CHECK(typed.user.verbosity == commands::Verbosity::frames);
     CHECK(typed.run);
   }
 }
@@ -213,8 +213,8 @@ TEST_CASE("nothing given: the defaults") {
   CHECK(typed.color == cli::ColorChoice::automatic);
   CHECK_FALSE(typed.common.timeout.has_value());
   CHECK_FALSE(typed.common.retries.has_value());
-  CHECK(typed.common.consent == commands::Consent::ask);
-  CHECK(typed.common.verbosity == commands::Verbosity::normal);
+  CHECK(typed.user.consent == commands::Consent::ask);
+  CHECK(typed.user.verbosity == commands::Verbosity::normal);
 }
 
 TEST_CASE("--json is -o json, and of several the last one wins") {
@@ -244,18 +244,18 @@ TEST_CASE("--json is -o json, and of several the last one wins") {
 }
 
 TEST_CASE("repeated options and flags are no error") {
-  CHECK(good("-v get t -v --verbose").common.verbosity == commands::Verbosity::frames);
+  CHECK(good("-v get t -v --verbose").user.verbosity == commands::Verbosity::frames);
   CHECK(good("get t -qq").talk == report::Talk::quiet);
-  CHECK(good("get t -yv").common.verbosity == commands::Verbosity::frames);
+  CHECK(good("get t -yv").user.verbosity == commands::Verbosity::frames);
   CHECK(good("--timeout 1s get t --timeout 2s").common.timeout == std::chrono::seconds(2));
   CHECK(good("get t --profile a --profile b").common.profile == "b");
   CHECK(good("set t a=1 --dry-run --dry-run").run);
 }
 
 TEST_CASE("--yes answers also where nobody may be asked") {
-  CHECK(good("do t x --no-input").common.consent == commands::Consent::no_input);
-  CHECK(good("do t x --no-input --yes").common.consent == commands::Consent::given);
-  CHECK(good("do t x --yes --no-input").common.consent == commands::Consent::given);
+  CHECK(good("do t x --no-input").user.consent == commands::Consent::no_input);
+  CHECK(good("do t x --no-input --yes").user.consent == commands::Consent::given);
+  CHECK(good("do t x --yes --no-input").user.consent == commands::Consent::given);
 }
 
 TEST_CASE("arguments that look like options, or are negative, arrive behind -- and =") {

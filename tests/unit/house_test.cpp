@@ -39,7 +39,7 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"files", {"catalogue"}},
     {"device", {"link", "catalogue"}},
     {"posix", {"link", "sim"}},
-    {"work", {"device", "files"}},
+    {"work", {"device", "files", "sim"}},
     {"commands", {"report", "work", "sim"}},
     {"cli", {"commands"}},
     {"main", {"cli", "posix"}},

@@ -1,4 +1,4 @@
-#include "commands/side_by_side.hpp"
+#include "spindle/work/side_by_side.hpp"
 
 #include <doctest/doctest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 
 using namespace spindle;
-using namespace spindle::commands;
+using namespace spindle::work;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "spindle/commands/target.hpp"
+#include "spindle/work/target.hpp"
 
 #include <doctest/doctest.h>
 
@@ -7,10 +7,12 @@
 
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
+#include "spindle/work/connect.hpp"
+#include "spindle/work/identification.hpp"
 #include "support/fake_clock.hpp"
 
 using namespace spindle;
-using namespace spindle::commands;
+using namespace spindle::work;
 
 namespace {
 
@@ -29,22 +31,20 @@ struct Bench {
                     .torque_unit = {}},
                    {.name = "bench", .url = "sim:doga-bmt", .profile = {}, .torque_unit = {}}};
     tools.groups = {{"line1", {"station3", "station4"}}, {"single", {"station4"}}};
-    renderer = report::make_renderer(report::Format::json, io, report::Talk::quiet);
   }
 
-  Context context() {
-    return {{.clock = clock, .interrupt = interrupt, .open = open},
-            {.io = io,
-             .calm = calm,
-             .serve = serve,
-             .end_waits = end_waits,
-             .disk = disk,
-             .state_folder = state_folder,
-             .version = "1.2.3",
-             .profiles = profiles,
-             .tools = tools,
-             .common = common},
-            {.renderer = *renderer}};
+  Environment context() {
+    return {.clock = clock,
+            .interrupt = interrupt,
+            .open = open,
+            .calm = calm,
+            .disk = disk,
+            .state_folder = state_folder,
+            .version = "1.2.3",
+            .profiles = profiles,
+            .tools = tools,
+            .show_frames = show_frames,
+            .common = common};
   }
 
   Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& endpoint) {
@@ -58,24 +58,19 @@ struct Bench {
   }
 
   sim::BmOptions tool;
-  report::Streams io{.out = [](std::string_view) { return Result<void>(); },
-                     .err = [](std::string_view) {},
-                     .read_line = [] { return std::optional<std::string>(); }};
   Interrupt interrupt;
   test::FakeClock clock{interrupt};
   std::vector<std::string> opened;
   device::OpenTransport open = [this](const auto& endpoint, const auto&, Duration) {
     return connect_to(endpoint);
   };
-  commands::Calm calm{clock, interrupt, open};
-  sim::Serve serve = {};
-  std::function<void()> end_waits = {};
+  work::Uninterruptible calm{clock, interrupt, open};
   Disk disk = {};
   std::string state_folder = {};
   files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};
   files::Tools tools;
+  ShowFrames show_frames = {};
   CommonOptions common = {};
-  std::unique_ptr<report::Renderer> renderer;
 };
 
 std::vector<std::string> shown(const Result<std::vector<Target>>& targets) {
@@ -87,7 +82,7 @@ std::vector<std::string> shown(const Result<std::vector<Target>>& targets) {
 }
 
 Result<OpenTool> open(const std::string& text, Need need, Bench& bench) {
-  const Context context = bench.context();
+  const Environment context = bench.context();
   const auto target = resolve_target(text, context);
   if (!target) return tl::unexpected(target.error());
   auto profile = load_profile(*target, context);
@@ -99,7 +94,7 @@ Result<OpenTool> open(const std::string& text, Need need, Bench& bench) {
 
 TEST_CASE("names, groups and URLs become targets, each once, in the order given") {
   Bench bench;
-  const Context context = bench.context();
+  const Environment context = bench.context();
   using Names = std::vector<std::string>;
   CHECK(shown(resolve_targets({"station4", "tcp://1.2.3.4", "@line1"}, context)) ==
         Names{"station4", "tcp://1.2.3.4", "station3"});
@@ -215,7 +210,7 @@ TEST_CASE("a tool that fits no profile gives only raw registers, with or without
 
 TEST_CASE("names are checked before connecting where the profile is known") {
   Bench bench;
-  const Context context = bench.context();
+  const Environment context = bench.context();
   const auto target = resolve_target("station3", context);
   const auto opened = open_prepared(
       *target, Need::named_registers, context,
@@ -227,7 +222,7 @@ TEST_CASE("names are checked before connecting where the profile is known") {
 
 TEST_CASE("an answer is matched against all profiles, or against one") {
   Bench bench;
-  const Context context = bench.context();
+  const Environment context = bench.context();
   // Four bytes of serial tell nothing of the product; five with 19 in the middle are a BMT.
   const Bytes short_answer = {0, 1, 0, 1, 0, 3, 0x08, 0x37, 0x3C, 0xDC, 0xC0, 0x0A};
   const Bytes bmt_answer = {0, 1, 0, 2, 0, 9, 0x08, 0xA7, 0x2A, 0x07, 0x13, 0x17, 0x01};

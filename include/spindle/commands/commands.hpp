@@ -7,7 +7,9 @@
 
 #include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
-#include "spindle/sim/bm_tool.hpp"
+#include "spindle/work/action.hpp"
+#include "spindle/work/simulated_tool.hpp"
+#include "spindle/work/snapshot.hpp"
 
 /// One options struct and one function a verb. None of them prints, exits or parses a command line.
 namespace spindle::commands {
@@ -48,8 +50,6 @@ struct SetOptions {
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
-
-enum class Acceptance : std::uint8_t { verified_only, unverified };
 
 struct DoOptions {
   std::string target;                ///< or a group
@@ -122,8 +122,6 @@ struct AlarmsOptions {
 };
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context);
 
-enum class Secrets : std::uint8_t { leave_out, include };
-
 struct BackupOptions {
   std::vector<std::string> targets;
   std::string file;    ///< of the one target; "-": standard output; empty: named after the target
@@ -155,16 +153,6 @@ struct RestoreOptions {
   Storing storing = Storing::no;  ///< in non-volatile memory, once and only when all succeeded
 };
 Result<Outcome> restore(const RestoreOptions& options, Context& context);
-
-/// What may be chosen of a simulated tool.
-struct SimulatedToolOptions {
-  sim::BmOptions bm = {};
-  std::vector<modbus::UnitId> units = {};       ///< of a serial tool; none: as many as usual
-  std::optional<Duration> busy = std::nullopt;  ///< how long Configuration takes; empty: as usual
-  std::vector<sim::Raised> alarms = {};
-  std::vector<sim::Raised> warnings = {};       ///< of a motor driver
-  std::optional<unsigned> baud = std::nullopt;  ///< of its line; empty: the profile's
-};
 
 struct SimulateOptions {
   std::string profile;

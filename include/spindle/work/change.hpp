@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "spindle/device/device.hpp"
@@ -13,6 +14,10 @@ bool is_interruption(const Error& error);
 
 /// The error of a write; of one that was cut off it also says that its effect is not known.
 Error of_write(const std::string& parameter, Error error);
+
+/// The result of an action that failed: "refused" by the tool, or "unknown" where it can not be
+/// said whether it was done.
+std::string_view result_of_failure(const Error& error);
 
 /// Changes values of one tool, by the same rule whatever the command: the intent is recorded, the
 /// value is written, what became of it is read back and recorded, and all of it can be put back.

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "spindle/commands/target.hpp"
+#include "spindle/work/target.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 inline const Target& target_of(const Target& target) { return target; }
 
@@ -84,4 +84,4 @@ auto side_by_side(const std::vector<Item>& items, std::size_t jobs, Handle handl
   return results;
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,20 +1,21 @@
-#include "shared_lines.hpp"
+#include "spindle/work/shared_lines.hpp"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "side_by_side.hpp"
 #include "spindle/link/serial_settings.hpp"
+#include "spindle/work/connect.hpp"
+#include "spindle/work/side_by_side.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
-SharedLines::SharedLines(const std::vector<Target>& targets, const Context& context)
-    : open_(&context.open) {
+SharedLines::SharedLines(const std::vector<Target>& targets, const Environment& environment)
+    : open_(&environment.open) {
   for (const auto& line : by_line(targets)) {
     if (line.size() == 1) continue;
     lines_.emplace(shared_line(targets[line.front()].endpoint),
-                   std::make_unique<link::SharedLine>(context.clock));
+                   std::make_unique<link::SharedLine>(environment.clock));
   }
 }
 
@@ -50,8 +51,8 @@ Result<void> check_same_settings(const std::vector<Target>& targets,
 }
 
 Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::string>& texts,
-                                                       const Context& context) {
-  auto targets = resolve_targets(texts, context);
+                                                       const Environment& environment) {
+  auto targets = resolve_targets(texts, environment);
   if (!targets) return targets;
   const auto lines = by_line(*targets);
   if (lines.size() == targets->size()) return targets;  // each has a line of its own
@@ -60,7 +61,7 @@ Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::st
   for (const Target& target : *targets) {
     const auto [entry, is_new] = known.try_emplace(target.profile);
     if (is_new) {
-      const auto profile = load_profile(target, context);
+      const auto profile = load_profile(target, environment);
       if (profile) entry->second = profile->link;  // else told when it is used
     }
     facts.push_back(entry->second);
@@ -68,4 +69,4 @@ Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::st
   return check_same_settings(*targets, facts).map([&] { return std::move(*targets); });
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

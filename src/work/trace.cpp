@@ -1,6 +1,4 @@
-#include "trace.hpp"
-
-#include <fmt/format.h>
+#include "spindle/work/trace.hpp"
 
 #include <functional>
 #include <utility>
@@ -9,54 +7,20 @@
 #include "spindle/files/capture.hpp"
 #include "spindle/modbus/adu.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
-
-std::string_view to_text(link::Decision decision) {
-  switch (decision) {
-    case link::Decision::request:
-      return "request";
-    case link::Decision::answer:
-      return "answer";
-    case link::Decision::exception_response:
-      return "exception response";
-    case link::Decision::spontaneous:
-      return "event, kept";
-    case link::Decision::broken:
-      return "not the answer to our request, ignored";
-    case link::Decision::stray:
-      return "stray frame, ignored";
-    case link::Decision::late:
-      return "late answer, ignored";
-    case link::Decision::echo:
-      return "echo of our request, ignored";
-    case link::Decision::junk:
-      return "no frame";
-    case link::Decision::unanswered:
-      return "no answer";
-    case link::Decision::retry:
-      return "asking again";
-    case link::Decision::resync:
-      return "resync";
-    case link::Decision::doubt:
-      return "doubt";
-    case link::Decision::proof:
-      return "proving the answer";
-  }
-  return "";
-}
 
 using Hear = std::function<void(link::Direction, ByteView)>;
 
 /// Puts the bytes of one connection together to frames and appends them to a capture file.
 class Capture {
  public:
-  Capture(std::string target, modbus::Framing framing, const Context& context)
+  Capture(std::string target, modbus::Framing framing, const Environment& environment)
       : target_(std::move(target)),
         framing_(framing),
-        path_(context.common.trace_file),
-        disk_(&context.disk),
-        clock_(&context.clock) {}
+        path_(environment.common.trace_file),
+        disk_(&environment.disk),
+        clock_(&environment.clock) {}
 
   void operator()(link::Direction direction, ByteView bytes) {
     if (direction == link::Direction::sent) {
@@ -116,35 +80,14 @@ Hear both(Hear first, Hear second) {
   };
 }
 
-link::Trace spoken(const std::string& target, const Context& context) {
-  if (context.common.verbosity == Verbosity::normal) return {};
-  const auto line = [&io = context.io, &clock = context.clock, target](std::string text) {
-    if (io.err_is_ready && !io.err_is_ready()) return;
-    text.erase(text.find_last_not_of(' ') + 1);
-    io.err(fmt::format("{} {} {}\n", report::to_text(clock.wall()), target, text));
-  };
-  return {.bytes =
-              [line](link::Direction direction, ByteView bytes) {
-                if (bytes.empty()) return;
-                const std::string_view arrow = direction == link::Direction::sent ? "->" : "<-";
-                line(fmt::format("{} {}", arrow, to_hex(bytes)));
-              },
-          .decision =
-              [line](link::Decision decision, std::string_view text) {
-                line(fmt::format("   {}: {}", to_text(decision), text));
-              }};
-}
-
 }  // namespace
 
-link::Trace make_trace(const std::string& target, modbus::Framing framing, const Context& context) {
-  link::Trace trace = spoken(target, context);
-  trace.notice = [&io = context.io, target](std::string_view sentence) {
-    report::say_warning(io, fmt::format("{}: {}", target, sentence));
-  };
-  if (context.common.trace_file.empty()) return trace;
-  trace.bytes = both(std::move(trace.bytes), Capture(target, framing, context));
+link::Trace make_trace(const std::string& target, modbus::Framing framing,
+                       const Environment& environment) {
+  link::Trace trace = environment.show_frames ? environment.show_frames(target) : link::Trace();
+  if (environment.common.trace_file.empty()) return trace;
+  trace.bytes = both(std::move(trace.bytes), Capture(target, framing, environment));
   return trace;
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,10 +1,8 @@
-#include "commands/deeds.hpp"
+#include "spindle/work/action.hpp"
 
 #include <doctest/doctest.h>
 
 #include <string>
-
-#include "commands/change_log.hpp"
 
 using namespace spindle;
 
@@ -36,11 +34,11 @@ catalogue::Profile secretive() {
 }  // namespace
 
 TEST_CASE("what an action writes over a secret is not recorded") {
-  const auto secret = commands::parse_deed("enter-pin=4711", secretive());
+  const auto secret = work::parse_action("enter-pin=4711", secretive());
   REQUIRE(secret);
   CHECK(secret->value == 4711);
-  CHECK_FALSE(commands::logged(*secret).new_value.has_value());
-  const auto open = commands::parse_deed("select=3", secretive());
+  CHECK_FALSE(work::logged(*secret).new_value.has_value());
+  const auto open = work::parse_action("select=3", secretive());
   REQUIRE(open);
-  CHECK(commands::logged(*open).new_value == Decimal(3));
+  CHECK(work::logged(*open).new_value == Decimal(3));
 }

@@ -1,8 +1,8 @@
-#include "side_by_side.hpp"
+#include "spindle/work/side_by_side.hpp"
 
 #include <map>
 
-namespace spindle::commands {
+namespace spindle::work {
 
 std::vector<std::vector<std::size_t>> by_line(const std::vector<std::string>& lines) {
   std::vector<std::vector<std::size_t>> places;
@@ -29,4 +29,4 @@ void FinishedCounter::add() {
   if (tell_) tell_(finished_);
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,4 +1,4 @@
-#include "open_sim.hpp"
+#include "spindle/work/simulated_tool.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,7 +10,7 @@
 #include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/sim_transport.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
 
 /// Whom a broadcast inside the program reaches.
@@ -71,10 +71,10 @@ Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profi
 
 Result<SimulatedTool> make_simulated_tool(const std::string& profile,
                                           const SimulatedToolOptions& options,
-                                          const Context& context) {
-  auto loaded = context.profiles.load(profile);
+                                          const Environment& environment) {
+  auto loaded = environment.profiles.load(profile);
   if (!loaded) return tl::unexpected(std::move(loaded.error()));
-  auto start = context.profiles.load_simulation(profile);
+  auto start = environment.profiles.load_simulation(profile);
   if (!start) return tl::unexpected(std::move(start.error()));
   auto server = make_server(*loaded, *start, options);
   if (!server) return tl::unexpected(std::move(server.error()));
@@ -88,22 +88,24 @@ Duration simulated_character_time(const catalogue::LinkFacts& facts, std::option
       link::serial_settings(line, serial.baud, serial.parity, serial.stop_bits));
 }
 
-device::OpenTransport with_simulated_tools(const Context& context, SimulatedToolOptions options) {
-  return [&context, options = std::move(options)](
+device::OpenTransport with_simulated_tools(const Environment& environment,
+                                           SimulatedToolOptions options) {
+  return [&environment, options = std::move(options)](
              const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
              Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
     if (endpoint.medium != link::Medium::simulated) {
-      return context.open(endpoint, facts, connect_timeout);
+      return environment.open(endpoint, facts, connect_timeout);
     }
     SimulatedToolOptions wanted = options;
     wanted.baud = endpoint.baud;
     wanted.units = units_for(endpoint, facts);
-    auto tool = make_simulated_tool(endpoint.profile, wanted, context);
+    auto tool = make_simulated_tool(endpoint.profile, wanted, environment);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     return sim::make_sim_transport(
-        std::move(tool->server), tool->profile.link.framing, {}, context.clock, context.interrupt,
+        std::move(tool->server), tool->profile.link.framing, {}, environment.clock,
+        environment.interrupt,
         {.character_time = simulated_character_time(tool->profile.link, endpoint.baud)});
   };
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

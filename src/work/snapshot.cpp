@@ -1,12 +1,11 @@
-#include "snapshots.hpp"
+#include "spindle/work/snapshot.hpp"
 
 #include <algorithm>
 #include <utility>
 
-#include "records.hpp"
-#include "spindle/files/backup_file.hpp"
+#include "spindle/base/duration.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
 
 using catalogue::Missing;
@@ -57,14 +56,18 @@ void add(const device::Reading& reading, const Target& target, Secrets secrets,
 
 }  // namespace
 
-Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Context& context,
+std::string unit_of(const catalogue::Parameter& parameter, const Target& target) {
+  return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit;
+}
+
+Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Environment& environment,
                                    const link::Progress& progress) {
   const catalogue::Profile& profile = tool.device.profile();
   const auto stored = catalogue::stored_parameters(profile);
   const auto readings = tool.device.read_each(stored, device::Limits::read, progress);
   if (!readings) return tl::unexpected(readings.error());
-  ToolSnapshot taken{.snapshot = {.time = report::to_text(context.clock.wall()),
-                                  .version = std::string(context.version),
+  ToolSnapshot taken{.snapshot = {.time = to_text(environment.clock.wall()),
+                                  .version = std::string(environment.version),
                                   .target = tool.target.shown,
                                   .profile = profile.id,
                                   .fingerprint = catalogue::fingerprint(stored),
@@ -74,8 +77,9 @@ Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Contex
   return taken;
 }
 
-Result<files::BackupFile> read_backup_file(const std::string& path, const Context& context) {
-  auto text = context.disk.read(path);
+Result<files::BackupFile> read_backup_file(const std::string& path,
+                                           const Environment& environment) {
+  auto text = environment.disk.read(path);
   if (!text) return tl::unexpected(std::move(text.error()));
   return files::read_backup(*text, path);
 }
@@ -96,4 +100,4 @@ std::string file_name_of(const std::string& target) {
   return name;
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,15 +1,15 @@
 #pragma once
 
-#include "spindle/commands/target.hpp"
+#include "spindle/work/connect.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// The way back to a tool whose line broke, on a clock and lines that signals do not end: for the
 /// last words that leave a tool safe.
-class CalmLine {
+class UninterruptibleLine {
  public:
   /// Both must outlive it, and it must outlive the devices that it opens.
-  CalmLine(const OpenTool& tool, const Context& context);
+  UninterruptibleLine(const OpenTool& tool, const Environment& environment);
 
   /// Connects within `patience`, or the usual time where that is shorter, and asks nothing.
   Result<device::Device> connect(Duration patience);
@@ -17,7 +17,7 @@ class CalmLine {
  private:
   const OpenTool* tool_;
   Duration usual_;
-  Context context_;  ///< lines that are opened on it refer to it
+  Environment environment_;  ///< lines that are opened on it refer to it
 };
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -5,20 +5,20 @@
 #include <string>
 #include <vector>
 
-#include "spindle/commands/target.hpp"
 #include "spindle/link/shared_line.hpp"
+#include "spindle/work/target.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// The serial lines on which several tools of one command are, so that all of them can be connected
 /// at the same time. Must outlive what it opens.
 class SharedLines {
  public:
   /// Opens nothing. Every other target has a line of its own.
-  SharedLines(const std::vector<Target>& targets, const Context& context);
+  SharedLines(const std::vector<Target>& targets, const Environment& environment);
 
-  /// Like `open` of the context; on a shared line all get a share of one opening, with the settings
-  /// of whoever came first.
+  /// Like `open` of the environment; on a shared line all get a share of one opening, with the
+  /// settings of whoever came first.
   [[nodiscard]] device::OpenTransport opener();
 
  private:
@@ -34,6 +34,6 @@ Result<void> check_same_settings(const std::vector<Target>& targets,
 /// resolve_targets() for commands that go on with all of them: refuses tools of one line that do
 /// not mean the same settings, as a frame at a wrong rate can stop a motor that runs there.
 Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::string>& texts,
-                                                       const Context& context);
+                                                       const Environment& environment);
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

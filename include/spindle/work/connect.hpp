@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "spindle/work/target.hpp"
+
+namespace spindle::work {
+
+/// A target that was connected.
+struct OpenTool {
+  Target target;
+  std::unique_ptr<const catalogue::Profile> profile;  ///< what the device refers to
+  device::Device device;
+};
+
+/// What a command has to know of the registers.
+enum class Need : std::uint8_t {
+  named_registers,  ///< that they are those of the profile
+  raw_registers,    ///< nothing
+};
+
+/// The target's profile, or an empty one where none is known before connecting.
+Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment);
+
+/// Whether somebody works with a tool of sim:, so that there is something to watch.
+enum class SimulatedOperator : std::uint8_t { absent, working };
+
+/// Connects with a profile that outlives the device, and asks nothing. `past` says whether an
+/// earlier connection to this tool had trouble.
+Result<device::Device> connect_device(
+    const Target& target, const catalogue::Profile& profile, const Environment& environment,
+    SimulatedOperator simulated_operator = SimulatedOperator::absent,
+    link::SessionOptions::Past past = link::SessionOptions::Past::clean);
+
+/// The same with a profile to keep.
+Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
+                         const Environment& environment);
+
+/// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
+/// other registers than the profile's (`wrong_generation`), or one that is another product
+/// (`mismatch`), is refused.
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Environment& environment);
+
+/// Unit 0 on a serial line is everybody, and nobody answers: refuses it where one tool is meant,
+/// and one tool where everybody is.
+Result<void> check_reach(const Target& target, const catalogue::Profile& profile);
+
+/// The target of a tool that was opened, with the profile that was found, to be opened again.
+Target known_target(const OpenTool& tool);
+
+/// An open tool, and what was prepared from its profile.
+template <typename Prepared>
+struct Opened {
+  OpenTool tool;
+  Prepared prepared;
+};
+
+/// Opens a tool and calls `prepare(profile)` as early as possible: before connecting where the
+/// profile is known, so that a misspelt name is told without asking anybody.
+template <typename Prepare>
+auto open_prepared(const Target& target, Need need, const Environment& environment, Prepare prepare)
+    -> Result<
+        Opened<typename std::invoke_result_t<Prepare, const catalogue::Profile&>::value_type>> {
+  using Attempt = std::invoke_result_t<Prepare, const catalogue::Profile&>;
+  auto profile = load_profile(target, environment);
+  if (!profile) return tl::unexpected(std::move(profile.error()));
+  const bool known = !target.profile.empty() || need == Need::raw_registers;
+  std::optional<Attempt> prepared;
+  if (known) prepared = prepare(*profile);
+  if (prepared && !*prepared) return tl::unexpected(std::move(prepared->error()));
+  auto tool = open_tool(target, std::move(*profile), need, environment);
+  if (!tool) return tl::unexpected(std::move(tool.error()));
+  if (!prepared) prepared = prepare(*tool->profile);
+  if (!*prepared) return tl::unexpected(std::move(prepared->error()));
+  return Opened<typename Attempt::value_type>{std::move(*tool), std::move(**prepared)};
+}
+
+}  // namespace spindle::work

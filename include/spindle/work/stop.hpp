@@ -1,0 +1,26 @@
+#pragma once
+
+#include "spindle/device/motor.hpp"
+#include "spindle/device/run_guard.hpp"
+#include "spindle/work/connect.hpp"
+
+namespace spindle::work {
+
+/// How often a stop is sent that stays without an answer or an effect.
+inline constexpr int most_stops = 3;
+
+/// Whether the tool may still run although it can be reached.
+bool leaves_open(const Result<device::StopResult>& stopped);
+
+/// Stops the motor of a product that is run by a command word, or all on the line where the target
+/// says so. Whatever can be read helps to stop gently; whatever can not be read does not keep it
+/// from being stopped.
+Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
+                                      const Environment& environment);
+
+/// Tells every motor on the line to stop, more than once, as none of them acknowledges it. Which
+/// bit starts what on each of them can not be asked.
+Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+                            catalogue::StopMode mode);
+
+}  // namespace spindle::work

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "spindle/work/environment.hpp"
+
+namespace spindle::work {
+
+/// Whom a command means: one tool, or everybody on its serial line.
+enum class Reach : std::uint8_t { one, everybody };
+
+/// A tool as the user named it, with everything that is known before connecting.
+struct Target {
+  std::string shown;  ///< name or URL as given: the `target` of records
+  link::Endpoint endpoint = {};
+  std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
+  std::string torque_unit = {};  ///< of the tools file; empty: unknown
+  std::vector<std::string> verified = {};
+  Reach reach = Reach::one;
+  link::Reopening reopening = link::Reopening::never;
+
+  /// The error as one of this tool, with its address beside its name.
+  [[nodiscard]] Error blamed(Error error) const;
+};
+
+/// The error as one of this tool, with its address beside its name, unless it is one of a tool
+/// already.
+Error with_target(Error error, const Target& target);
+
+/// The same target, whose connection is opened once more where the tool closes it: for commands
+/// that ask for one thing and end, while the context lives.
+Target reopening(Target target);
+
+/// Name, @group or URL to targets, each once. Errors `bad_target` and `unknown_name` with a
+/// suggestion.
+Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
+                                            const Environment& environment);
+
+/// The targets that are known, and the errors of resolve_targets() for those that are not.
+struct Resolution {
+  std::vector<Target> targets = {};
+  std::vector<Error> faults = {};
+};
+
+/// For a command that must not leave out a tool because the name of another is wrong.
+Resolution resolve_each_target(const std::vector<std::string>& texts,
+                               const Environment& environment);
+
+/// Why a command does not take a group, and what helps instead, before the name of the first tool.
+struct OneTool {
+  std::string_view why = "this command takes one";
+  std::string_view instead = "name one of them, such as";
+};
+
+/// The same for a command that takes one tool; a group of several is an error.
+Result<Target> resolve_target(const std::string& text, const Environment& environment,
+                              const OneTool& words = {});
+
+/// Names the line on which the target's unit is one of several, as only one connection at a time
+/// can have it: the port behind its links, or the device server. Empty for a tool with a line of
+/// its own.
+std::string shared_line(const link::Endpoint& endpoint);
+
+/// Whether a target's text names a group.
+bool names_group(std::string_view text);
+
+/// Whether a first argument is meant as a target rather than a parameter pattern.
+bool is_target(std::string_view text, const Environment& environment);
+
+/// A tool on a serial line whose profile nobody named.
+Error unproven(const Target& target);
+
+}  // namespace spindle::work

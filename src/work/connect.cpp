@@ -1,0 +1,179 @@
+#include "spindle/work/connect.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <utility>
+
+#include "spindle/work/identification.hpp"
+#include "spindle/work/simulated_tool.hpp"
+#include "spindle/work/trace.hpp"
+
+namespace spindle::work {
+namespace {
+
+/// What tools send unasked, by all profiles: a tool whose profile is not known may be any of them.
+std::vector<link::SpontaneousShape> unasked_shapes(const Environment& environment) {
+  std::vector<link::SpontaneousShape> shapes;
+  for (const files::ProfileEntry& entry : environment.profiles.list()) {
+    const auto profile = environment.profiles.load(entry.id);
+    if (profile && profile->events) shapes.push_back(device::shape_of(*profile->events));
+  }
+  return shapes;
+}
+
+device::LinkOptions link_options(const Target& target, const catalogue::Profile& profile,
+                                 const Environment& environment) {
+  return {.answer_timeout = environment.common.timeout,
+          .connect_timeout = environment.common.connect_timeout,
+          .retries = environment.common.retries,
+          .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link),
+                              environment),
+          .shown = target.shown,
+          .unasked = profile.id.empty() ? unasked_shapes(environment)
+                                        : std::vector<link::SpontaneousShape>(),
+          .reopening = target.reopening};
+}
+
+SimulatedToolOptions simulated_options(SimulatedOperator simulated_operator) {
+  SimulatedToolOptions options;
+  if (simulated_operator == SimulatedOperator::working) {
+    options.bm.rundown_every = std::chrono::seconds(2);
+    options.bm.ng_every = 4;
+  }
+  return options;
+}
+
+/// A tool that could say what it is, but fits nothing that is known.
+Error unknown_product(Errc code, std::string why) {
+  return {.code = code,
+          .message = std::move(why),
+          .hint = "only raw registers such as @holding:2 can be read"};
+}
+
+/// The bytes with which a tool whose profile was not named says what it is.
+Result<Bytes> ask_identity(OpenTool& tool) {
+  if (tool.target.endpoint.medium != link::Medium::tcp) {
+    return tl::unexpected(unproven(tool.target));
+  }
+  auto answer = tool.device.report_server_id();
+  if (answer || answer.error().code != Errc::exception_response) return answer;
+  return tl::unexpected(tool.target.blamed(unknown_product(
+      Errc::mismatch, fmt::format("no profile can be found: {}", message_of(answer.error())))));
+}
+
+/// A tool whose profile was not named: ask it, and go on with what its answer fits.
+Result<void> find_profile(OpenTool& tool, const Environment& environment) {
+  auto answer = ask_identity(tool);
+  if (!answer) return tl::unexpected(std::move(answer.error()));
+  auto identification = match_identity(*answer, {}, environment);
+  if (!identification) return tl::unexpected(std::move(identification.error()));
+  if (identification->candidates.empty()) {
+    const bool later = identification->generation == catalogue::Generation::later;
+    return tl::unexpected(tool.target.blamed(
+        unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
+                        fmt::format("no profile fits what the tool says of itself: {}",
+                                    fmt::join(identification->identity.notes, "; ")))));
+  }
+  // Products that their answer does not tell apart share the register map of their common base.
+  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
+  tool.device.use(*tool.profile, std::move(identification->identity));
+  return {};
+}
+
+/// The port that was tried is nobody's choice when neither URL nor profile names one.
+std::string other_port_hint(const Environment& environment) {
+  for (const files::ProfileEntry& entry : environment.profiles.list()) {
+    const auto profile = environment.profiles.load(entry.id);
+    if (!profile || profile->link.port == catalogue::LinkFacts().port) continue;
+    return fmt::format("no port is named, and {} tools listen on port {}: add :{} or --profile {}",
+                       profile->series, profile->link.port, profile->link.port, profile->id);
+  }
+  return {};
+}
+
+bool is_wrong_port(const Error& error) {
+  return error.code == Errc::connection_refused || error.code == Errc::connect_timeout;
+}
+
+}  // namespace
+
+Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment) {
+  if (target.profile.empty()) return catalogue::Profile();
+  auto profile = environment.profiles.load(target.profile);
+  if (!profile) profile.error().asked_of = target.shown;
+  return profile;
+}
+
+Target known_target(const OpenTool& tool) {
+  Target known = tool.target;
+  if (known.profile.empty()) known.profile = tool.profile->id;
+  return known;
+}
+
+Result<void> check_reach(const Target& target, const catalogue::Profile& profile) {
+  const bool serial_line = target.endpoint.medium == link::Medium::serial ||
+                           target.endpoint.medium == link::Medium::rtu_over_tcp;
+  const bool serial_product = profile.link.framing == modbus::Framing::rtu;
+  const std::uint8_t unit = target.endpoint.unit.value_or(modbus::UnitId{profile.link.unit}).value;
+  const bool meant = serial_product || (serial_line && target.endpoint.unit);
+  const bool everybody = meant && unit == 0;
+  if (everybody == (target.reach == Reach::everybody)) return {};
+  Error error{.code = Errc::usage};
+  if (everybody) {
+    error.message = "unit 0 is everybody on the line, and nobody answers";
+    error.hint = "name one unit, or add --broadcast to 'set', 'do' or 'remote-stop'";
+  } else {
+    error.message = "--broadcast is for everybody on a serial line, but this is one tool";
+    error.hint = "give unit=0 in the URL, as in rtu:///dev/ttyUSB0?unit=0";
+  }
+  return tl::unexpected(target.blamed(std::move(error)));
+}
+
+link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& profile) {
+  if (endpoint.medium != link::Medium::tcp || endpoint.port) return endpoint;
+  endpoint.port = profile.link.port;
+  endpoint.text = link::to_url(endpoint);
+  return endpoint;
+}
+
+Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
+                                      const Environment& environment,
+                                      SimulatedOperator simulated_operator,
+                                      link::SessionOptions::Past past) {
+  if (auto meant = check_reach(target, profile); !meant) {
+    return tl::unexpected(std::move(meant.error()));
+  }
+  device::LinkOptions options = link_options(target, profile, environment);
+  options.past = past;
+  auto device = device::Device::open(
+      with_port(target.endpoint, profile), profile, options,
+      with_simulated_tools(environment, simulated_options(simulated_operator)), environment.clock);
+  const bool guessed = target.profile.empty() && !target.endpoint.port;
+  if (!device && guessed && is_wrong_port(device.error())) {
+    device.error().hint = other_port_hint(environment);
+  }
+  return device;
+}
+
+Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
+                         const Environment& environment) {
+  auto kept = std::make_unique<const catalogue::Profile>(std::move(profile));
+  auto device = connect_device(target, *kept, environment);
+  if (!device) return tl::unexpected(std::move(device.error()));
+  Target resolved = target;
+  resolved.endpoint = with_port(resolved.endpoint, *kept);
+  return OpenTool{std::move(resolved), std::move(kept), std::move(*device)};
+}
+
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Environment& environment) {
+  auto tool = connect(target, std::move(profile), environment);
+  if (!tool || need == Need::raw_registers) return tool;
+  auto known = target.profile.empty() ? find_profile(*tool, environment)
+                                      : tool->device.require_known_registers();
+  if (!known) return tl::unexpected(std::move(known.error()));
+  return tool;
+}
+
+}  // namespace spindle::work

@@ -1,0 +1,38 @@
+#include "spindle/work/stop.hpp"
+
+namespace spindle::work {
+
+Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+                            catalogue::StopMode mode) {
+  const catalogue::RunFacts& facts = motor.facts();
+  const bool gently = mode == catalogue::StopMode::decelerate && !motor.has_inputs();
+  const std::uint16_t word = gently ? facts.decelerate_always : motor.idle_word();
+  Result<void> sent;
+  for (int again = 0; again < most_stops && sent; ++again) sent = motor.broadcast(device, word);
+  return sent;
+}
+
+bool leaves_open(const Result<device::StopResult>& stopped) {
+  if (stopped) return *stopped == device::StopResult::unconfirmed;
+  return link::is_lost_answer(stopped.error());
+}
+
+Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
+                                      const Environment& environment) {
+  const auto motor = device::Motor::of(*tool.profile);
+  if (!motor) return tl::unexpected(motor.error());
+  if (tool.target.reach == Reach::everybody) {
+    return broadcast_stop(tool.device, *motor, mode).map([] { return device::StopResult::sent; });
+  }
+  device::MotorStopper stopper(*motor, mode);
+  tool.device.set_retries(0);  // it is better to send the stop soon, and again
+  tool.device.session().waive_proofs();
+  stopper.observe(tool.device);
+  auto stopped = stopper.stop(tool.device, environment.clock);
+  for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {
+    stopped = stopper.stop(tool.device, environment.clock);
+  }
+  return stopped;
+}
+
+}  // namespace spindle::work

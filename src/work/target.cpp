@@ -1,0 +1,169 @@
+#include "spindle/work/target.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::work {
+namespace {
+
+const files::Tool* find_tool(const files::Tools& tools, std::string_view name) {
+  const auto found = std::find_if(tools.tools.begin(), tools.tools.end(),
+                                  [&](const files::Tool& tool) { return tool.name == name; });
+  return found == tools.tools.end() ? nullptr : &*found;
+}
+
+Error unknown_target(const std::string& text, const files::Tools& tools) {
+  std::vector<std::string> known;
+  for (const files::Tool& tool : tools.tools) known.push_back(tool.name);
+  for (const auto& [group, members] : tools.groups) known.push_back("@" + group);
+  std::string hint = suggestion(text, known);
+  if (hint.empty()) {
+    hint = tools.path.empty()
+               ? "no tools file was found, so a target is a URL: tcp://HOST or sim:doga-bm"
+               : fmt::format("name a tool of {}, or a URL such as tcp://HOST", tools.path);
+  }
+  return {.code = Errc::unknown_name,
+          .message = fmt::format("unknown target '{}'", text),
+          .hint = std::move(hint)};
+}
+
+Result<Target> target_of_url(const std::string& url, const Environment& environment) {
+  auto endpoint = link::parse_endpoint(url);
+  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
+  Target target{.shown = url, .endpoint = std::move(*endpoint)};
+  target.profile =
+      environment.common.profile.empty() ? target.endpoint.profile : environment.common.profile;
+  return target;
+}
+
+Result<Target> target_of_tool(const files::Tool& tool, const Environment& environment) {
+  auto target = target_of_url(tool.url, environment);
+  if (!target) {
+    target.error().target = tool.name;
+    target.error().endpoint = tool.url;
+    target.error().code = Errc::bad_file;
+    return target;
+  }
+  target->shown = tool.name;
+  if (environment.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
+  target->torque_unit = tool.torque_unit;
+  target->verified = tool.verified;
+  return target;
+}
+
+/// The tools of this name, or that of this URL. Only a file with faults can have a name twice.
+std::vector<Result<Target>> named_targets(const std::string& name, const Environment& environment) {
+  std::vector<Result<Target>> found;
+  for (const files::Tool& tool : environment.tools.tools) {
+    if (tool.name == name) found.push_back(target_of_tool(tool, environment));
+  }
+  if (!found.empty()) return found;
+  if (link::looks_like_url(name)) {
+    found.push_back(target_of_url(name, environment));
+  } else {
+    found.emplace_back(tl::unexpected(unknown_target(name, environment.tools)));
+  }
+  return found;
+}
+
+void add(Result<Target> found, Resolution& resolution) {
+  if (!found) {
+    resolution.faults.push_back(std::move(found.error()));
+    return;
+  }
+  const bool known =
+      std::any_of(resolution.targets.begin(), resolution.targets.end(), [&](const Target& target) {
+        return target.shown == found->shown && target.endpoint.text == found->endpoint.text;
+      });
+  if (!known) resolution.targets.push_back(std::move(*found));
+}
+
+void add_named(const std::string& name, const Environment& environment, Resolution& resolution) {
+  for (Result<Target>& found : named_targets(name, environment)) add(std::move(found), resolution);
+}
+
+}  // namespace
+
+Error Target::blamed(Error error) const {
+  error.target = shown;
+  if (endpoint.text != shown) error.endpoint = endpoint.text;
+  return error;
+}
+
+Error with_target(Error error, const Target& target) {
+  return error.target.empty() ? target.blamed(std::move(error)) : error;
+}
+
+Target reopening(Target target) {
+  target.reopening = link::Reopening::once;
+  return target;
+}
+
+std::string shared_line(const link::Endpoint& endpoint) {
+  if (endpoint.medium == link::Medium::rtu_over_tcp) {
+    return fmt::format("{}:{}", endpoint.host, endpoint.port.value_or(0));
+  }
+  if (endpoint.medium != link::Medium::serial) return {};
+  std::error_code unreadable;  // then the path as it is
+  const auto port = std::filesystem::weakly_canonical(endpoint.device, unreadable);
+  return unreadable ? endpoint.device : port.string();
+}
+
+Error unproven(const Target& target) {
+  return target.blamed(
+      {.code = Errc::usage,
+       .message = "a tool on a serial line can not prove what it is",
+       .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
+               "shows all"});
+}
+
+bool names_group(std::string_view text) { return text.starts_with('@'); }
+
+bool is_target(std::string_view text, const Environment& environment) {
+  if (link::looks_like_url(text) || find_tool(environment.tools, text) != nullptr) return true;
+  return names_group(text) && environment.tools.groups.contains(std::string(text.substr(1)));
+}
+
+Resolution resolve_each_target(const std::vector<std::string>& texts,
+                               const Environment& environment) {
+  Resolution resolution;
+  for (const std::string& text : texts) {
+    const auto group = names_group(text) ? environment.tools.groups.find(text.substr(1))
+                                         : environment.tools.groups.end();
+    if (group == environment.tools.groups.end()) {
+      add_named(text, environment, resolution);
+      continue;
+    }
+    for (const std::string& name : group->second) add_named(name, environment, resolution);
+    if (group->second.empty()) {
+      resolution.faults.push_back(
+          {.code = Errc::bad_file, .message = fmt::format("'{}' names no tools", text)});
+    }
+  }
+  return resolution;
+}
+
+Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
+                                            const Environment& environment) {
+  Resolution resolution = resolve_each_target(texts, environment);
+  if (!resolution.faults.empty()) return tl::unexpected(std::move(resolution.faults.front()));
+  return std::move(resolution.targets);
+}
+
+Result<Target> resolve_target(const std::string& text, const Environment& environment,
+                              const OneTool& words) {
+  auto targets = resolve_targets({text}, environment);
+  if (!targets) return tl::unexpected(std::move(targets.error()));
+  if (targets->size() == 1) return std::move(targets->front());
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
+            .hint = fmt::format("{} {}", words.instead, targets->front().shown)});
+}
+
+}  // namespace spindle::work
