@@ -46,9 +46,10 @@ std::string Danger::effect() const {
 }
 
 std::string Danger::remedy() const {
-  if (runs_motor || (hazard == Hazard::moves && action == "start")) {
+  if (is_guarded) {
     return "'spindle remote-start' starts it under a guard that always ends in a stop";
   }
+  if (hazard == Hazard::moves) return {};
   if (!action.empty()) return fmt::format("'spindle do TARGET {}' does it, and asks first", action);
   return {};
 }
@@ -63,12 +64,16 @@ void Dangers::add(modbus::RegisterTable table, modbus::RegisterAddress address, 
 Dangers::Dangers(const Profile& profile) {
   for (const Action& action : profile.actions) {
     add(modbus::RegisterTable::holding, action.address, action.kind,
-        {.hazard = hazard_of(action), .action = action.name});
+        {.hazard = hazard_of(action),
+         .action = action.name,
+         .is_guarded = profile.is_guarded_start(action.name)});
   }
   for (const Parameter& parameter : profile.parameters) {
-    const bool runs = profile.run && parameter.name == profile.run->command;
+    const bool runs = profile.commands_motion(parameter);
     add(parameter.table, parameter.address, parameter.encoding.kind,
-        {.hazard = runs ? Hazard::moves : parameter.hazard, .runs_motor = runs});
+        {.hazard = runs ? Hazard::moves : parameter.hazard,
+         .runs_motor = runs,
+         .is_guarded = runs});
   }
 }
 
@@ -79,6 +84,7 @@ std::optional<Danger> Dangers::find(const Parameter& parameter) const {
   for (const Source& source : sources_) {
     if (source.table != parameter.table || source.end <= first || end <= source.first) continue;
     danger.runs_motor |= source.danger.runs_motor;
+    danger.is_guarded |= source.danger.is_guarded;
     const bool names_action = danger.action.empty() && source.danger.hazard == danger.hazard;
     if (!names_action && !is_graver(source.danger.hazard, danger.hazard)) continue;
     danger.hazard = source.danger.hazard;

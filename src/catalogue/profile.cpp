@@ -257,6 +257,14 @@ Result<Action> Profile::find_action(std::string_view name) const {
       unknown(name, fmt::format("no such action in profile {}", id), std::move(hint)));
 }
 
+bool Profile::is_guarded_start(std::string_view action) const {
+  if (!run) return false;
+  if (const StartActionFacts* facts = run->action()) return facts->start == action;
+  const auto found = std::find_if(actions.begin(), actions.end(),
+                                  [action](const Action& each) { return each.name == action; });
+  return found != actions.end() && found->motion == Motion::start;
+}
+
 bool Profile::writable(RegisterAddress address) const {
   const std::uint16_t wanted = address.value;
   const bool by_number = numbered && numbered->table == RegisterTable::holding &&

@@ -65,9 +65,29 @@ std::uint16_t CommandBits::any_of(std::uint16_t standard) const {
   return mask;
 }
 
-std::uint16_t RunFacts::selecting(std::uint16_t number) const {
+std::uint16_t CommandWordFacts::selecting(std::uint16_t number) const {
   const unsigned shifted = unsigned{number} << static_cast<unsigned>(std::countr_zero(select));
   return static_cast<std::uint16_t>(shifted & select);
+}
+
+std::string_view to_text(RunKind kind) {
+  switch (kind) {
+    case RunKind::start_action:
+      return "start-action";
+    case RunKind::command_word:
+      return "command-word";
+    case RunKind::command_register:
+      return "command-register";
+  }
+  return "";
+}
+
+bool RunFacts::is_command(std::string_view parameter) const {
+  if (const auto* by_word = word()) return parameter == by_word->command;
+  const auto* by_register = command_register();
+  if (by_register == nullptr || parameter.empty()) return false;
+  return parameter == by_register->command || parameter == by_register->enable.parameter ||
+         parameter == by_register->stop_register;
 }
 
 std::string numbered_name(const std::string& pattern, std::uint16_t number) {

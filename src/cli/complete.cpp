@@ -11,6 +11,7 @@
 
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
+#include "spindle/commands/commands.hpp"
 #include "spindle/link/endpoint.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/sim/outage.hpp"
@@ -191,9 +192,27 @@ class Completer {
   void offer_options() {
     for (const auto* options : option_lists()) {
       for (const OptionDescription& option : *options) {
-        if (!option.is_argument()) add(option.names.back(), option.meaning);
+        if (option.is_argument() || !is_declared(option)) continue;
+        add(option.names.back(), option.meaning);
       }
     }
+  }
+
+  /// Whether the profile of the tool that was typed has such an option; yes where it is not known.
+  [[nodiscard]] bool is_declared(const OptionDescription& option) const {
+    if (option.declared_by.empty()) return true;
+    const bool simulates = typed_.command->name == "simulate";
+    const auto profile = simulates ? profile_argument() : profile_of_target();
+    if (!profile) return true;
+    const auto declared =
+        simulates ? commands::simulate_options(*profile) : commands::start_options(*profile);
+    return std::find(declared.begin(), declared.end(), option.names.back()) != declared.end();
+  }
+
+  [[nodiscard]] std::optional<Profile> profile_argument() const {
+    if (typed_.arguments.empty()) return std::nullopt;
+    auto profile = nameable_->profiles.load(typed_.arguments.front());
+    return profile ? std::optional(std::move(*profile)) : std::nullopt;
   }
 
   void offer_commands(const std::vector<CommandDescription>& commands) {

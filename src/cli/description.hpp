@@ -11,6 +11,8 @@ struct OptionDescription {
   std::vector<std::string> names = {};  ///< "-o", "--output"; an argument: "TARGET"
   std::string placeholder = {};         ///< what its value stands for; a flag: empty
   std::string meaning = {};
+  /// Which profiles declare it, such as "run model command-word"; empty: it is always there.
+  std::string declared_by = {};
 
   [[nodiscard]] bool is_argument() const { return !names.front().starts_with('-'); }
   [[nodiscard]] bool is_flag() const { return placeholder.empty() && !is_argument(); }

@@ -135,9 +135,18 @@ CLI::Option* option(CLI::App* app, const std::string& names, std::string& into,
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
 }
 
-void flag(CLI::App* app, const std::string& names, bool& into, const std::string& meaning) {
-  app->add_flag(names, into, meaning)->disable_flag_override();
+CLI::Option* flag(CLI::App* app, const std::string& names, bool& into, const std::string& meaning) {
+  return app->add_flag(names, into, meaning)->disable_flag_override();
 }
+
+/// Of options that only some profiles declare: CLI11's groups say which.
+constexpr std::string_view declared_prefix = "of ";
+constexpr const char* of_start_action = "of the run model start-action";
+constexpr const char* of_command_word = "of the run model command-word";
+constexpr const char* of_motors = "of the run models command-word and command-register";
+constexpr const char* of_identity = "of profiles with an identity";
+constexpr const char* of_screwdrivers = "of profiles that count their results";
+constexpr const char* of_alarms = "of profiles whose run names alarms and warnings";
 
 void add_common_options(CLI::App& app, Typed& typed) {
   option(&app, "-o,--output", typed.output, "FORMAT", "table, json (JSON Lines) or csv");
@@ -706,7 +715,7 @@ constexpr std::string_view accept_unverified_words =
 
 void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {
-      "remote-start", "TARGET [--preset N] [--direction D] [--speed RPM] [--for DURATION]",
+      "remote-start", "TARGET [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
       "spindle remote-start station3 --preset 2\n"
       "spindle remote-start station3 --for 2s --yes --json\n"
@@ -715,18 +724,28 @@ void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
   add_command(app, draft, words, typed.remote_start, run_remote_start, [&typed](CLI::App* command) {
     auto& options = typed.remote_start.options;
     command->add_option("TARGET", options.target, "tool name or URL");
-    option(command, "--preset", options.preset, "N", "select this preset first");
-    option(command, "--direction", options.direction, "D", "select this direction first");
     option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
-    option(command, "--speed", options.speed, "RPM", "speed of a motor (BLV)");
-    flag(command, "--reverse", typed.remote_start.reverse, "turn a motor the other way round");
+    option(command, "--preset", options.preset, "N", "select this preset first")
+        ->group(of_start_action);
+    option(command, "--direction", options.direction, "D", "select this direction first")
+        ->group(of_start_action);
+    option(command, "--speed", options.speed, "SPEED",
+           "how fast, in the unit of the profile: 500 (r/min), 25.5 (Hz)")
+        ->group(of_motors);
+    flag(command, "--reverse", typed.remote_start.reverse, "turn the motor the other way round")
+        ->group(of_motors);
+    option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant")
+        ->group(of_motors);
     option(command, "--operation", typed.remote_start.operation, "N",
-           "operation data to set and run (default: 2 on BLV)");
-    option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed");
-    option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still");
+           "operation data to set and run (default: those of the profile)")
+        ->group(of_command_word);
+    option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed")
+        ->group(of_command_word);
+    option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still")
+        ->group(of_command_word);
     option(command, "--watchdog", typed.remote_start.watchdog, "DURATION",
-           "let the driver itself stop when it hears nothing for so long");
-    option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant");
+           "let the driver itself stop when it hears nothing for so long")
+        ->group(of_command_word);
     command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
                       std::string(accept_unverified_words));
   });
@@ -901,28 +920,37 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     option(command, "--busy", typed.simulate.busy, "DURATION",
-           "motor drivers: how long Configuration takes (default 200ms, at most 1s)");
+           "how long Configuration takes (default 200ms, at most 1s)")
+        ->group(of_command_word);
     const auto repeatable = [command](const char* name, std::vector<std::string>& into,
                                       const char* meaning) {
       command->add_option(name, into, meaning)
           ->type_name("CODE")
           ->expected(1)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+          ->group(of_alarms);
     };
     repeatable("--alarm", options.alarms,
                "an alarm that the tool raises, such as 30h, or 30h@5s after a time; repeatable");
-    repeatable("--warning", options.warnings, "motor drivers: a warning in the same form");
+    repeatable("--warning", options.warnings, "a warning in the same form");
     option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
-           "length of the identity: 12, 13 or 17");
-    option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report");
-    option(command, "--serial", typed.simulate.serial, "N", "serial number to report");
-    option(command, "--model", typed.simulate.model, "N", "tool model code to report");
+           "length of the identity: 12, 13 or 17")
+        ->group(of_identity);
+    option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report")
+        ->group(of_identity);
+    option(command, "--serial", typed.simulate.serial, "N", "serial number to report")
+        ->group(of_identity);
+    option(command, "--model", typed.simulate.model, "N", "tool model code to report")
+        ->group(of_identity);
     option(command, "--rundown-every", typed.simulate.rundown_every, "DURATION",
-           "an operator who drives a screw at this interval (default: nobody)");
+           "an operator who drives a screw at this interval (default: nobody)")
+        ->group(of_screwdrivers);
     option(command, "--ng-every", typed.simulate.ng_every, "N",
-           "every so many of the operator's screws end NG");
+           "every so many of the operator's screws end NG")
+        ->group(of_screwdrivers);
     option(command, "--burst", typed.simulate.burst, "N",
-           "results that each of the operator's screws brings, all at once (default 1)");
+           "results that each of the operator's screws brings, all at once (default 1)")
+        ->group(of_screwdrivers);
     command
         ->add_option("--outage", options.outages,
                      "let the tool be away at times, repeatable; see below")
@@ -1119,6 +1147,8 @@ Result<void> understand_common(const Typed& typed, Invocation& invocation) {
 
 OptionDescription description_of(const CLI::Option& known) {
   OptionDescription option{.meaning = known.get_description()};
+  const std::string& group = known.get_group();
+  if (group.starts_with(declared_prefix)) option.declared_by = group;
   for (const std::string& name : known.get_snames()) option.names.push_back("-" + name);
   for (const std::string& name : known.get_lnames()) option.names.push_back("--" + name);
   if (option.names.empty()) {

@@ -2,13 +2,26 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace spindle::cli {
 namespace {
 
+/// Those that only some profiles declare stand behind the others, in the order of their first one.
 std::string option_lines(const std::vector<OptionDescription>& options) {
   std::string text;
+  std::vector<std::string> groups = {""};
   for (const OptionDescription& option : options) {
-    text += fmt::format("  {:<32}{}\n", names_of(option), option.meaning);
+    if (std::find(groups.begin(), groups.end(), option.declared_by) == groups.end()) {
+      groups.push_back(option.declared_by);
+    }
+  }
+  for (const std::string& group : groups) {
+    if (!group.empty()) text += fmt::format("\nOptions {}:\n", group);
+    for (const OptionDescription& option : options) {
+      if (option.declared_by != group) continue;
+      text += fmt::format("  {:<32}{}\n", names_of(option), option.meaning);
+    }
   }
   return text;
 }

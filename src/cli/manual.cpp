@@ -66,7 +66,9 @@ std::string term_of(const OptionDescription& option) {
 std::string option_list(const std::vector<OptionDescription>& options) {
   std::string items;
   for (const OptionDescription& option : options) {
-    items += term_of(option) + mdoc_prose(option.meaning);
+    const std::string declared =
+        option.declared_by.empty() ? "" : fmt::format(" ({})", option.declared_by);
+    items += term_of(option) + mdoc_prose(option.meaning + declared);
   }
   return list(items);
 }

@@ -104,6 +104,21 @@ device::RunGuard::Reopen GuardedRun::reopener() {
   };
 }
 
+std::pair<Result<void>, device::StopReport> GuardedRun::run(
+    device::GuardedMotion motion, const std::function<void()>& begin,
+    const std::function<Result<void>()>& follow) {
+  if (context_->calm.stay_awake) context_->calm.stay_awake();
+  out_.emplace(context_->io, context_->interrupt);
+  device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
+  const LastWords last_words(*context_, words_of_death());
+  begin();
+  auto followed = guard.start().and_then(follow);
+  const device::StopReport stop = guard.stop();
+  tell_guardian();
+  progress_.clear();  // not before the stop: a terminal may keep its writer waiting
+  return std::pair(std::move(followed), stop);
+}
+
 Result<void> GuardedRun::check_reader() const {
   const bool closed = context_->io.out_is_open && !context_->io.out_is_open();
   if (!closed) return {};

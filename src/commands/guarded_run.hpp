@@ -20,8 +20,9 @@ namespace spindle::commands {
 
 /// How a run ended, in words.
 struct RunEnd {
-  std::string result;   ///< for records, such as "fastening-ok" or "ran"; empty: none
-  std::string subject;  ///< begins the sentence on whether it stands still: "OK; the tool"
+  std::string result;       ///< for records, such as "fastening-ok" or "ran"; empty: none
+  std::string subject;      ///< begins the sentence on whether it stands still: "OK; the tool"
+  std::string logged = {};  ///< the result, as the change log says it; empty: none
 };
 
 /// Something that a run set and that was not set back.
@@ -60,20 +61,10 @@ class GuardedRun {
                             catalogue::StopMode mode = catalogue::StopMode::decelerate);
 
   /// Starts, follows and stops, whatever happens meanwhile: the pair of what `follow` says and how
-  /// the stop went. `limit` is asked before the start is sent; `follow` gets what it says.
-  template <typename Limit, typename Follow>
-  auto run(device::GuardedMotion motion, Limit limit, Follow follow) {
-    if (context_->calm.stay_awake) context_->calm.stay_awake();
-    out_.emplace(context_->io, context_->interrupt);
-    device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
-    const LastWords last_words(*context_, words_of_death());
-    const auto limits = limit();
-    auto followed = guard.start().and_then([&] { return follow(limits); });
-    const device::StopReport stop = guard.stop();
-    tell_guardian();
-    progress_.clear();  // not before the stop: a terminal may keep its writer waiting
-    return std::pair(std::move(followed), stop);
-  }
+  /// the stop went. `begin` is called before the start is sent.
+  std::pair<Result<void>, device::StopReport> run(device::GuardedMotion motion,
+                                                  const std::function<void()>& begin,
+                                                  const std::function<Result<void>()>& follow);
 
   /// Error `closed_pipe` when nobody reads the output any more.
   Result<void> check_reader() const;

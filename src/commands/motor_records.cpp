@@ -14,6 +14,10 @@ std::string meaning_of(std::int64_t code, const catalogue::CodeTexts& texts) {
   return code == 0 || known == texts.end() ? std::string() : known->second.text;
 }
 
+report::Cell number_or_null(const std::optional<Decimal>& number) {
+  return number ? report::Cell(*number) : report::Cell();
+}
+
 /// What people read beside the kind.
 std::string words_of(const device::MotorNews& news, const catalogue::CodeTables& tables) {
   switch (news.event) {
@@ -60,9 +64,9 @@ report::Record motor_record(const device::MotorNews& news, const Target& target,
   report::Record record{.type = "event", .target = target.shown, .time = news.time, .fields = {}};
   record.fields = {{"kind", std::string(kind_of(news.event))},
                    {"source", std::string("poll")},
-                   {"speed", number(state.feedback_speed)},
-                   {"command_speed", number(state.command_speed)},
-                   {"load", number(state.load)},
+                   {"speed", number_or_null(state.feedback_speed)},
+                   {"command_speed", number_or_null(state.command_speed)},
+                   {"load", number_or_null(state.load)},
                    {"alarm", number(state.alarm)},
                    {"alarm_text", text_or_null(meaning_of(state.alarm, tables.error))},
                    {"warning", number(state.warning)},

@@ -1,96 +1,122 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "change_log.hpp"
 #include "guarded_run.hpp"
-#include "motor_plan.hpp"
+#include "spindle/commands/commands.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/device/rollback.hpp"
+#include "spindle/device/run_model.hpp"
+#include "spindle/work/change.hpp"
 #include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
-/// What a driver is set to before its motor runs, and what of it is set back afterwards.
+/// A parameter and what it is to be.
+using Setting = std::pair<catalogue::Parameter, catalogue::Value>;
+
+/// What every run of a motor decides before its driver is touched.
+struct MotorPlan {
+  RemoteStartOptions options;
+  std::vector<Setting> settings = {};           ///< the speed first, where it has one
+  std::optional<Decimal> speed = std::nullopt;  ///< empty: the driver's own
+  std::string speed_unit = {};                  ///< as people read it: "r/min"
+
+  /// "500 r/min"; empty where the driver decides.
+  [[nodiscard]] std::string speed_in_words() const;
+};
+
+/// What is typed behind an option for a parameter, with or without its unit. Errors name the
+/// option.
+Result<Setting> parse_setting(std::string_view option, const catalogue::Parameter& parameter,
+                              std::string_view text);
+
+/// Adds the speed that was typed, and remembers it.
+Result<void> add_speed(const catalogue::Parameter& parameter, MotorPlan& plan);
+
+/// "operation.2.speed=500 r/min, communication.timeout=1000 ms".
+std::string settings_in_words(const std::vector<Setting>& settings);
+
+/// What a driver is set to before its motor runs, how it is started, and what is set back
+/// afterwards: one class for each run model.
 class MotorSetup {
  public:
-  /// All must outlive it.
-  MotorSetup(const MotorPlan& plan, OpenTool& tool, Context& context, work::ChangeLog& log)
-      : plan_(&plan),
+  /// All must outlive it. `monitor` may be null.
+  MotorSetup(const device::MotorMonitor* monitor, OpenTool& tool, Context& context,
+             work::ChangeLog& log)
+      : monitor_(monitor),
         tool_(&tool),
         context_(&context),
         changer_(tool.device, log),
         calm_line_(tool, context) {}
+  MotorSetup(const MotorSetup&) = delete;
+  MotorSetup& operator=(const MotorSetup&) = delete;
+  virtual ~MotorSetup() = default;
 
   /// Reads what the run depends on, and checks that the motor may be started. Only reads.
-  Result<void> look();
+  virtual Result<void> look() = 0;
+  /// What other drivers on the line have to do with the run, as a sentence; may be empty. Only
+  /// reads.
+  virtual Result<std::string> group_in_words() { return std::string(); }
+  /// Looks, and then writes the settings. The motor does not turn.
+  virtual Result<void> prepare() = 0;
 
-  /// What a group of drivers means for the run, as far as this driver and those of the tools file
-  /// on its line tell it; empty where it belongs to none. Only reads.
-  Result<std::string> group_in_words();
+  // ---- these require that prepare() succeeded ----
 
-  /// Looks, and then writes the operation data and the watchdog: by function 06, which the
-  /// drivers of a group do not hear. The motor does not turn.
-  Result<void> prepare();
+  /// The number that starts the run.
+  [[nodiscard]] virtual std::uint32_t start_number() const = 0;
+  virtual Result<void> start(device::Device& device) const = 0;
+  /// Knows how the motor was started.
+  [[nodiscard]] virtual std::unique_ptr<device::Stopper> stopper(
+      catalogue::StopMode mode) const = 0;
+  /// How long the motor may take to stand still.
+  [[nodiscard]] virtual Duration stopping() const = 0;
+  /// How often it has to be asked at least.
+  [[nodiscard]] virtual Duration interval(Duration usual) const { return usual; }
+
+  /// What to look at where a motor did not start, or ran too fast.
+  [[nodiscard]] virtual std::string hint_not_started() const = 0;
+  [[nodiscard]] virtual std::string hint_too_fast() const { return {}; }
 
   /// Of a motor that stands still, also after prepare() failed: sets back what was written. Not
   /// ended by an interrupt, and reopens a lost link. Returns what could not be set back.
   std::vector<Left> put_back();
-
   /// What was written and not set back, of a motor that may still run.
   [[nodiscard]] std::vector<Left> left() const;
 
-  /// By which the words of the run are chosen.
-  [[nodiscard]] std::int64_t input_mode() const { return found_.mode; }
-  /// What the bits of the command word do on this driver.
-  [[nodiscard]] const catalogue::CommandBits& bits() const { return found_.bits; }
-  /// The word of the profile that starts the run.
-  [[nodiscard]] std::uint16_t standard_word() const;
-  /// The same word for this driver. Requires that prepare() succeeded.
-  [[nodiscard]] std::uint16_t start_word() const {
-    return found_.bits.word(standard_word()).value_or(plan_->motor.idle_word());
-  }
-  /// How long the motor takes to decelerate, as it is set now.
-  [[nodiscard]] Duration stopping() const { return found_.stopping; }
-  /// The one that is in force during the run; empty or 0 where there is none.
-  [[nodiscard]] const std::optional<catalogue::Value>& watchdog() const {
-    return plan_->watchdog ? plan_->watchdog : found_.watchdog;
-  }
+ protected:
+  [[nodiscard]] OpenTool& tool() const { return *tool_; }
+  [[nodiscard]] Context& context() const { return *context_; }
+  [[nodiscard]] work::Changer& changer() { return changer_; }
+  /// Error `negative` where an alarm is present, or the motor runs or its driver works.
+  Result<void> check_at_rest();
+  /// Reads what a parameter is, and writes it where it is something else.
+  Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);
+  /// Settings are written in this way where a driver needs another one.
+  [[nodiscard]] virtual catalogue::Parameter written_as(const catalogue::Parameter& parameter,
+                                                        const catalogue::Value& before,
+                                                        const catalogue::Value& value) const;
+  /// Before settings are set back.
+  virtual void begin_put_back() {}
+  /// What else is not as it was found.
+  virtual void add_left(std::vector<Left>& left) const { static_cast<void>(left); }
+  /// What a setting does that is not set back; may be empty.
+  [[nodiscard]] virtual std::string left_note(const catalogue::Parameter& parameter) const;
 
  private:
-  /// Before anything is changed.
-  struct Found {
-    std::int64_t mode = 0;
-    std::uint16_t word = 0;
-    catalogue::CommandBits bits = {};
-    std::int64_t analog = 0;
-    std::optional<catalogue::Value> watchdog;
-    Duration stopping = {};
-  };
-
-  [[nodiscard]] const catalogue::RunFacts& facts() const { return plan_->motor.facts(); }
-  Result<void> read_settings();
-  Result<void> check_ready();
-  Result<void> check_inputs() const;
-  Result<void> check_analog() const;
-  Result<void> clear_word();
-  Result<void> write_one(const catalogue::Parameter& parameter, const catalogue::Value& value);
-  Result<void> write_settings();
-  Result<void> set_watchdog();
-  [[nodiscard]] std::vector<Target> neighbours() const;
   [[nodiscard]] Left left_of(const device::TriedWrite& write, std::string trouble) const;
-  void add_cleared_word(std::vector<Left>& left) const;
 
-  const MotorPlan* plan_;
+  const device::MotorMonitor* monitor_;
   OpenTool* tool_;
   Context* context_;
   work::Changer changer_;
   UninterruptibleLine calm_line_;
-  Found found_ = {};
-  bool cleared_word_ = false;  ///< it had a run bit, which stays cleared
 };
 
 }  // namespace spindle::commands

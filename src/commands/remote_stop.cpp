@@ -9,8 +9,7 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/device/motor.hpp"
-#include "spindle/device/run_guard.hpp"
+#include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/shared_lines.hpp"
 #include "spindle/work/side_by_side.hpp"
@@ -33,16 +32,16 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
   for (const std::size_t index : line) {
     const auto profile = load_profile(targets[index], context);
     if (!profile) continue;  // told when its turn comes, as all that fails here
-    const auto motor = device::Motor::of(*profile);
-    if (!motor) continue;
+    const auto model = device::RunModel::of(*profile);
+    if (!model) continue;
     Context hurried = context;
     hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / haste;
     hurried.common.retries = 0;
     auto device = connect_device(targets[index], *profile, hurried);
     if (!device) continue;
-    device::MotorStopper stopper(*motor, options.stop.value_or(StopMode::decelerate));
-    if (options.stop == StopMode::decelerate) stopper.observe(*device);
-    static_cast<void>(stopper.send(*device));
+    const auto stopper = (*model)->stopper(options.stop.value_or(StopMode::decelerate));
+    if (options.stop == StopMode::decelerate) stopper->observe(*device);
+    static_cast<void>(stopper->send(*device));
   }
 }
 

@@ -8,6 +8,7 @@
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/simulated_tool.hpp"
 
@@ -42,14 +43,14 @@ Error useless(std::string_view option, const catalogue::Profile& profile, std::s
 
 constexpr std::string_view no_identity = "its simulation has no identity";
 constexpr std::string_view no_events = "it has no operator who drives screws";
+constexpr std::string_view no_warnings = "its 'run' names no warning";
 constexpr std::string_view no_motor = "it has no motor that a command word runs";
 
 /// The first option that does nothing for this profile.
 std::optional<Error> useless_option(const SimulateOptions& options,
                                     const catalogue::Profile& profile) {
   const sim::BmOptions& bm = options.tool.bm;
-  const bool motor = profile.run.has_value();
-  const bool identity = profile.identity && !motor;
+  const sim::Abilities able = sim::abilities_of(profile);
   struct Row {
     std::string_view option;
     bool given;
@@ -57,13 +58,14 @@ std::optional<Error> useless_option(const SimulateOptions& options,
     std::string_view why;
   };
   const Row rows[] = {
-      {"--identity-bytes", bm.identity_bytes.has_value(), identity, no_identity},
-      {"--firmware", bm.firmware.has_value(), identity, no_identity},
-      {"--serial", bm.serial.has_value(), identity, no_identity},
-      {"--model", bm.tool_model.has_value(), identity, no_identity},
-      {"--rundown-every", bm.rundown_every.has_value(), !motor, no_events},
-      {"--busy", options.tool.busy.has_value(), motor, no_motor},
-      {"--warning", !options.tool.warnings.empty(), motor, no_motor},
+      {"--identity-bytes", bm.identity_bytes.has_value(), able.identity, no_identity},
+      {"--firmware", bm.firmware.has_value(), able.identity, no_identity},
+      {"--serial", bm.serial.has_value(), able.identity, no_identity},
+      {"--model", bm.tool_model.has_value(), able.identity, no_identity},
+      {"--rundown-every", bm.rundown_every.has_value(), able.operated, no_events},
+      {"--busy", options.tool.busy.has_value(), able.configuration, no_motor},
+      {"--warning", !options.tool.warnings.empty(), able.warnings, no_warnings},
+      {"--alarm", !options.tool.alarms.empty(), able.alarms, "its 'run' names no alarm"},
       {"--no-gap", options.gaps == sim::LineModel::Gaps::ignored,
        profile.link.framing == modbus::Framing::tcp || !profile.link.serial.gaps.empty(),
        "it asks for no gaps"},
@@ -83,9 +85,9 @@ std::string_view why_not_felt(sim::FaultKind kind, const catalogue::Profile& pro
     case sim::FaultNeed::serial_line:
       return serial ? "" : "it speaks Modbus TCP";
     case sim::FaultNeed::events:
-      return profile.events && !profile.run ? "" : "it sends nothing unasked";
+      return sim::abilities_of(profile).operated ? "" : "it sends nothing unasked";
     case sim::FaultNeed::screwdriver:
-      return profile.run ? "a simulated motor driver stores what is written" : "";
+      return sim::abilities_of(profile).operated ? "" : "it stores what is written";
     case sim::FaultNeed::nothing:
       break;
   }
@@ -240,6 +242,20 @@ Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& 
 }
 
 }  // namespace
+
+std::vector<std::string> simulate_options(const catalogue::Profile& profile) {
+  const sim::Abilities able = sim::abilities_of(profile);
+  std::vector<std::string> options;
+  const auto add = [&](bool is_able, std::initializer_list<const char*> names) {
+    if (is_able) options.insert(options.end(), names.begin(), names.end());
+  };
+  add(able.identity, {"--identity-bytes", "--firmware", "--serial", "--model"});
+  add(able.operated, {"--rundown-every", "--ng-every", "--burst"});
+  add(able.configuration, {"--busy"});
+  add(able.alarms, {"--alarm"});
+  add(able.warnings, {"--warning"});
+  return options;
+}
 
 Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   auto faults = parse_each("--fault", options.faults, sim::parse_fault);

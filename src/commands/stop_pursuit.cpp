@@ -133,16 +133,10 @@ Result<void> StopPursuit::adopt(std::unique_ptr<const Profile> profile) {
 }
 
 Result<void> StopPursuit::prepare_stop() {
-  if (!profile_->run) {
-    auto start = find_start(*profile_);
-    if (!start) return tl::unexpected(target_.blamed(std::move(start.error())));
-    start_ = std::move(*start);
-    return {};
-  }
-  auto motor = device::Motor::of(*profile_);
-  if (!motor) return tl::unexpected(target_.blamed(std::move(motor.error())));
-  motor_ = std::move(*motor);
-  stopper_.emplace(*motor_, mode_);
+  auto model = device::RunModel::of(*profile_);
+  if (!model) return tl::unexpected(target_.blamed(std::move(model.error())));
+  model_ = std::move(*model);
+  stopper_ = model_->stopper(mode_);
   return {};
 }
 
@@ -154,9 +148,8 @@ Result<StopResult> StopPursuit::stop(device::Device& device, Clock& clock) {
 }
 
 Result<StopResult> StopPursuit::send_stop(device::Device& device, Clock& clock) {
-  if (start_) return device::stop_and_confirm(device, *start_, clock);
   if (target_.reach == Reach::everybody) {
-    return broadcast_stop(device, *motor_, mode_).map([] { return StopResult::sent; });
+    return broadcast_stop(device, *model_, mode_).map([] { return StopResult::sent; });
   }
   if (!std::exchange(was_observed_, true)) stopper_->observe(device);
   return stopper_->stop(device, clock);

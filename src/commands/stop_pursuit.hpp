@@ -4,8 +4,7 @@
 #include <optional>
 
 #include "spindle/commands/context.hpp"
-#include "spindle/device/motor.hpp"
-#include "spindle/device/run_guard.hpp"
+#include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
 
 namespace spindle::commands {
@@ -55,9 +54,8 @@ class StopPursuit {
   Context context_;                         ///< lines that are opened on it refer to it
   std::unique_ptr<const catalogue::Profile> own_profile_ = nullptr;
   const catalogue::Profile* profile_ = nullptr;  ///< null: not known yet
-  std::optional<device::Motor> motor_ = std::nullopt;
-  std::optional<device::MotorStopper> stopper_ = std::nullopt;
-  std::optional<catalogue::Action> start_ = std::nullopt;
+  std::unique_ptr<const device::RunModel> model_ = nullptr;
+  std::unique_ptr<device::Stopper> stopper_ = nullptr;
   bool was_observed_ = false;
   bool generation_is_checked_ = false;
   unsigned questions_ = 0;

@@ -21,15 +21,6 @@ std::string_view to_text(device::StopResult result) {
 
 }  // namespace
 
-Result<catalogue::Action> find_start(const catalogue::Profile& profile) {
-  auto start = profile.find_action("start");
-  if (start && start->value && start->stop_value) return start;
-  return tl::unexpected(Error{.code = Errc::usage,
-                              .message = "this product can not be started and stopped by Modbus",
-                              .hint = "start and stop it at the tool",
-                              .name = profile.id});
-}
-
 report::Record stop_record(device::StopResult result, const Target& target, const Clock& clock) {
   return {.type = "action",
           .target = target.shown,
@@ -47,8 +38,8 @@ std::span<const report::Column> stop_columns() {
 
 std::string where_to_stop(const catalogue::Profile* profile) {
   const std::string here = "stop it at the tool";
-  const bool has_more = profile != nullptr && profile->run && !profile->run->still_runs.empty();
-  return has_more ? here + "; " + profile->run->still_runs : here;
+  const std::string more = profile == nullptr ? "" : device::still_runs_words(*profile);
+  return more.empty() ? here : here + "; " + more;
 }
 
 Error still_runs(const Target& target, const catalogue::Profile* profile) {

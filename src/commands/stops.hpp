@@ -4,17 +4,11 @@
 #include <string>
 
 #include "spindle/commands/context.hpp"
-#include "spindle/device/motor.hpp"
-#include "spindle/device/run_guard.hpp"
 #include "spindle/report/renderer.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/stop.hpp"
 
 namespace spindle::commands {
-
-/// The catalogue's action that starts a motion and can end it again. Error `usage` where a
-/// product has none.
-Result<catalogue::Action> find_start(const catalogue::Profile& profile);
 
 /// The `action` record of a stop.
 report::Record stop_record(device::StopResult result, const Target& target, const Clock& clock);

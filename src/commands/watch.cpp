@@ -15,6 +15,7 @@
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
+#include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/shared_lines.hpp"
 #include "watched_tool.hpp"
@@ -277,11 +278,8 @@ Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::
   device::WatchPlan plan{.events = options.events, .samples = options.samples};
   plan.interval = options.interval.value_or(plan.interval);
   if (!profile.events) plan.events = device::EventMode::none;
-  if (profile.run) {
-    auto motor = device::Motor::of(profile);
-    if (!motor) return tl::unexpected(std::move(motor.error()));
-    plan.motor = std::move(*motor);
-  }
+  const auto model = device::RunModel::of(profile);
+  if (model && (*model)->monitor() != nullptr) plan.motor = *(*model)->monitor();
   const std::vector<std::string>& names = options.names.empty() ? profile.watched : options.names;
   if (!names.empty()) {
     auto values = profile.select(names);
@@ -336,7 +334,8 @@ std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools,
   const bool one = tools.size() == 1 && !names_group(options.targets.front());
   const Tools shown = one ? Tools::one : Tools::several;
   const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
-    return tool.known() != nullptr && tool.known()->profile.run && !tool.known()->profile.events;
+    return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&
+           !tool.known()->profile.events;
   });
   return motors ? motor_columns(shown) : news_columns(shown);
 }

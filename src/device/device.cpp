@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "device/hints.hpp"
-#include "spindle/device/motor.hpp"
+#include "spindle/device/command_word.hpp"
 #include "spindle/link/serial_settings.hpp"
 
 namespace spindle::device {
@@ -697,6 +697,14 @@ Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
       .map_error([&](Error error) { return about(std::move(error), action.name, action.address); });
 }
 
+Result<void> Device::send(const Parameter& parameter, const Decimal& number) {
+  const auto registers = catalogue::encode(parameter, number);
+  if (!registers) return tl::unexpected(registers.error());
+  return write_registers(parameter.address, *registers).map_error([&](Error error) {
+    return about(std::move(error), parameter.name, parameter.address);
+  });
+}
+
 Result<void> Device::write_word(modbus::RegisterAddress address, std::uint16_t word) {
   return client_.write(address, word).map_error([this](Error error) {
     return located(std::move(error));
@@ -781,7 +789,7 @@ Result<ActionResult> Device::confirm(const catalogue::Action& action, const Para
 /// On a driver whose inputs are assigned otherwise other bits do the same; all of them where that
 /// can not be known.
 std::uint16_t Device::bits_to_clear(const catalogue::Preparation& preparation) {
-  const auto motor = Motor::of(*profile_);
+  const auto motor = CommandWord::of(*profile_);
   const bool varies =
       motor && motor->has_inputs() && motor->command_register() == preparation.address;
   if (!varies) return preparation.clear;
@@ -800,15 +808,17 @@ Result<void> Device::prepare(const catalogue::Preparation& preparation) {
 
 /// Until the status says that the tool does no longer work by itself; no limit: it never does.
 Result<Shown> Device::await_ready(Duration limit) {
-  if (limit == Duration::zero() || !profile_->run) return Shown::yes;
-  const auto status = profile_->find(profile_->run->status);
+  if (limit == Duration::zero()) return Shown::yes;
+  const auto model = RunModel::of(*profile_);
+  const MotorMonitor* monitor = model ? (*model)->monitor() : nullptr;
+  if (monitor == nullptr) return Shown::yes;
+  const auto status = profile_->find(monitor->facts().status);
   if (!status) return tl::unexpected(status.error());
   const TimePoint deadline = clock().now() + limit;
   while (true) {
     const auto word = read_value(*status);
     if (!word) return tl::unexpected(word.error());
-    const auto bits = static_cast<std::uint64_t>(word->number.mantissa());
-    if (((bits >> profile_->run->busy) & 1U) == 0) return Shown::yes;
+    if (!monitor->is_busy(word->number)) return Shown::yes;
     const TimePoint next = clock().now() + busy_interval;
     if (next > deadline) return Shown::no;
     if (auto slept = clock().sleep_until(next); !slept) return tl::unexpected(slept.error());

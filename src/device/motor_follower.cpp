@@ -1,7 +1,6 @@
 #include "spindle/device/motor_follower.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <optional>
 #include <utility>
 
@@ -27,7 +26,7 @@ Error not_seen() {
 
 class Follower {
  public:
-  Follower(Device& device, const Motor& motor, MotorStopper& stopper,
+  Follower(Device& device, const MotorMonitor& motor, Stopper& stopper,
            const MotorFollowOptions& options)
       : device_(&device),
         motor_(&motor),
@@ -87,9 +86,16 @@ class Follower {
     stopper_->seen_running();
   }
 
+  [[nodiscard]] bool is_too_fast(const MotorState& state) const {
+    if (!state.command_speed || !options_->fastest) return false;
+    const Decimal& speed = *state.command_speed;
+    const Decimal other_way(-speed.mantissa(), speed.exponent());
+    return std::max(speed, other_way) > *options_->fastest;
+  }
+
   [[nodiscard]] std::optional<MotorEnding> judge(const MotorState& state, Duration elapsed) const {
     if (state.alarm != 0) return MotorEnding::alarm;
-    if (std::abs(state.command_speed) > options_->fastest) return MotorEnding::too_fast;
+    if (is_too_fast(state)) return MotorEnding::too_fast;
     if (state.running) return std::nullopt;
     if (has_run_) return MotorEnding::stopped;
     if (elapsed > start_grace) return MotorEnding::ignored;
@@ -102,8 +108,8 @@ class Follower {
   }
 
   Device* device_;
-  const Motor* motor_;
-  MotorStopper* stopper_;
+  const MotorMonitor* motor_;
+  Stopper* stopper_;
   const MotorFollowOptions* options_;
   Duration answer_timeout_;  ///< the user's or the profile's
   MotorState before_ = {};
@@ -113,9 +119,24 @@ class Follower {
 
 }  // namespace
 
-Result<MotorEnding> follow_motor(Device& device, const Motor& motor, MotorStopper& stopper,
+Result<MotorEnding> follow_motor(Device& device, const MotorMonitor& motor, Stopper& stopper,
                                  const MotorFollowOptions& options) {
   return Follower(device, motor, stopper, options).follow();
+}
+
+Result<MotorEnding> wait_unseen(Device& device, const MotorFollowOptions& options) {
+  Clock& clock = device.session().clock();
+  const TimePoint began = clock.now();
+  while (clock.now() < options.deadline) {
+    if (options.progress) {
+      if (auto told = options.progress(clock.now() - began, {}); !told) {
+        return tl::unexpected(std::move(told.error()));
+      }
+    }
+    const TimePoint next = std::min(options.deadline, clock.now() + options.interval);
+    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+  }
+  return MotorEnding::unseen;
 }
 
 }  // namespace spindle::device

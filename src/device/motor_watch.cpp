@@ -8,10 +8,6 @@ namespace {
 
 using catalogue::Parameter;
 
-bool has_bit(std::int64_t word, unsigned bit) {
-  return ((static_cast<std::uint64_t>(word) >> bit) & 1U) != 0;
-}
-
 std::uint32_t end_of(const Parameter& parameter) {
   return parameter.address.value + catalogue::register_count(parameter.encoding.kind);
 }
@@ -21,17 +17,14 @@ bool joins(const std::vector<Parameter>& piece, const Parameter& parameter) {
 }
 
 /// What says that something happened, as pieces of registers that stand side by side.
-std::vector<std::vector<Parameter>> pieces_of(const Motor& motor,
+std::vector<std::vector<Parameter>> pieces_of(const MotorMonitor& motor,
                                               const std::vector<Parameter>& polled) {
-  const catalogue::RunFacts& facts = motor.facts();
   std::vector<Parameter> telling;
   for (const Parameter& parameter : motor.parameters()) {
-    const bool tells = parameter.name == facts.status || parameter.name == facts.alarm ||
-                       parameter.name == facts.warning;
     const bool read_anyhow = std::any_of(polled.begin(), polled.end(), [&](const Parameter& other) {
       return other.name == parameter.name;
     });
-    if (tells && !read_anyhow) telling.push_back(parameter);
+    if (motor.tells(parameter.name) && !read_anyhow) telling.push_back(parameter);
   }
   std::sort(telling.begin(), telling.end(), [](const Parameter& one, const Parameter& other) {
     return std::pair(one.table, one.address.value) < std::pair(other.table, other.address.value);
@@ -43,7 +36,7 @@ std::vector<std::vector<Parameter>> pieces_of(const Motor& motor,
   }
   const auto first = std::find_if(pieces.begin(), pieces.end(), [&](const auto& piece) {
     return std::any_of(piece.begin(), piece.end(),
-                       [&](const Parameter& each) { return each.name == facts.alarm; });
+                       [&](const Parameter& each) { return each.name == motor.facts().alarm; });
   });
   if (first != pieces.end()) std::iter_swap(pieces.begin(), first);
   return pieces;
@@ -56,7 +49,7 @@ bool says_the_same(const MotorState& one, const MotorState& other) {
 
 }  // namespace
 
-MotorWatch::MotorWatch(Motor motor, const std::vector<Parameter>& polled)
+MotorWatch::MotorWatch(MotorMonitor motor, const std::vector<Parameter>& polled)
     : motor_(std::move(motor)), pieces_(pieces_of(motor_, polled)) {}
 
 /// The first piece three times of four: an alarm is what has to be known soonest.
@@ -65,6 +58,11 @@ const std::vector<Parameter>& MotorWatch::next_piece() {
   const std::size_t turn = turn_++;
   if (pieces_.size() == 1 || turn % round != 1) return pieces_.front();
   return pieces_[1 + turn / round % (pieces_.size() - 1)];
+}
+
+bool MotorWatch::knows_running() const {
+  return std::any_of(seen_.begin(), seen_.end(),
+                     [this](const std::string& name) { return motor_.tells_running(name); });
 }
 
 Result<std::vector<MotorNews>> MotorWatch::take_turn(Device& device) {
@@ -77,23 +75,14 @@ Result<std::vector<MotorNews>> MotorWatch::take_turn(Device& device) {
 /// The state as seen last, with what these readings say. What was never read before is taken for
 /// what it always was.
 Result<MotorState> MotorWatch::with(std::span<const Reading> readings) {
-  const catalogue::RunFacts& facts = motor_.facts();
   MotorState now = state_;
   for (const Reading& reading : readings) {
     const std::string& name = reading.parameter.name;
-    if (name != facts.status && name != facts.alarm && name != facts.warning) continue;
-    if (!reading.value) return tl::unexpected(reading.value.error());
-    const std::int64_t number = reading.value->number.mantissa();
-    const auto note = [&](MotorState& state) {
-      if (name == facts.alarm) state.alarm = number;
-      if (name == facts.warning) state.warning = number;
-      if (name != facts.status) return;
-      state.running = has_bit(number, facts.running);
-      state.at_speed = has_bit(number, facts.at_speed);
-      state.busy = has_bit(number, facts.busy);
-    };
-    note(now);
-    if (seen_.insert(name).second) note(state_);
+    if (!motor_.tells(name)) continue;
+    if (auto noted = motor_.note(reading, now); !noted) {
+      return tl::unexpected(std::move(noted.error()));
+    }
+    if (seen_.insert(name).second) static_cast<void>(motor_.note(reading, state_));
   }
   return now;
 }
@@ -101,19 +90,18 @@ Result<MotorState> MotorWatch::with(std::span<const Reading> readings) {
 /// Everything, read once more where the motor stopped or left its speed before speed and load were
 /// read: values of different moments make no state.
 Result<MotorState> MotorWatch::look(Device& device) const {
-  const catalogue::RunFacts& facts = motor_.facts();
   std::vector<Parameter> status = motor_.parameters();
-  std::erase_if(status, [&](const Parameter& each) { return each.name != facts.status; });
+  std::erase_if(status, [&](const Parameter& each) { return !motor_.tells_running(each.name); });
   auto seen = motor_.look(device);
   if (!seen || !seen->running) return seen;
   const auto behind = device.read_each(status, Limits::skip);
   if (!behind) return tl::unexpected(behind.error());
-  const auto& value = behind->front().value;
-  if (!value) return tl::unexpected(value.error());
-  const std::int64_t word = value->number.mantissa();
-  const bool runs_on = has_bit(word, facts.running);
-  const bool keeps_speed = has_bit(word, facts.at_speed) || !seen->at_speed;
-  return runs_on && keeps_speed ? seen : motor_.look(device);
+  MotorState later = *seen;
+  if (auto noted = motor_.note(behind->front(), later); !noted) {
+    return tl::unexpected(std::move(noted.error()));
+  }
+  const bool keeps_speed = later.at_speed || !seen->at_speed;
+  return later.running && keeps_speed ? seen : motor_.look(device);
 }
 
 /// What happened is told with the speed and load that are read at once. They may say already what
@@ -128,7 +116,7 @@ Result<std::vector<MotorNews>> MotorWatch::take(Device& device, std::span<const 
   auto later = look(device);
   if (!later) return tl::unexpected(std::move(later.error()));  // told when it can be read again
   // What was never read by its turn is not judged by chance.
-  if (!seen_.contains(motor_.facts().status)) {
+  if (!knows_running()) {
     later->running = state_.running;
     later->at_speed = state_.at_speed;
   }

@@ -12,118 +12,12 @@
 namespace spindle::files {
 namespace {
 
-using catalogue::RunFacts;
-using catalogue::RunWords;
-
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 
 constexpr std::array<std::pair<std::string_view, catalogue::CodeTable>, 3> table_of_codes = {
     {{"error-codes", catalogue::CodeTable::error},
      {"warning-codes", catalogue::CodeTable::warning},
      {"refusals", catalogue::CodeTable::refusal}}};
-
-RunWords read_words(const YamlNode& node, Findings& findings) {
-  YamlMap map(node, findings);
-  RunWords words;
-  assign(words.forward, map.number<std::uint16_t>("forward", Need::required));
-  assign(words.reverse, map.number<std::uint16_t>("reverse", Need::required));
-  assign(words.decelerate, map.number<std::uint16_t>("decelerate", Need::required));
-  assign(words.instant, map.number<std::uint16_t>("instant", Need::required));
-  map.finish();
-  return words;
-}
-
-void read_modes(const YamlNode& node, RunFacts& run, Findings& findings) {
-  if (!expect(node, YamlNode::Kind::map, findings)) return;
-  for (const YamlEntry& entry : node.entries) {
-    const auto value = parse_integer(entry.key);
-    if (value) {
-      run.modes.insert_or_assign(*value, read_words(entry.value, findings));
-    } else {
-      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
-    }
-  }
-}
-
-void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
-  expect(node, YamlNode::Kind::sequence, findings);
-  inputs.functions.clear();
-  for (const YamlNode& item : node.items) {
-    YamlMap map(item, findings);
-    catalogue::InputFunction function;
-    assign(function.number, map.number<std::uint16_t>("number", Need::required));
-    function.bit = map.number<std::uint8_t>("bit");
-    assign(function.evidence,
-           map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, Need::required));
-    assign(function.source, map.text("source", Need::required));
-    map.finish();
-    inputs.functions.push_back(std::move(function));
-  }
-}
-
-void read_inputs(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
-  YamlMap map(node, findings);
-  assign(inputs.parameter, map.text("parameter", Need::required));
-  if (const auto bits = map.range("bits", last_register, Need::required)) {
-    inputs.first = static_cast<std::uint16_t>(bits->from);
-    inputs.last = static_cast<std::uint16_t>(bits->to);
-  }
-  if (const YamlNode* functions = map.get("functions", Need::required)) {
-    read_functions(*functions, inputs, findings);
-  }
-  map.finish();
-}
-
-void read_command(const YamlNode& node, RunFacts& run, Need need, Findings& findings) {
-  YamlMap map(node, findings);
-  assign(run.command, map.text("parameter", need));
-  assign(run.mode, map.text("mode", need));
-  if (const YamlNode* modes = map.get("modes", need)) read_modes(*modes, run, findings);
-  assign(run.starting, map.number<std::uint16_t>("starting", need));
-  assign(run.select, map.number<std::uint16_t>("select", need));
-  if (const YamlNode* always = map.get("always", need)) {
-    YamlMap words(*always, findings);
-    assign(run.decelerate_always, words.number<std::uint16_t>("decelerate", Need::required));
-    assign(run.instant_always, words.number<std::uint16_t>("instant", Need::required));
-    words.finish();
-  }
-  if (const YamlNode* inputs = map.get("inputs")) read_inputs(*inputs, run.inputs, findings);
-  map.finish();
-}
-
-void read_status(const YamlNode& node, RunFacts& run, Need need, Findings& findings) {
-  YamlMap map(node, findings);
-  assign(run.status, map.text("parameter", need));
-  assign(run.running, map.number<std::uint8_t>("running", need));
-  assign(run.at_speed, map.number<std::uint8_t>("at-speed", need));
-  assign(run.busy, map.number<std::uint8_t>("busy", need));
-  assign(run.command_speed, map.text("command-speed", need));
-  assign(run.feedback_speed, map.text("feedback-speed", need));
-  assign(run.load, map.text("load"));
-  assign(run.alarm, map.text("alarm", need));
-  assign(run.warning, map.text("warning"));
-  map.finish();
-}
-
-void read_operation(const YamlNode& node, RunFacts& run, Need need, Findings& findings) {
-  YamlMap map(node, findings);
-  assign(run.speed, map.text("speed", need));
-  assign(run.acceleration, map.text("acceleration", need));
-  assign(run.deceleration, map.text("deceleration", need));
-  if (const auto numbers = map.range("numbers", last_register, need)) {
-    run.first = static_cast<std::uint16_t>(numbers->from);
-    run.last = static_cast<std::uint16_t>(numbers->to);
-  }
-  assign(run.preferred, map.number<std::uint16_t>("preferred", need));
-  if (const YamlNode* analog = map.get("analog")) {
-    YamlMap choice(*analog, findings);
-    assign(run.analog, choice.text("parameter", Need::required));
-    assign(run.digital, choice.number<std::uint16_t>("digital", Need::required));
-    assign(run.analog_to, choice.number<std::uint16_t>("up-to", Need::required));
-    choice.finish();
-  }
-  map.finish();
-}
 
 // ---- rules ----
 
@@ -132,7 +26,6 @@ class DriveRules {
   DriveRules(const ProfileDraft& draft, Findings& findings) : draft_(draft), findings_(findings) {}
 
   void check() {
-    if (draft_.profile.run) check_run(*draft_.profile.run);
     if (draft_.profile.refusals) check_refusals(*draft_.profile.refusals);
     check_lists();
     for (std::size_t i = 0; i < draft_.parameters.size(); ++i) {
@@ -156,124 +49,6 @@ class DriveRules {
       findings_.add_once(at, fmt::format("'{}' is no parameter of this profile", name));
     }
     return parameter;
-  }
-
-  void require_optional(const std::string& name, const Position& at) {
-    if (!name.empty()) require(name, at);
-  }
-
-  void check_run(const RunFacts& run) {
-    check_words(run, draft_.run.of("command"));
-    check_operations(run, draft_.run.of("operation"));
-    const Position status = draft_.run.of("status");
-    for (const std::string* name :
-         {&run.status, &run.command_speed, &run.feedback_speed, &run.alarm}) {
-      require(*name, status);
-    }
-    require_optional(run.load, status);
-    require_optional(run.warning, status);
-    constexpr std::uint8_t highest_bit = 15;
-    if (std::max({run.running, run.at_speed, run.busy}) > highest_bit) {
-      findings_.add_once(status, fmt::format("a status bit is 0 to {}", highest_bit));
-    }
-    require_optional(run.watchdog, draft_.run.of("watchdog"));
-    require_optional(run.group, draft_.run.of("group"));
-    if (run.source.empty()) findings_.add_once(draft_.run.of("source"), "run has no source");
-  }
-
-  void check_words(const RunFacts& run, const Position& at) {
-    const catalogue::Parameter* command = require(run.command, at);
-    require(run.mode, at);
-    if (command != nullptr && command->access == catalogue::Access::read_only) {
-      findings_.add_once(at, fmt::format("{} cannot be written", run.command));
-    }
-    if (run.modes.empty()) findings_.add_once(at, "there is no mode in which the motor runs");
-    for (const auto& [mode, words] : run.modes) check_mode(mode, words, run, at);
-    check_inputs(run, at);
-    if (((run.decelerate_always | run.instant_always) & run.starting) != 0) {
-      findings_.add_once(at, "a word that stops in every mode has a bit that starts in one");
-    }
-    const unsigned lowest = run.select & (~unsigned{run.select} + 1U);
-    const unsigned room = lowest == 0 ? 0 : run.select / lowest;
-    if (room < run.last || ((room + 1) & room) != 0) {
-      findings_.add_once(at, fmt::format("the bits {:#x} can not select operation data up to {}",
-                                         run.select, run.last));
-    }
-  }
-
-  /// Every bit of a word has one function by which it is found on a driver.
-  void check_inputs(const RunFacts& run, const Position& at) {
-    const catalogue::InputFacts& inputs = run.inputs;
-    if (inputs.parameter.empty()) return;
-    constexpr std::uint16_t highest_bit = 15;
-    if (inputs.first > inputs.last || inputs.last > highest_bit) {
-      findings_.add_once(at, fmt::format("the bits of inputs are 0 to {}", highest_bit));
-      return;
-    }
-    for (std::uint16_t n = inputs.first; n <= inputs.last; ++n) {
-      require(catalogue::numbered_name(inputs.parameter, n), at);
-    }
-    unsigned used =
-        unsigned{run.select} | run.starting | run.decelerate_always | run.instant_always;
-    for (const auto& [mode, words] : run.modes) {
-      used |= unsigned{words.forward} | words.reverse | words.decelerate | words.instant;
-    }
-    unsigned known = 0;
-    for (const catalogue::InputFunction& function : inputs.functions) {
-      if (inputs.find(function.number) != &function) {
-        findings_.add_once(at, fmt::format("function {} is there twice", function.number));
-      }
-      if (!function.bit) continue;
-      if (*function.bit > highest_bit) {
-        findings_.add_once(
-            at, fmt::format("function {}: a bit is 0 to {}", function.number, highest_bit));
-      } else if ((known >> *function.bit & 1U) != 0) {
-        findings_.add_once(at, fmt::format("bit {} has two functions", *function.bit));
-      } else {
-        known |= 1U << *function.bit;
-      }
-    }
-    for (unsigned bit = 0; bit <= highest_bit; ++bit) {
-      const bool is_missing = ((used & ~known) >> bit & 1U) != 0;
-      if (is_missing) findings_.add_once(at, fmt::format("bit {} has no function in inputs", bit));
-    }
-  }
-
-  void check_mode(std::int64_t mode, const RunWords& words, const RunFacts& run,
-                  const Position& at) {
-    const unsigned all = unsigned{words.forward} | words.reverse | words.decelerate | words.instant;
-    if ((all & run.select) != 0) {
-      findings_.add_once(at, fmt::format("mode {}: a word has a bit that selects", mode));
-    }
-    const bool starts = (words.forward & run.starting) != 0 && (words.reverse & run.starting) != 0;
-    if (!starts || words.forward == words.reverse) {
-      findings_.add_once(at, fmt::format("mode {}: forward and reverse need bits that start, and "
-                                         "differ",
-                                         mode));
-    }
-    const bool stops = words.decelerate != words.forward && words.decelerate != words.reverse &&
-                       words.instant != words.forward && words.instant != words.reverse;
-    if (!stops) findings_.add_once(at, fmt::format("mode {}: a stop equals a start", mode));
-  }
-
-  void check_operations(const RunFacts& run, const Position& at) {
-    if (run.preferred < run.first || run.preferred > run.last) {
-      findings_.add_once(at, "the preferred operation data is none of them");
-    }
-    constexpr int most = 64;
-    if (run.last - run.first >= most) {
-      findings_.add_once(at, fmt::format("more than {} sets of operation data", most));
-      return;
-    }
-    for (std::uint16_t n = run.first; n <= run.last; ++n) {
-      for (const std::string* pattern : {&run.speed, &run.acceleration, &run.deceleration}) {
-        const auto* parameter = require(catalogue::numbered_name(*pattern, n), at);
-        if (parameter != nullptr && parameter->access == catalogue::Access::read_only) {
-          findings_.add_once(at, fmt::format("{} cannot be written", parameter->name));
-        }
-      }
-    }
-    require_optional(run.analog, at);
   }
 
   void check_refusals(const catalogue::RefusalFacts& refusals) {
@@ -368,11 +143,11 @@ class DriveRules {
       findings_.add_once(origin.of("rest"),
                          fmt::format("{}: rest needs a value that differs from it", action.name));
     }
-    if (action.motion != catalogue::Motion::none && draft_.run.entry == nullptr) {
+    if (action.motion != catalogue::Motion::none && !has_command_word()) {
       findings_.add_once(origin.of("motion"),
                          fmt::format("{}: a motion needs the section 'run'", action.name));
     }
-    if (action.busy > Duration::zero() && draft_.run.entry == nullptr) {
+    if (action.busy > Duration::zero() && !has_command_word()) {
       findings_.add_once(origin.of("busy"), fmt::format("{}: without the section 'run' no status "
                                                         "says that it is busy",
                                                         action.name));
@@ -385,27 +160,17 @@ class DriveRules {
     }
   }
 
+  /// The words of a motion, and the status that says "busy", are those of a command word.
+  [[nodiscard]] bool has_command_word() const {
+    if (draft_.run.entry == nullptr) return false;
+    return !draft_.profile.run || draft_.profile.run->word() != nullptr;
+  }
+
   const ProfileDraft& draft_;
   Findings& findings_;
 };
 
 }  // namespace
-
-void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
-  YamlMap map(node, findings);
-  auto [run, need] = section_of(draft.profile.run);
-  assign(run.evidence, map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, need));
-  assign(run.source, map.text("source", need));
-  if (const YamlNode* part = map.get("command", need)) read_command(*part, run, need, findings);
-  if (const YamlNode* part = map.get("status", need)) read_status(*part, run, need, findings);
-  if (const YamlNode* part = map.get("operation", need)) {
-    read_operation(*part, run, need, findings);
-  }
-  assign(run.watchdog, map.text("watchdog"));
-  assign(run.still_runs, map.text("still-runs"));
-  assign(run.group, map.text("group"));
-  map.finish();
-}
 
 void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);

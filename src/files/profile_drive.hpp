@@ -4,9 +4,8 @@
 
 namespace spindle::files {
 
-/// The sections of a product that is run by a command word: how it is run, what it says of refused
-/// requests, its lists of codes, and what is worth watching. Each lays its keys over the draft.
-void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings);
+/// What a product says of refused requests, its lists of codes, and what is worth watching. Each
+/// lays its keys over the draft.
 void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings);
 void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findings);
 void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings);

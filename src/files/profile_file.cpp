@@ -7,6 +7,7 @@
 
 #include "files/profile_drive.hpp"
 #include "files/profile_entries.hpp"
+#include "files/profile_run.hpp"
 #include "files/yaml_map.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/files/profile_store.hpp"

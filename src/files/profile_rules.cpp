@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "files/profile_drive.hpp"
+#include "files/profile_run.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
@@ -557,10 +558,19 @@ bool is_catalogue_name(std::string_view text) {
 
 void check_guards(const ProfileDraft& draft, Findings& findings) {
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
-    if (!catalogue::moves_without_end(action)) return;
+    if (catalogue::moves_without_end(action)) {
+      findings.add_once(
+          origin.of("hazard"),
+          fmt::format("{}: it moves and has no 'stop', so it is never sent", action.name));
+      return;
+    }
+    const bool moves =
+        action.hazard == catalogue::Hazard::moves && action.motion == catalogue::Motion::none;
+    const bool is_unread = draft.run.entry != nullptr && !draft.profile.run;
+    if (!moves || is_unread || draft.profile.is_guarded_start(action.name)) return;
     findings.add_once(
         origin.of("hazard"),
-        fmt::format("{}: it moves and has no 'stop', so it is never sent", action.name));
+        fmt::format("{}: it moves, and no 'run' of this profile guards it", action.name));
   });
   const catalogue::Dangers dangers(draft.profile);
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
@@ -580,6 +590,7 @@ void check_guards(const ProfileDraft& draft, Findings& findings) {
 void check_rules(const ProfileDraft& draft, Findings& findings) {
   for (const Rule rule : rules) rule(draft, findings);
   check_drive_rules(draft, findings);
+  check_run_rules(draft, findings);
 }
 
 }  // namespace spindle::files

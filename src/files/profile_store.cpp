@@ -284,12 +284,7 @@ Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
   catalogue::SimulationFacts facts;
   if (part != nullptr) facts = read_simulation(*part, open->findings);
   if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
-  if (part != nullptr) return facts;
-  return tl::unexpected(
-      Error{.code = Errc::bad_file,
-            .message = "this profile has no start state for a simulated tool",
-            .hint = "add a document '--- part: simulation', or extend a profile that has one",
-            .name = std::string(name_or_file)});
+  return facts;
 }
 
 Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {

@@ -1,9 +1,12 @@
 #include "spindle/sim/blv_driver.hpp"
 
 #include <algorithm>
-#include <deque>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include "blv_unit.hpp"
+#include "profile_unit.hpp"
 
 namespace spindle::sim {
 namespace {
@@ -19,16 +22,16 @@ Duration gap_at(const catalogue::SerialFacts& serial, unsigned baud) {
   return {};
 }
 
+using MakeUnit = std::function<std::unique_ptr<BusUnit>(std::uint8_t address)>;
+
 class SimulatedBus final : public BlvBus {
  public:
-  SimulatedBus(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
-               const BlvOptions& options) {
-    for (const std::uint8_t unit : options.units) {
-      units_.emplace_back(profile, start, unit, options.configuring);
-    }
-    for (const Raised& alarm : options.alarms) trouble_.push_back({alarm, &BlvUnit::raise_alarm});
+  SimulatedBus(const catalogue::Profile& profile, const BlvOptions& options, const MakeUnit& make)
+      : is_network_(profile.link.framing == modbus::Framing::tcp) {
+    for (const std::uint8_t unit : options.units) units_.push_back(make(unit));
+    for (const Raised& alarm : options.alarms) trouble_.push_back({alarm, &BusUnit::raise_alarm});
     for (const Raised& warning : options.warnings) {
-      trouble_.push_back({warning, &BlvUnit::raise_warning});
+      trouble_.push_back({warning, &BusUnit::raise_warning});
     }
     const catalogue::SerialFacts& serial = profile.link.serial;
     const unsigned baud = options.baud == 0 ? serial.baud : options.baud;
@@ -39,31 +42,32 @@ class SimulatedBus final : public BlvBus {
                             TimePoint now) override {
     advance(now);
     std::optional<Pdu> response;
-    for (BlvUnit& one : units_) {
-      one.hear_good_frame();
-      if (unit.value == one.address()) {
-        response = one.answer(request, now);
-      } else if (unit.value == everybody ? is_write(request) : follows(one, unit, request)) {
-        one.answer(request, now);  // and nobody hears what it says to it
+    for (const auto& one : units_) {
+      one->hear_good_frame();
+      if (unit.value == one->address() || is_network_) {
+        response = one->answer(request, now);
+      } else if (unit.value == everybody ? is_write(request) : follows(*one, unit, request)) {
+        one->answer(request, now);  // and nobody hears what it says to it
       }
     }
     return response;
   }
 
   [[nodiscard]] bool answers_to(modbus::UnitId unit) const override {
-    return std::any_of(units_.begin(), units_.end(),
-                       [unit](const BlvUnit& one) { return one.address() == unit.value; });
+    return is_network_ || std::any_of(units_.begin(), units_.end(), [unit](const auto& one) {
+             return one->address() == unit.value;
+           });
   }
   [[nodiscard]] Duration required_gap() const override { return gap_; }
   [[nodiscard]] Duration answer_delay(modbus::UnitId unit) const override {
-    for (const BlvUnit& one : units_) {
-      if (one.address() == unit.value) return one.waiting_time();
+    for (const auto& one : units_) {
+      if (one->address() == unit.value) return one->waiting_time();
     }
     return {};
   }
   void bad_frame(TimePoint now) override {
     advance(now);
-    for (BlvUnit& one : units_) one.hear_bad_frame(now);
+    for (const auto& one : units_) one->hear_bad_frame(now);
   }
 
   void advance(TimePoint now) override {
@@ -71,18 +75,18 @@ class SimulatedBus final : public BlvBus {
     std::erase_if(trouble_, [&](const Trouble& trouble) {
       const TimePoint due = *begin_ + trouble.raised.after;
       if (due > now) return false;
-      for (BlvUnit& one : units_) {
-        one.advance(due);
-        (one.*trouble.raise)(trouble.raised.code, due);
+      for (const auto& one : units_) {
+        one->advance(due);
+        (*one.*trouble.raise)(trouble.raised.code, due);
       }
       return true;
     });
-    for (BlvUnit& one : units_) one.advance(now);
+    for (const auto& one : units_) one->advance(now);
   }
   [[nodiscard]] std::optional<TimePoint> next_change() const override {
     std::optional<TimePoint> next;
-    for (const BlvUnit& one : units_) {
-      const auto due = one.next_change();
+    for (const auto& one : units_) {
+      const auto due = one->next_change();
       if (due && (!next || *due < *next)) next = due;
     }
     for (const Trouble& trouble : trouble_) {
@@ -98,28 +102,28 @@ class SimulatedBus final : public BlvBus {
 
   void raise_alarm(std::uint8_t unit, std::uint8_t code, TimePoint now) override {
     advance(now);
-    if (BlvUnit* one = find(unit)) one->raise_alarm(code, now);
+    if (BusUnit* one = find(unit)) one->raise_alarm(code, now);
   }
   void raise_warning(std::uint8_t unit, std::uint8_t code, TimePoint now) override {
     advance(now);
-    if (BlvUnit* one = find(unit)) one->raise_warning(code, now);
+    if (BusUnit* one = find(unit)) one->raise_warning(code, now);
   }
   void use_setter(std::uint8_t unit, TimePoint until) override {
-    if (BlvUnit* one = find(unit)) one->use_setter(until);
+    if (BusUnit* one = find(unit)) one->use_setter(until);
   }
   void reboot(TimePoint now) override {
     advance(now);
-    for (BlvUnit& one : units_) one.power_cycle(now);
+    for (const auto& one : units_) one->power_cycle(now);
   }
   void power_cycle(std::uint8_t unit, TimePoint now) override {
     advance(now);
-    if (BlvUnit* one = find(unit)) one->power_cycle(now);
+    if (BusUnit* one = find(unit)) one->power_cycle(now);
   }
 
  private:
   struct Trouble {
     Raised raised;
-    void (BlvUnit::*raise)(std::int64_t code, TimePoint now);
+    void (BusUnit::*raise)(std::int64_t code, TimePoint now);
   };
 
   static bool is_write(const Pdu& request) {
@@ -128,18 +132,19 @@ class SimulatedBus final : public BlvBus {
            function == modbus::FunctionCode::write_multiple_registers;
   }
   // A group send reaches children by function 10h only.
-  static bool follows(const BlvUnit& child, modbus::UnitId parent, const Pdu& request) {
+  static bool follows(const BusUnit& child, modbus::UnitId parent, const Pdu& request) {
     return child.group() == parent.value &&
            request.function ==
                static_cast<std::uint8_t>(modbus::FunctionCode::write_multiple_registers);
   }
-  BlvUnit* find(std::uint8_t unit) {
+  BusUnit* find(std::uint8_t unit) {
     const auto found = std::find_if(units_.begin(), units_.end(),
-                                    [unit](const BlvUnit& one) { return one.address() == unit; });
-    return found == units_.end() ? nullptr : &*found;
+                                    [unit](const auto& one) { return one->address() == unit; });
+    return found == units_.end() ? nullptr : found->get();
   }
 
-  std::deque<BlvUnit> units_ = {};
+  bool is_network_;  ///< there is one unit, whose number does not matter
+  std::vector<std::unique_ptr<BusUnit>> units_ = {};
   std::vector<Trouble> trouble_ = {};
   std::optional<TimePoint> begin_ = std::nullopt;
   Duration gap_ = {};
@@ -150,7 +155,17 @@ class SimulatedBus final : public BlvBus {
 std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
                                      const catalogue::SimulationFacts& start,
                                      const BlvOptions& options) {
-  return std::make_unique<SimulatedBus>(profile, start, options);
+  return std::make_unique<SimulatedBus>(profile, options, [&](std::uint8_t address) {
+    return std::make_unique<BlvUnit>(profile, start, address, options.configuring);
+  });
+}
+
+std::unique_ptr<BlvBus> make_profile_bus(const catalogue::Profile& profile,
+                                         const catalogue::SimulationFacts& start,
+                                         const BlvOptions& options, const Bytes& identity) {
+  return std::make_unique<SimulatedBus>(profile, options, [&](std::uint8_t address) {
+    return std::make_unique<ProfileUnit>(profile, start, address, identity);
+  });
 }
 
 }  // namespace spindle::sim

@@ -64,13 +64,25 @@ void write_raw(Registers& words, std::uint16_t first, Kind kind, std::uint32_t r
 }  // namespace
 
 BlvRegisters::BlvRegisters(const catalogue::Profile& profile,
-                           const catalogue::SimulationFacts& start)
-    : words_{Registers(room, 0), {}}, holding_end_(map_end) {
+                           const catalogue::SimulationFacts& start, Layout layout)
+    : layout_(layout),
+      words_{Registers(room, 0), {}},
+      holding_end_(layout == Layout::one_map ? map_end : 0) {
   for (const catalogue::Parameter& parameter : profile.parameters) {
-    add(parameter, profile.run && parameter.name == profile.run->command);
+    add(parameter, profile.commands_motion(parameter));
   }
   for (const catalogue::Action& action : profile.actions) add(action, profile.link.even_pairs);
+  const bool is_exact = layout == Layout::exactly_as_named;
+  if (is_exact && profile.numbered) add(*profile.numbered);
   if (has_input()) words_.input.resize(room, 0);
+  if (is_exact) {
+    for (const catalogue::Parameter& parameter : profile.parameters) begin(parameter);
+    for (const catalogue::Area& area : start.absent) {
+      for (std::uint32_t at = area.from; at <= area.to; ++at) {
+        named_.erase({area.table, static_cast<std::uint16_t>(at)});
+      }
+    }
+  }
   for (const auto& value : start.values) {
     for (const auto& [name, place] : places_) {
       if (glob_match(value.pattern, name)) set_number(place, value.raw);
@@ -131,10 +143,42 @@ void BlvRegisters::add(const catalogue::Action& action, bool even_pairs) {
   by_address_[place.cell.first] = place;
 }
 
+/// What has a name already keeps it.
+void BlvRegisters::add(const catalogue::NumberedFacts& facts) {
+  for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
+    Place place{.table = facts.table, .cell = {.first = static_cast<std::uint16_t>(number)}};
+    place.writable = facts.access == catalogue::Access::read_write;
+    place.stored = place.writable;
+    reach(place);
+    places_.try_emplace(fmt::format("{}{}", facts.prefix, number), place);
+    const bool is_free =
+        place.table == RegisterTable::holding && place_at(place.cell.first) == nullptr;
+    if (is_free) by_address_[place.cell.first] = place;
+  }
+}
+
+void BlvRegisters::begin(const catalogue::Parameter& parameter) {
+  const Place& place = places_.at(parameter.name);
+  const auto value = steps_of(parameter.default_value, parameter.encoding.scale);
+  const std::int64_t number = value.value_or(place.minimum.value_or(0));
+  if (number != 0) set_number(place, number);
+}
+
 void BlvRegisters::reach(const Place& place) {
+  for (unsigned i = 0; i < catalogue::register_count(place.cell.kind); ++i) {
+    named_.emplace(place.table, static_cast<std::uint16_t>(place.cell.first + i));
+  }
   const std::uint32_t end = place.cell.first + catalogue::register_count(place.cell.kind);
   std::uint32_t& known = place.table == RegisterTable::holding ? holding_end_ : input_end_;
   known = std::max(known, end);
+}
+
+bool BlvRegisters::exists(RegisterTable table, std::uint16_t first, std::size_t quantity) const {
+  if (layout_ == Layout::one_map) return true;
+  for (std::size_t i = 0; i < quantity; ++i) {
+    if (!named_.contains({table, static_cast<std::uint16_t>(first + i)})) return false;
+  }
+  return true;
 }
 
 bool BlvRegisters::holds(std::uint16_t first, std::size_t quantity) const {
@@ -145,6 +189,7 @@ std::optional<Registers> BlvRegisters::read(RegisterTable table, std::uint16_t f
                                             std::size_t quantity) const {
   const bool holding = table == RegisterTable::holding;
   if (first + quantity > (holding ? holding_end_ : input_end_)) return std::nullopt;
+  if (!exists(table, first, quantity)) return std::nullopt;
   const Registers& words = holding ? words_.holding : words_.input;
   const auto begin = words.begin() + first;
   return Registers(begin, begin + static_cast<std::ptrdiff_t>(quantity));
@@ -160,12 +205,25 @@ const BlvRegisters::Place* BlvRegisters::place_at(std::uint16_t address) const {
 
 std::optional<BlvRegisters::Cell> BlvRegisters::cell_at(std::uint16_t address) const {
   const Place* place = place_at(address);
-  if (place == nullptr || !place->writable) return std::nullopt;
+  const bool is_there =
+      place != nullptr && place->writable && exists(RegisterTable::holding, address, 1);
+  if (!is_there) return std::nullopt;
   return place->cell;
 }
 
 std::uint32_t BlvRegisters::raw(const Cell& cell) const {
   return read_raw(words_.holding, cell.first, cell.kind);
+}
+
+std::uint32_t BlvRegisters::with_words(const Cell& cell, std::uint16_t first, RegisterView values,
+                                       std::size_t& next) const {
+  std::uint32_t raw = this->raw(cell);
+  const unsigned end = unsigned{cell.first} + catalogue::register_count(cell.kind);
+  for (; next < values.size() && first + next < end; ++next) {
+    const auto shift = static_cast<unsigned>(16U * (end - 1U - (first + next)));
+    raw = (raw & ~(0xFFFFU << shift)) | (std::uint32_t{values[next]} << shift);
+  }
+  return raw;
 }
 
 void BlvRegisters::set_raw(const Cell& cell, std::uint32_t raw) {

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
@@ -12,14 +14,22 @@
 
 namespace spindle::sim {
 
-/// The registers of a simulated BLV driver, laid out by its profile, with the values that it stores
+/// The registers of a simulated driver, laid out by its profile, with the values that it stores
 /// and those that it had when it left the factory. Takes every profile that is valid: any address,
 /// both tables, values of one register and of two.
 class BlvRegisters {
  public:
-  BlvRegisters(const catalogue::Profile& profile, const catalogue::SimulationFacts& start);
+  enum class Layout : std::uint8_t {
+    /// Registers up to the end of the map that have no name read as 0; values begin at 0.
+    one_map,
+    /// Registers without a name do not exist; values begin at their default, else at the least
+    /// value, else at 0.
+    exactly_as_named,
+  };
+  BlvRegisters(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+               Layout layout = Layout::one_map);
 
-  /// Empty when the request reaches behind the map. Registers inside that nobody named are 0.
+  /// Empty when a register does not exist.
   [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
                                               std::size_t quantity) const;
   /// Whether so many holding registers are inside the map.
@@ -36,6 +46,10 @@ class BlvRegisters {
   /// The writable value that this holding register belongs to; empty when there is none.
   [[nodiscard]] std::optional<Cell> cell_at(std::uint16_t address) const;
   [[nodiscard]] std::uint32_t raw(const Cell& cell) const;
+  /// The cell's value with those of its registers that are written from `first` on, beginning with
+  /// values[next]; `next` is then that of the next cell.
+  [[nodiscard]] std::uint32_t with_words(const Cell& cell, std::uint16_t first, RegisterView values,
+                                         std::size_t& next) const;
   void set_raw(const Cell& cell, std::uint32_t raw);
   /// Whether the value takes this number.
   [[nodiscard]] bool takes(const Cell& cell, std::uint32_t raw) const;
@@ -79,17 +93,23 @@ class BlvRegisters {
   /// `is_word`: it is the word that commands the motor.
   void add(const catalogue::Parameter& parameter, bool is_word);
   void add(const catalogue::Action& action, bool even_pairs);
+  void add(const catalogue::NumberedFacts& facts);
+  void begin(const catalogue::Parameter& parameter);
+  [[nodiscard]] bool exists(modbus::RegisterTable table, std::uint16_t first,
+                            std::size_t quantity) const;
   void reach(const Place& place);
   [[nodiscard]] const Place* place_at(std::uint16_t address) const;
   [[nodiscard]] std::int64_t number(const Place& place) const;
   void set_number(const Place& place, std::int64_t number);
   [[nodiscard]] Numbers stored_part() const;
 
+  Layout layout_;
   Memory words_;
   std::uint32_t holding_end_;  ///< first address that no request may reach
   std::uint32_t input_end_ = 0;
   std::map<std::string, Place, std::less<>> places_ = {};
   std::map<std::uint16_t, Place> by_address_ = {};  ///< of the holding table
+  std::set<std::pair<modbus::RegisterTable, std::uint16_t>> named_ = {};
   Numbers factory_ = {};
   Numbers stored_ = {};
 };

@@ -37,18 +37,23 @@ constexpr std::string_view alarms = "alarm.history";
 constexpr std::string_view warnings = "warning.history";
 constexpr std::string_view errors = "communication-error.history";
 
+catalogue::CommandWordFacts word_facts(const catalogue::Profile& profile) {
+  const auto* facts = profile.run ? profile.run->word() : nullptr;
+  return facts == nullptr ? catalogue::CommandWordFacts{} : *facts;
+}
+
 }  // namespace
 
 BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
                  std::uint8_t address, Duration configuring)
     : address_(address),
-      run_(profile.run.value_or(catalogue::RunFacts{})),
+      run_(word_facts(profile)),
       refusals_(profile.refusals.value_or(catalogue::RefusalFacts{})),
       permanent_alarms_(start.permanent_alarms),
       max_read_(profile.link.max_read),
       max_write_(profile.link.max_write),
       registers_(profile, start),
-      load_(registers_.get(run_.load)),
+      load_(registers_.get(run_.monitor.load)),
       configuring_(configuring) {
   constexpr std::array<std::pair<std::string_view, Handler>, 9> handlers = {{
       {"alarm-reset", &BlvUnit::reset_alarm},
@@ -69,7 +74,7 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationF
     if (known == handlers.end() || !action.value || !action.rest || !cell) continue;
     deeds_.push_back({cell->first, *action.value, known->second});
   }
-  for (const std::string* name : {&run_.command, &run_.status}) {
+  for (const std::string* name : {&run_.command, &run_.monitor.status}) {
     if (auto parameter = profile.find(*name)) words_.push_back(std::move(*parameter));
   }
   make_effective();
@@ -162,12 +167,7 @@ BlvUnit::Outcome BlvUnit::write(std::uint16_t first, RegisterView values, TimePo
   for (std::size_t i = 0; i < values.size();) {
     const auto cell = registers_.cell_at(static_cast<std::uint16_t>(first + i));
     if (!cell) return no_such_register;
-    std::uint32_t raw = registers_.raw(*cell);
-    const unsigned end = unsigned{cell->first} + catalogue::register_count(cell->kind);
-    for (; i < values.size() && first + i < end; ++i) {
-      const auto shift = static_cast<unsigned>(16U * (end - 1U - (first + i)));
-      raw = (raw & ~(0xFFFFU << shift)) | (std::uint32_t{values[i]} << shift);
-    }
+    const std::uint32_t raw = registers_.with_words(*cell, first, values, i);
     if (Outcome refused = write_cell(*cell, raw, now)) return refused;
   }
   return std::nullopt;
@@ -211,22 +211,22 @@ BlvUnit::Outcome BlvUnit::use(const Deed& deed, std::uint32_t before, std::uint3
 // ---- maintenance commands ----
 
 BlvUnit::Outcome BlvUnit::check_at_rest(TimePoint now) const {
-  const bool at_rest = registers_.get(run_.alarm) == 0 && !motor_.moves(now);
+  const bool at_rest = registers_.get(run_.monitor.alarm) == 0 && !motor_.moves(now);
   if (at_rest) return std::nullopt;
   return Refusal{ExceptionCode::server_device_failure, not_now};
 }
 
 BlvUnit::Outcome BlvUnit::check_memory() const {
-  if (registers_.get(run_.alarm) != memory_alarm) return std::nullopt;
+  if (registers_.get(run_.monitor.alarm) != memory_alarm) return std::nullopt;
   return Refusal{ExceptionCode::server_device_failure, memory_busy};
 }
 
 BlvUnit::Outcome BlvUnit::reset_alarm(TimePoint now) {
-  const std::int64_t present = registers_.get(run_.alarm);
+  const std::int64_t present = registers_.get(run_.monitor.alarm);
   const bool stays = std::find(permanent_alarms_.begin(), permanent_alarms_.end(), present) !=
                      permanent_alarms_.end();
   if (stays) return std::nullopt;  // accepted, and without effect
-  registers_.set(run_.alarm, 0);
+  registers_.set(run_.monitor.alarm, 0);
   bad_frames_ = 0;
   obey(now);  // a run command that is still on counts again
   return std::nullopt;
@@ -345,7 +345,7 @@ Duration BlvUnit::time_of(const std::string& pattern, std::uint16_t operation) c
 }
 
 void BlvUnit::obey(TimePoint now) {
-  if (registers_.get(run_.alarm) != 0 || configured_at_) return;
+  if (registers_.get(run_.monitor.alarm) != 0 || configured_at_) return;
   const std::uint32_t word = standard_word();
   const auto operation = static_cast<std::uint16_t>(
       (word & run_.select) >> static_cast<unsigned>(std::countr_zero(run_.select)));
@@ -377,53 +377,55 @@ void BlvUnit::make_effective() {
 std::uint32_t BlvUnit::status_word(TimePoint now) const {
   std::uint32_t word = static_cast<std::uint32_t>(registers_.get(run_.command)) & 0x3FU;
   const auto show_bit = [&](bool on, std::uint32_t mask) { word |= on ? mask : 0U; };
-  const std::int64_t alarm = registers_.get(run_.alarm);
-  const std::int64_t warning = registers_.get(run_.warning);
+  const std::int64_t alarm = registers_.get(run_.monitor.alarm);
+  const std::int64_t warning = registers_.get(run_.monitor.warning);
   const std::int64_t off = std::abs(motor_.speed(now) - motor_.target());
   const bool near = motor_.target() != 0 && off <= registers_.get("motor.attainment-band");
-  show_bit(warning != 0, mask_of(run_.status, "WNG", std::nullopt));
-  show_bit(alarm != 0, mask_of(run_.status, "ALARM-OUT1", std::nullopt));
+  show_bit(warning != 0, mask_of(run_.monitor.status, "WNG", std::nullopt));
+  show_bit(alarm != 0, mask_of(run_.monitor.status, "ALARM-OUT1", std::nullopt));
   show_bit(alarm == overload || warning == overload,
-           mask_of(run_.status, "ALARM-OUT2", std::nullopt));
-  show_bit(busy(now), 1U << run_.busy);
-  show_bit(motor_.moves(now), 1U << run_.running);
-  show_bit(near, 1U << run_.at_speed);
+           mask_of(run_.monitor.status, "ALARM-OUT2", std::nullopt));
+  show_bit(busy(now), 1U << *run_.monitor.busy);
+  show_bit(motor_.moves(now), 1U << *run_.monitor.running);
+  show_bit(near, 1U << *run_.monitor.at_speed);
   return word;
 }
 
 // Monitors are looked at only when somebody reads.
 void BlvUnit::show(TimePoint now) {
-  const bool alarm = registers_.get(run_.alarm) != 0;
+  const bool alarm = registers_.get(run_.monitor.alarm) != 0;
   const std::int64_t speed = motor_.speed(now);
-  registers_.set(run_.status, status_word(now));
-  registers_.set(run_.command_speed, alarm ? 0 : speed);
-  registers_.set(run_.feedback_speed, speed);
+  registers_.set(run_.monitor.status, status_word(now));
+  registers_.set(run_.monitor.command_speed, alarm ? 0 : speed);
+  registers_.set(run_.monitor.feedback_speed, speed);
   registers_.set("monitor.operating-speed", speed);
-  registers_.set(run_.load, motor_.target() != 0 ? load_ : 0);
+  registers_.set(run_.monitor.load, motor_.target() != 0 ? load_ : 0);
 }
 
 // ---- what goes wrong ----
 
 void BlvUnit::raise_alarm(std::int64_t code, TimePoint now) {
-  registers_.set(run_.alarm, code);
+  registers_.set(run_.monitor.alarm, code);
   registers_.push_history(alarms, code);
   motor_.coast(now);
 }
 
 void BlvUnit::raise_warning(std::int64_t code, TimePoint /*now*/) {
-  registers_.set(run_.warning, code);
+  registers_.set(run_.monitor.warning, code);
   if (code != 0) registers_.push_history(warnings, code);
 }
 
 void BlvUnit::hear_good_frame() {
   bad_frames_ = 0;
-  if (registers_.get(run_.warning) == transmission_error) registers_.set(run_.warning, 0);
+  if (registers_.get(run_.monitor.warning) == transmission_error)
+    registers_.set(run_.monitor.warning, 0);
 }
 
 void BlvUnit::hear_bad_frame(TimePoint now) {
   ++bad_frames_;
   note_error(transmission_error);
-  if (registers_.get(run_.warning) != transmission_error) raise_warning(transmission_error, now);
+  if (registers_.get(run_.monitor.warning) != transmission_error)
+    raise_warning(transmission_error, now);
   if (bad_frames_ == registers_.get("communication.error-limit")) raise_alarm(line_alarm, now);
 }
 

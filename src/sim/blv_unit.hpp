@@ -7,36 +7,34 @@
 
 #include "blv_motor.hpp"
 #include "blv_registers.hpp"
+#include "bus_unit.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/modbus/pdu.hpp"
 
 namespace spindle::sim {
 
-/// One simulated BLV driver. Knows nothing of other units, frames or connections.
-class BlvUnit {
+/// One simulated BLV driver.
+class BlvUnit final : public BusUnit {
  public:
   /// `configuring`: how long Configuration takes.
   BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
           std::uint8_t address, Duration configuring);
 
-  [[nodiscard]] std::uint8_t address() const { return address_; }
-  [[nodiscard]] std::int64_t group() const;
-  [[nodiscard]] Duration waiting_time() const { return waiting_time_; }
+  [[nodiscard]] std::uint8_t address() const override { return address_; }
+  [[nodiscard]] std::int64_t group() const override;
+  [[nodiscard]] Duration waiting_time() const override { return waiting_time_; }
 
-  void advance(TimePoint now);
-  [[nodiscard]] std::optional<TimePoint> next_change() const;
+  void advance(TimePoint now) override;
+  [[nodiscard]] std::optional<TimePoint> next_change() const override;
 
-  /// A query for this unit, its group or everybody.
-  modbus::Pdu answer(const modbus::Pdu& request, TimePoint now);
-  /// A good frame for whomever; a bad one was meant for nobody knows whom.
-  void hear_good_frame();
-  void hear_bad_frame(TimePoint now);
+  modbus::Pdu answer(const modbus::Pdu& request, TimePoint now) override;
+  void hear_good_frame() override;
+  void hear_bad_frame(TimePoint now) override;
 
-  void raise_alarm(std::int64_t code, TimePoint now);
-  /// A warning begins; 0 ends it.
-  void raise_warning(std::int64_t code, TimePoint now);
-  void use_setter(TimePoint until) { setter_until_ = until; }
-  void power_cycle(TimePoint now);
+  void raise_alarm(std::int64_t code, TimePoint now) override;
+  void raise_warning(std::int64_t code, TimePoint now) override;
+  void use_setter(TimePoint until) override { setter_until_ = until; }
+  void power_cycle(TimePoint now) override;
 
  private:
   /// What refuses a request: the exception, and the code in the driver's own register.
@@ -50,15 +48,6 @@ class BlvUnit {
     std::uint16_t first;  ///< register of its value
     std::uint32_t value;
     Handler handler;
-  };
-  /// Bits of the command word by their names, in one input mode.
-  struct Wires {
-    std::uint32_t forward = 0;   ///< FWD
-    std::uint32_t reverse = 0;   ///< REV
-    std::uint32_t slow = 0;      ///< STOP-MODE
-    std::uint32_t start = 0;     ///< START/STOP
-    std::uint32_t run = 0;       ///< RUN/BRAKE
-    std::uint32_t backward = 0;  ///< FWD/REV
   };
   enum class Wish : std::uint8_t { forward, reverse, decelerate, brake };
 
@@ -103,7 +92,7 @@ class BlvUnit {
   [[nodiscard]] std::optional<TimePoint> watchdog_due() const;
 
   std::uint8_t address_;
-  catalogue::RunFacts run_;
+  catalogue::CommandWordFacts run_;
   catalogue::RefusalFacts refusals_;
   std::vector<catalogue::Parameter> words_;  ///< with the names of bits
   std::vector<std::int64_t> permanent_alarms_;

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "spindle/link/serial_settings.hpp"
-#include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/sim_transport.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 
 namespace spindle::work {
 namespace {
@@ -52,19 +52,12 @@ Result<void> check_identity_bytes(const catalogue::Profile& profile,
 Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profile,
                                                  const catalogue::SimulationFacts& start,
                                                  const SimulatedToolOptions& options) {
-  if (profile.run) return sim::make_blv_bus(profile, start, bus_options(options));
-  if (!profile.events) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "this product can not be simulated",
-                                .hint = "its profile has neither 'run' nor 'events'",
-                                .name = profile.id});
-  }
   if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
     return tl::unexpected(std::move(known.error()));
   }
   sim::BmOptions bm = options.bm;
   bm.alarms = options.alarms;
-  return sim::make_bm_tool(profile, start, bm);
+  return sim::make_simulated_server(profile, start, bm, bus_options(options));
 }
 
 }  // namespace

@@ -2,13 +2,12 @@
 
 namespace spindle::work {
 
-Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+Result<void> broadcast_stop(device::Device& device, const device::RunModel& model,
                             catalogue::StopMode mode) {
-  const catalogue::RunFacts& facts = motor.facts();
-  const bool gently = mode == catalogue::StopMode::decelerate && !motor.has_inputs();
-  const std::uint16_t word = gently ? facts.decelerate_always : motor.idle_word();
   Result<void> sent;
-  for (int again = 0; again < most_stops && sent; ++again) sent = motor.broadcast(device, word);
+  for (int again = 0; again < most_stops && sent; ++again) {
+    sent = model.broadcast_stop(device, mode);
+  }
   return sent;
 }
 
@@ -19,18 +18,18 @@ bool leaves_open(const Result<device::StopResult>& stopped) {
 
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Environment& environment) {
-  const auto motor = device::Motor::of(*tool.profile);
-  if (!motor) return tl::unexpected(motor.error());
+  const auto model = device::RunModel::of(*tool.profile);
+  if (!model) return tl::unexpected(model.error());
   if (tool.target.reach == Reach::everybody) {
-    return broadcast_stop(tool.device, *motor, mode).map([] { return device::StopResult::sent; });
+    return broadcast_stop(tool.device, **model, mode).map([] { return device::StopResult::sent; });
   }
-  device::MotorStopper stopper(*motor, mode);
+  const auto stopper = (*model)->stopper(mode);
   tool.device.set_retries(0);  // it is better to send the stop soon, and again
   tool.device.session().waive_proofs();
-  stopper.observe(tool.device);
-  auto stopped = stopper.stop(tool.device, environment.clock);
+  stopper->observe(tool.device);
+  auto stopped = stopper->stop(tool.device, environment.clock);
   for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {
-    stopped = stopper.stop(tool.device, environment.clock);
+    stopped = stopper->stop(tool.device, environment.clock);
   }
   return stopped;
 }

@@ -19,6 +19,7 @@
 //                         the same of an alarm
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
 //                         backups are kept on
+//   %profile NAME         a file of tests/profiles/good, in the transcript's own folder
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
 //   %disk full|empty      whether it takes any more
 //   %hide progress        from here on the line that a terminal shows for a moment is left out
@@ -190,8 +191,10 @@ class Stage {
         }
       }
     }
-    auto bus =
-        sim::make_blv_bus(tool->profile, profiles_.load_simulation(words.at(1)).value(), options);
+    const auto start = profiles_.load_simulation(words.at(1)).value();
+    const bool has_word = tool->profile.run && tool->profile.run->word() != nullptr;
+    auto bus = has_word ? sim::make_blv_bus(tool->profile, start, options)
+                        : sim::make_profile_bus(tool->profile, start, options, {});
     tool->bus = bus.get();
     tool->server = std::move(bus);
     tools_[commands::shared_line(link::parse_endpoint(words.at(0)).value())] = std::move(tool);
@@ -389,8 +392,14 @@ class Player {
     if (words.at(0) == "answer") stage_.answer(words.at(1));
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
+    if (words.at(0) == "profile") copy_profile(words.at(1));
     if (words.at(0) == "hide") stage_.hide_progress();
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
+  }
+
+  static void copy_profile(const std::string& name) {
+    fs::copy_file(fs::path(SPINDLE_SOURCE_DIR) / "tests/profiles/good" / (name + ".yaml"),
+                  name + ".yaml");
   }
 
   void edit(const std::string& name, const std::string& old_text, const std::string& new_text) {

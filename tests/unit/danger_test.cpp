@@ -120,7 +120,7 @@ TEST_CASE("the gravest hazard of a register counts") {
 TEST_CASE("the word that runs a motor is no setting, though no action says so") {
   Profile profile;
   profile.parameters = {parameter("word", 124, Kind::u32), parameter("speed", 130)};
-  profile.run.emplace().command = "word";
+  profile.run.emplace().model = catalogue::CommandWordFacts{.command = "word"};
   const auto danger = danger_of(parse_raw_register("@holding:125")->value(), profile);
   REQUIRE(danger.has_value());
   CHECK(danger->runs_motor);

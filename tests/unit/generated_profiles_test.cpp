@@ -435,7 +435,7 @@ TEST_CASE("generated profiles: what passes the checks can be simulated and asked
     REQUIRE(profile);
     REQUIRE(start);
     ++valid;
-    if (profile->run) {
+    if (profile->run && profile->run->word() != nullptr) {
       const auto bus = sim::make_blv_bus(
           *profile, *start,
           {.alarms = {{.code = 0x30, .after = 1s}}, .warnings = {{.code = 0x21}}});

@@ -340,10 +340,45 @@ void check_main(const Source& source, Findings& findings) {
   }
 }
 
+/// How a product is run is asked of its run model: only the loader, the models and what makes them
+/// look at the section `run` of a profile.
+const std::vector<std::string> run_readers = {
+    "src/files/",
+    "src/device/run_model.cpp",
+    "src/device/start_action.cpp",
+    "src/device/command_word.cpp",
+    "src/device/command_register.cpp",
+    "src/sim/simulated_tool.cpp",
+    "src/sim/blv_unit.cpp",
+    "src/sim/profile_unit.cpp",
+    "src/commands/run.cpp",
+    "src/commands/command_register_run.cpp",
+};
+
+bool asks_how_it_is_run(const std::string& text) {
+  for (const std::string asked :
+       {"profile.run", "profile->run", "profile_->run", "profile().run"}) {
+    for (auto at = text.find(asked); at != std::string::npos; at = text.find(asked, at + 1)) {
+      const auto behind = static_cast<unsigned char>(
+          at + asked.size() < text.size() ? text[at + asked.size()] : ' ');
+      if (std::isalnum(behind) == 0 && behind != '_') return true;
+    }
+  }
+  return false;
+}
+
+void check_run_models(const Source& source, Findings& findings) {
+  const bool may = std::any_of(run_readers.begin(), run_readers.end(),
+                               [&](const auto& reader) { return source.path.starts_with(reader); });
+  if (may || !asks_how_it_is_run(source.text)) return;
+  findings.push_back(source.path + ": asks the profile how it is run, instead of the run model");
+}
+
 Findings judge(const Source& source) {
   Findings findings;
-  for (const auto rule : {check_layers, check_private_headers, check_homes, check_words,
-                          check_formats, check_finished, check_pragma_once, check_main}) {
+  for (const auto rule :
+       {check_layers, check_private_headers, check_homes, check_words, check_formats,
+        check_finished, check_pragma_once, check_main, check_run_models}) {
     rule(source, findings);
   }
   return findings;
@@ -466,6 +501,12 @@ TEST_CASE("a file that breaks the law is found") {
       {{"src/report/a.cpp", "double d = std::strtod(text, nullptr);\n"},
        "src/report/a.cpp: uses strtod"},
       {{"src/report/a.cpp", "std::ostringstream s;\n"}, "src/report/a.cpp: uses ostringstream"},
+      {{"src/commands/a.cpp", "bool f() { return profile.run.has_value(); }\n"},
+       "src/commands/a.cpp: asks the profile how it is run, instead of the run model"},
+      {{"src/sim/a.cpp", "auto f = tool.profile->run;\n"},
+       "src/sim/a.cpp: asks the profile how it is run, instead of the run model"},
+      {{"src/device/a.cpp", "auto f = device.profile().run;\n"},
+       "src/device/a.cpp: asks the profile how it is run, instead of the run model"},
       {{"src/link/a.hpp", "// #pragma once\n"}, "src/link/a.hpp: lacks #pragma once"},
       {{"src/link/a.cpp", "// " + unfinished.front() + ": later\n"},
        "src/link/a.cpp: says " + unfinished.front()},

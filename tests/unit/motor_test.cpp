@@ -1,10 +1,9 @@
-#include "spindle/device/motor.hpp"
-
 #include <doctest/doctest.h>
 
 #include <chrono>
 #include <vector>
 
+#include "spindle/device/command_word.hpp"
 #include "spindle/device/motor_follower.hpp"
 #include "support/blv_bench.hpp"
 
@@ -13,10 +12,10 @@ namespace {
 using namespace spindle;
 using namespace std::chrono_literals;
 using catalogue::StopMode;
-using device::Motor;
+using device::CommandWord;
+using device::CommandWordStopper;
 using device::MotorEvent;
 using device::MotorState;
-using device::MotorStopper;
 using device::StopResult;
 using test::BlvBench;
 
@@ -50,28 +49,28 @@ TEST_CASE("events are what differs between two looks") {
 TEST_CASE("only products that are run by a command word have a motor") {
   catalogue::Profile profile;
   profile.id = "none";
-  CHECK(Motor::of(profile).error().code == Errc::usage);
+  CHECK(CommandWord::of(profile).error().code == Errc::usage);
 }
 
 TEST_CASE("a look shows the state, the speeds and the codes") {
   BlvBench bench;
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
+  const CommandWord motor = CommandWord::of(bench.profile).value();
   bench.write(command, 0x32);
   bench.clock.advance(1s);
-  auto state = motor.look(device).value();
+  auto state = motor.monitor()->look(device).value();
   CHECK(state.running);
   CHECK(state.at_speed);
-  CHECK(state.feedback_speed == -1000);
-  CHECK(state.load == 18);
+  CHECK(state.feedback_speed == Decimal(-1000));
+  CHECK(state.load == Decimal(18));
   bench.bus->raise_warning(1, 0x21, bench.clock.now());
   bench.bus->raise_alarm(1, 0x30, bench.clock.now());
   bench.clock.advance(1s);
-  state = motor.look(device).value();
+  state = motor.monitor()->look(device).value();
   CHECK_FALSE(state.running);
   CHECK(state.alarm == 0x30);
   CHECK(state.warning == 0x21);
-  CHECK(state.command_speed == 0);
+  CHECK(state.command_speed == Decimal(0));
 }
 
 namespace {
@@ -100,8 +99,8 @@ TEST_CASE("a motor is stopped by the word of its input mode") {
     bench.clock.advance(1s);
     REQUIRE(bench.moves());
     auto device = bench.open().value();
-    const Motor motor = Motor::of(bench.profile).value();
-    MotorStopper stopper(motor, stop.how);
+    const CommandWord motor = CommandWord::of(bench.profile).value();
+    CommandWordStopper stopper(motor, stop.how);
     stopper.observe(device);
     CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
     if (stop.how == StopMode::decelerate) CHECK(stopper.stopping() == 500ms);
@@ -120,8 +119,8 @@ TEST_CASE("a mode that was written and not configured never turns a stop into a 
     bench.write(command, word);
     bench.clock.advance(1s);
     auto device = bench.open().value();
-    const Motor motor = Motor::of(bench.profile).value();
-    MotorStopper stopper(motor, StopMode::decelerate);
+    const CommandWord motor = CommandWord::of(bench.profile).value();
+    CommandWordStopper stopper(motor, StopMode::decelerate);
     stopper.observe(device);
     auto stopped = stopper.stop(device, bench.clock);
     if (stopped == StopResult::unconfirmed) stopped = stopper.stop(device, bench.clock);
@@ -137,8 +136,8 @@ TEST_CASE("a gentle stop that does not help becomes a hard one") {
   bench.write(command, 0x2A);
   bench.clock.advance(1s);
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 300ms);
   stopper.seen_running();
   CHECK(stopper.stop(device, bench.clock) == StopResult::unconfirmed);
@@ -155,8 +154,8 @@ TEST_CASE("without anything known a motor is stopped by the word that no assignm
     bench.write(command, 0x1A);
     bench.clock.advance(1s);
     auto device = bench.open().value();
-    const Motor motor = Motor::of(bench.profile).value();
-    MotorStopper stopper(motor, how);
+    const CommandWord motor = CommandWord::of(bench.profile).value();
+    CommandWordStopper stopper(motor, how);
     CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
     CHECK(bench.read(command) == 0x00);
   }
@@ -199,8 +198,8 @@ TEST_CASE("no assignment of the inputs makes a stop start a motor") {
         bench.clock.advance(1s);
         const bool ran = bench.moves();
         auto device = bench.open().value();
-        const Motor motor = Motor::of(bench.profile).value();
-        MotorStopper stopper(motor, how);
+        const CommandWord motor = CommandWord::of(bench.profile).value();
+        CommandWordStopper stopper(motor, how);
         stopper.observe(device);
         REQUIRE(stopper.send(device));
         bench.clock.advance(1ms);
@@ -220,8 +219,8 @@ TEST_CASE("a motor is stopped gently by the inputs that its driver has for it") 
   bench.clock.advance(1s);
   REQUIRE(bench.moves());
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.observe(device);
   REQUIRE(stopper.send(device));
   CHECK(bench.read(command) == 0x0A);
@@ -238,8 +237,8 @@ TEST_CASE("a stop does not wait for what can not be read") {
   bench.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
   auto device = bench.open().value();
   device.set_retries(0);
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   const TimePoint began = bench.clock.now();
   stopper.observe(device);
   CHECK(bench.clock.now() - began < 400ms);
@@ -252,8 +251,8 @@ TEST_CASE("a stop does not wait for what can not be read") {
 TEST_CASE("a guard stops a motor, also when nobody calls it") {
   BlvBench bench;
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 500ms);
   const device::GuardedMotion motion{
       .start = [&](device::Device& on) { return motor.command(on, 0x2A); },
@@ -288,14 +287,14 @@ TEST_CASE("a guard stops a motor, also when nobody calls it") {
 TEST_CASE("following tells what happens, and why it is over") {
   BlvBench bench;
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   std::vector<device::MotorNews> news;
-  device::MotorFollowOptions options{.deadline = bench.clock.now() + 3s, .fastest = 1000};
+  device::MotorFollowOptions options{.deadline = bench.clock.now() + 3s, .fastest = Decimal(1000)};
   options.hear = [&](const device::MotorNews& one) { news.push_back(one); };
   SUBCASE("elapsed") {
     bench.write(command, 0x2A);
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::elapsed);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::elapsed);
     REQUIRE(news.size() == 2);
     CHECK(news[0].event == MotorEvent::started);
     CHECK(news[1].event == MotorEvent::at_speed);
@@ -304,18 +303,18 @@ TEST_CASE("following tells what happens, and why it is over") {
     bench.write(command, 0x2A);
     bench.clock.at(bench.clock.now() + 1s,
                    [&] { bench.bus->raise_alarm(1, 0x30, bench.clock.now()); });
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::alarm);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::alarm);
     CHECK(news.back().event == MotorEvent::alarm);
   }
   SUBCASE("stopped by somebody else") {
     bench.write(command, 0x2A);
     bench.clock.at(bench.clock.now() + 1s, [&] { bench.write(command, 0); });
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::stopped);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::stopped);
   }
   SUBCASE("ignored") {
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::ignored);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::ignored);
     options.deadline = bench.clock.now() + 200ms;
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::ignored);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::ignored);
   }
   SUBCASE("over before it could be looked at") {
     bench.write(command, 0x2A);
@@ -326,9 +325,10 @@ TEST_CASE("following tells what happens, and why it is over") {
     CHECK(news.empty());
   }
   SUBCASE("too fast") {
-    options.fastest = 900;
+    options.fastest = Decimal(900);
     bench.write(command, 0x32);
-    CHECK(follow_motor(device, motor, stopper, options) == device::MotorEnding::too_fast);
+    CHECK(follow_motor(device, *motor.monitor(), stopper, options) ==
+          device::MotorEnding::too_fast);
   }
 }
 
@@ -339,14 +339,14 @@ TEST_CASE("a driver that falls silent is hardly waited for beyond the time allow
   }
   BlvBench bench({}, faults);
   auto device = bench.open().value();
-  const Motor motor = Motor::of(bench.profile).value();
-  MotorStopper stopper(motor, StopMode::decelerate);
+  const CommandWord motor = CommandWord::of(bench.profile).value();
+  CommandWordStopper stopper(motor, StopMode::decelerate);
   device.session().set_answer_timeout(60s);  // a patient user
   device.set_retries(9);
   bench.write(command, 0x2A);
   const TimePoint began = bench.clock.now();
-  device::MotorFollowOptions options{.deadline = began + 3s, .fastest = 1000};
-  const auto followed = follow_motor(device, motor, stopper, options);
+  device::MotorFollowOptions options{.deadline = began + 3s, .fastest = Decimal(1000)};
+  const auto followed = follow_motor(device, *motor.monitor(), stopper, options);
   CHECK(bench.clock.now() - began < 4s);
   CHECK(bench.moves());
 }

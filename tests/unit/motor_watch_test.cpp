@@ -6,14 +6,15 @@
 #include <map>
 #include <vector>
 
+#include "spindle/device/command_word.hpp"
 #include "spindle/device/watcher.hpp"
 #include "support/blv_bench.hpp"
 
 using namespace spindle;
 using namespace std::chrono_literals;
+using device::CommandWord;
 using device::EventMode;
 using device::Heed;
-using device::Motor;
 using device::MotorEvent;
 using device::MotorNews;
 using device::News;
@@ -79,7 +80,7 @@ struct Line {
 
   test::BlvBench bench;
   WatchPlan plan = {.events = EventMode::none,
-                    .motor = Motor::of(bench.profile).value(),
+                    .motor = *CommandWord::of(bench.profile).value().monitor(),
                     .samples = Samples::all};
   std::map<std::uint16_t, unsigned> asked = {};
   std::vector<MotorEvent> events = {};
@@ -139,8 +140,8 @@ TEST_CASE("a motor that is run and stopped by others is told soon, with the spee
                                                    MotorEvent::stopped});
     CHECK(line.heard[0] - began > 5s);
     CHECK(line.heard[0] - began < 6500ms);
-    CHECK(line.states[0].feedback_speed > 0);
-    CHECK(line.states[1].feedback_speed == 1000);
-    CHECK(line.states[2].feedback_speed == 0);
+    CHECK(line.states[0].feedback_speed > Decimal(0));
+    CHECK(line.states[1].feedback_speed == Decimal(1000));
+    CHECK(line.states[2].feedback_speed == Decimal(0));
   }
 }

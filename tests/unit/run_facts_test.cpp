@@ -7,7 +7,7 @@
 using namespace spindle;
 
 TEST_CASE("operation data are selected by adjoining bits of the word") {
-  catalogue::RunFacts run;
+  catalogue::CommandWordFacts run;
   run.select = 0x07;
   CHECK(run.selecting(0) == 0);
   CHECK(run.selecting(2) == 2);

@@ -126,7 +126,7 @@ TEST_CASE("without numbers what can be set is stored in the order of the catalog
   Profile profile;
   profile.parameters = {parameter("b", 20), parameter("a", 10, Access::read_only),
                         parameter("command", 30), parameter("c", 5)};
-  profile.run = catalogue::RunFacts{.command = "command"};
+  profile.run = catalogue::RunFacts{.model = catalogue::CommandWordFacts{.command = "command"}};
   Parameter input = parameter("input", 5, Access::read_only);
   input.table = modbus::RegisterTable::input;
   profile.parameters.push_back(input);

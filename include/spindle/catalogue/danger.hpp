@@ -12,7 +12,8 @@ namespace spindle::catalogue {
 struct Danger {
   Hazard hazard = Hazard::none;  ///< the gravest of what its registers may do; never `none`
   std::string action = {};       ///< the action that writes one of its registers; may be empty
-  bool runs_motor = false;       ///< one of its registers is the word that runs a motor
+  bool runs_motor = false;       ///< one of its registers commands a motor
+  bool is_guarded = false;       ///< what it may start is started by the profile's `run`
 
   /// What may happen, as half a sentence: "it may start the motor".
   [[nodiscard]] std::string effect() const;
@@ -21,7 +22,7 @@ struct Danger {
 };
 
 /// All registers of a profile that are no settings: those of parameters that declare a hazard, of
-/// actions that have one or that act on a change (`rest`), and the word that runs a motor.
+/// actions that have one or that act on a change (`rest`), and those that command a motor.
 class Dangers {
  public:
   explicit Dangers(const Profile& profile);

@@ -255,7 +255,7 @@ class Profile {
   std::vector<Parameter> parameters;
   std::vector<Action> actions;
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
-  std::optional<RunFacts> run = std::nullopt;  ///< of a product that is run by a command word
+  std::optional<RunFacts> run = std::nullopt;  ///< how it is started and stopped; may be missing
   std::optional<RefusalFacts> refusals = std::nullopt;
   std::vector<AlarmList> alarm_lists = {};  ///< empty: the present alarm and what else is named so
   std::vector<std::string> watched = {};    ///< values that `watch` polls unless others are named
@@ -278,6 +278,13 @@ class Profile {
   /// Whether a raw write to this holding register is allowed: it belongs to a writable parameter,
   /// named or numbered.
   [[nodiscard]] bool writable(modbus::RegisterAddress address) const;
+
+  /// Whether a write to this parameter is a command to the motor of `run`.
+  [[nodiscard]] bool commands_motion(const Parameter& parameter) const {
+    return run && run->is_command(parameter.name);
+  }
+  /// Whether `run` starts by this action, under a guard.
+  [[nodiscard]] bool is_guarded_start(std::string_view action) const;
 
   /// Registers with the tool's own minimum and maximum of a parameter; empty when it has none.
   struct LimitRegisters {

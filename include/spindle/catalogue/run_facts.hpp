@@ -6,8 +6,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/catalogue/parameter.hpp"
 
 namespace spindle::catalogue {
@@ -72,11 +75,38 @@ class CommandBits {
   std::array<std::uint16_t, width> functions_ = {};
 };
 
+/// What a motor says of itself. Names are those of parameters; an empty one: it does not say it.
+struct MonitorFacts {
+  std::string status = {};
+  std::optional<std::uint8_t> running = std::nullopt;   ///< bit of the status; empty: its values
+  std::vector<std::int64_t> running_values = {};        ///< values of a status that says "runs"
+  std::vector<std::int64_t> stopped_values = {};        ///< and of one that says "stands still"
+  std::optional<std::uint8_t> at_speed = std::nullopt;  ///< bit: the speed asked for is reached
+  std::optional<std::uint8_t> busy = std::nullopt;      ///< bit: internal processing
+  std::string command_speed = {};   ///< signed; 0 when the motor is told to stand still
+  std::string feedback_speed = {};  ///< signed where the motor tells its direction
+  std::string load = {};
+  std::string alarm = {};    ///< present alarm; 0: none
+  std::string warning = {};  ///< present warning; 0: none
+};
+
+/// An option of a start, and the action that it gives a value to before.
+struct StartOption {
+  std::string option = {};  ///< "preset", as typed behind two hyphens
+  std::string action = {};
+};
+
+/// How a product is run that starts by an action with a `stop`, and ends by itself.
+struct StartActionFacts {
+  std::string start = {};                    ///< the action; its `confirm` says whether it runs
+  std::vector<StartOption> selections = {};  ///< what may be selected before, in this order
+  std::string alarm = {};                    ///< present alarm; 0: none
+};
+
 /// How a product is run whose motor follows a command word: a level, which holds until it is told
 /// otherwise. Names are those of parameters; of a 32-bit one the word is the low half.
-struct RunFacts {
+struct CommandWordFacts {
   std::string command = {};  ///< the command word
-  std::string status = {};   ///< the status word
   std::string mode = {};     ///< parameter whose value decides what the bits of the word mean
   std::map<std::int64_t, RunWords> modes = {};
   /// Bits of which every motion needs at least one, whatever the mode: a word without them never
@@ -88,9 +118,7 @@ struct RunFacts {
   std::uint16_t select = 0;  ///< adjoining bits that hold the number of the operation data
   InputFacts inputs = {};    ///< which bit does what on one driver
 
-  std::uint8_t running = 0;   ///< bits of the status word
-  std::uint8_t at_speed = 0;  ///< the speed asked for is reached
-  std::uint8_t busy = 0;      ///< internal processing
+  MonitorFacts monitor = {};  ///< with all bits of the status, both speeds and the alarm
 
   std::string speed = {};         ///< of operation data {n}; its range is that of the parameter
   std::string acceleration = {};  ///< time, seconds
@@ -105,22 +133,65 @@ struct RunFacts {
   std::int64_t digital = 0;
   std::uint16_t analog_to = 0;
 
-  std::string command_speed = {};   ///< signed; 0 when the motor is told to stand still
-  std::string feedback_speed = {};  ///< signed
-  std::string load = {};            ///< may be empty
-  std::string alarm = {};           ///< present alarm; 0: none
-  std::string warning = {};         ///< present warning; may be empty
-  std::string watchdog = {};        ///< time without a query after which the driver stops; 0: never
-  /// What to look at when a stop is not confirmed, as one sentence; may be empty.
-  std::string still_runs = {};
+  std::string watchdog = {};  ///< time without a query after which the driver stops; 0: never
   /// Parameter with the address of the driver whose group this one belongs to; may be empty. Writes
   /// of several registers to that driver reach this one too, and writes of one do not.
   std::string group = {};
-  Evidence evidence = Evidence::inferred;
-  std::string source = {};
 
   /// The word that selects operation data.
   [[nodiscard]] std::uint16_t selecting(std::uint16_t number) const;
+};
+
+/// What lets a motor follow its command register: a value, or one bit.
+struct EnableFacts {
+  std::string parameter = {};                      ///< empty: nothing has to be enabled
+  std::optional<std::uint8_t> bit = std::nullopt;  ///< set beside the other bits
+  std::uint32_t value = 0;                         ///< written where there is no bit
+};
+
+/// How a product is run by values of one register of 16 or 32 bits. Names are those of parameters.
+struct CommandRegisterFacts {
+  std::string command = {};
+  std::uint32_t forward = 0;
+  std::optional<std::uint32_t> reverse = std::nullopt;  ///< empty: it turns one way only
+  std::optional<std::uint32_t> stop = std::nullopt;     ///< empty: only `stop_register` stops it
+  std::optional<std::uint32_t> instant = std::nullopt;  ///< stops harder than `stop`
+  std::string stop_register = {};  ///< another register that stops it; may be empty
+  std::uint32_t stop_value = 0;
+  EnableFacts enable = {};
+  std::string set_point = {};  ///< how fast, in its own unit; may be empty
+  MonitorFacts monitor = {};   ///< without a status and a speed nothing proves a standstill
+  Duration stopping = std::chrono::seconds(10);  ///< how long a stop may take at most
+};
+
+/// How a product is started and stopped.
+enum class RunKind : std::uint8_t { start_action, command_word, command_register };
+
+/// As written in profiles: "command-word".
+std::string_view to_text(RunKind kind);
+
+/// The section `run` of a profile.
+struct RunFacts {
+  std::variant<StartActionFacts, CommandWordFacts, CommandRegisterFacts> model = CommandWordFacts{};
+  /// What to look at when a stop is not confirmed, as one sentence; may be empty.
+  std::string still_runs = {};
+  std::string alarm_reset = {};  ///< action that ends an alarm; may be empty
+  Evidence evidence = Evidence::inferred;
+  std::string source = {};
+
+  [[nodiscard]] RunKind kind() const { return static_cast<RunKind>(model.index()); }
+  [[nodiscard]] const CommandWordFacts* word() const {
+    return std::get_if<CommandWordFacts>(&model);
+  }
+  [[nodiscard]] const StartActionFacts* action() const {
+    return std::get_if<StartActionFacts>(&model);
+  }
+  [[nodiscard]] const CommandRegisterFacts* command_register() const {
+    return std::get_if<CommandRegisterFacts>(&model);
+  }
+
+  /// Whether a write to this parameter is a command to the motor.
+  [[nodiscard]] bool is_command(std::string_view parameter) const;
 };
 
 /// "operation.{n}.speed" with the number in its place.

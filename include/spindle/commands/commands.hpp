@@ -104,6 +104,9 @@ struct RemoteStartOptions {
   std::optional<catalogue::StopMode> stop = std::nullopt;
 };
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context);
+/// The options that the run model of a profile declares beside those of every model, as typed:
+/// "--speed"; none where it has no run model.
+std::vector<std::string> start_options(const catalogue::Profile& profile);
 
 struct RemoteStopOptions {
   std::vector<std::string> targets;
@@ -166,6 +169,8 @@ struct SimulateOptions {
   std::vector<std::string> outages;   ///< KIND=TIME@every:TIME
 };
 Result<Outcome> simulate(const SimulateOptions& options, Context& context);
+/// The options that only some profiles declare and this one does, as typed: "--busy".
+std::vector<std::string> simulate_options(const catalogue::Profile& profile);
 
 /// The named tools of the tools file.
 Result<Outcome> tools(Context& context);

@@ -178,6 +178,10 @@ class Device {
   /// Sends an action's value once, never again; acknowledged is all that it means.
   Result<void> send(const catalogue::Action& action, std::int64_t value);
 
+  /// Sends a number to all registers of a parameter, once: as a whole where the tool takes that.
+  /// Does not read back; acknowledged is all that it means.
+  Result<void> send(const catalogue::Parameter& parameter, const Decimal& number);
+
   /// Sends an action's stop value. Requires an action that has one.
   Result<void> send_stop(const catalogue::Action& action) {
     return send(action, *action.stop_value);

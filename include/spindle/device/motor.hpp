@@ -3,23 +3,23 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "spindle/device/device.hpp"
-#include "spindle/device/run_guard.hpp"
 
 namespace spindle::device {
 
-/// What a driver says of its motor.
+/// What a driver says of its motor, in the units of its profile.
 struct MotorState {
-  bool running = false;   ///< it turns, or is told to
-  bool at_speed = false;  ///< the speed asked for is reached
-  bool busy = false;      ///< the driver works by itself
-  std::int64_t command_speed = 0;
-  std::int64_t feedback_speed = 0;  ///< signed, + forward
-  std::int64_t load = 0;            ///< 0 where it can not be read
-  std::int64_t alarm = 0;           ///< 0: none
-  std::int64_t warning = 0;         ///< 0: none
+  bool running = false;                                  ///< it turns, or is told to
+  bool at_speed = false;                                 ///< the speed asked for is reached
+  bool busy = false;                                     ///< the driver works by itself
+  std::optional<Decimal> command_speed = std::nullopt;   ///< empty: not known
+  std::optional<Decimal> feedback_speed = std::nullopt;  ///< signed, + forward; empty: not known
+  std::optional<Decimal> load = std::nullopt;            ///< empty: not known
+  std::int64_t alarm = 0;                                ///< 0: none
+  std::int64_t warning = 0;                              ///< 0: none
 };
 
 /// What happened between two looks at a motor.
@@ -28,103 +28,45 @@ enum class MotorEvent : std::uint8_t { started, at_speed, warning, alarm, stoppe
 /// In the order in which they can be told. An alarm or warning that goes is none. Pure.
 std::vector<MotorEvent> events_between(const MotorState& before, const MotorState& now);
 
-/// Reads and commands the motor of a product with `run`. Holds names and addresses only.
-class Motor {
+/// Reads how a motor runs. Holds parameters only.
+class MotorMonitor {
  public:
-  /// Error `usage` where the product has no motor that a command word runs.
-  static Result<Motor> of(const catalogue::Profile& profile);
-
-  [[nodiscard]] const catalogue::RunFacts& facts() const { return facts_; }
+  /// Error `unknown_name` where the profile lacks one of the names. Requires facts with a status
+  /// or a speed.
+  static Result<MotorMonitor> of(const catalogue::MonitorFacts& facts,
+                                 const catalogue::Profile& profile);
 
   /// What look() reads, to be read along with other things.
   [[nodiscard]] const std::vector<catalogue::Parameter>& parameters() const { return parameters_; }
-  /// Requires readings of parameters(), in that order.
-  static Result<MotorState> state_of(std::span<const Reading> readings,
-                                     const catalogue::RunFacts& facts);
+  /// Whether this parameter says that something happened: that it runs, an alarm, a warning.
+  [[nodiscard]] bool tells(std::string_view parameter) const;
+  /// Whether it says that the motor runs.
+  [[nodiscard]] bool tells_running(std::string_view parameter) const;
+  /// Whether this status says that the driver works by itself.
+  [[nodiscard]] bool is_busy(const Decimal& status) const;
+  [[nodiscard]] const catalogue::MonitorFacts& facts() const { return facts_; }
+
+  /// Lays what one parameter says over a state. Error: the reading has none.
+  Result<void> note(const Reading& reading, MotorState& state) const;
   Result<MotorState> look(Device& device) const;
 
   /// Whether the motor stands still, and is told to: the least that proves a stop.
   Result<Shown> stands_still(Device& device) const;
 
-  /// Whether the word is one that runs the motor in this mode.
-  [[nodiscard]] bool runs(std::uint16_t word, std::int64_t mode) const;
-
-  /// Whether drivers of this product can be told what the bits of their word do.
-  [[nodiscard]] bool has_inputs() const { return !facts_.inputs.parameter.empty(); }
-
-  /// What the bits of the command word do on this driver. Reads the inputs up to the highest bit of
-  /// `wanted`, and no less than the lower half, which is one request. Bits behind it are unknown.
-  Result<catalogue::CommandBits> read_bits(Device& device, std::uint16_t wanted) const;
-
-  /// A word that starts nothing and stops in every mode, whatever the bits do.
-  [[nodiscard]] std::uint16_t idle_word() const;
-
-  /// The command word, by FC 06: its answer repeats it, so it need not wait behind lost answers.
-  Result<void> command(Device& device, std::uint16_t word) const;
-  Result<void> broadcast(Device& device, std::uint16_t word) const;
-  [[nodiscard]] modbus::RegisterAddress command_register() const { return command_register_; }
+  /// The unit of its speed, as in the profile; may be empty.
+  [[nodiscard]] const std::string& speed_unit() const { return speed_unit_; }
 
  private:
-  catalogue::RunFacts facts_ = {};
+  [[nodiscard]] bool runs(std::int64_t status) const;
+  [[nodiscard]] bool is_still(const Reading& reading) const;
+
+  catalogue::MonitorFacts facts_ = {};
+  std::string speed_unit_ = {};
   std::vector<catalogue::Parameter> parameters_ = {};
-  std::vector<catalogue::Parameter> inputs_ = {};
-  modbus::RegisterAddress command_register_ = {};
+  std::vector<catalogue::Parameter> proof_ = {};  ///< of a standstill
 };
 
-/// Stops one motor, as gently as it was asked to, and harder when that does not help.
-///
-/// A word that decelerates in one input mode starts the motor in another, and a mode that was
-/// written but not configured yet can not be told from one that counts. So the words of a mode are
-/// used only for a motor that was seen to run by a word of that mode; else words that stop in every
-/// mode. Where the inputs of a driver can be assigned, a word with any bit is used only for a motor
-/// that this program started or that was seen to run, and while it is known what the bits do; else
-/// the word without any bit, which no assignment takes for a start.
-class MotorStopper {
- public:
-  MotorStopper(const Motor& motor, catalogue::StopMode mode) : motor_(&motor), mode_(mode) {}
-
-  /// The word of the profile and the input mode by which the motor was started, and what the bits
-  /// of this driver do; not trusted until seen to run.
-  void started(std::uint16_t word, std::int64_t mode, const catalogue::CommandBits& bits,
-               Duration stopping);
-  void seen_running() { seen_running_ = true; }
-
-  /// Reads how a motor runs that another program started, before the first word. A stop does not
-  /// wait for it: an answer that does not come soon ends it, and what is not known is not needed.
-  void observe(Device& device);
-
-  /// Sends a stop and waits for nothing but its acknowledgement.
-  Result<void> send(Device& device) const { return motor_->command(device, word()); }
-
-  /// Sends a stop and waits until the motor stands still; when it does not in the time that it
-  /// needs, the next call brakes. May be repeated without harm.
-  Result<StopResult> stop(Device& device, Clock& clock);
-
-  /// How long the motor may need to stand still.
-  [[nodiscard]] Duration stopping() const { return stopping_; }
-
- private:
-  [[nodiscard]] std::uint16_t word() const;
-  [[nodiscard]] std::uint16_t standard_word() const;
-  void observe_run(Device& device);
-  void read_stopping(Device& device);
-  Result<StopResult> await_standstill(Device& device, Clock& clock, TimePoint deadline) const;
-
-  const Motor* motor_;
-  catalogue::StopMode mode_;
-  std::uint16_t started_by_ = 0;  ///< in bits of the profile
-  std::optional<std::int64_t> input_mode_ = std::nullopt;
-  std::optional<catalogue::CommandBits> bits_ = std::nullopt;
-  bool seen_running_ = false;
-  bool harder_ = false;  ///< the gentle stop did not help
-  bool knows_stopping_ = false;
-  Duration stopping_ = {};
-};
-
-/// A time of operation data as a duration; `fallback` when it can not be read.
+/// A time as a duration, in seconds with up to three decimals; `fallback` when it can not be read.
 Duration time_of(const Reading& reading, Duration fallback);
-
-/// The longest time that the profile allows for decelerating.
-Duration longest_stop(const catalogue::Profile& profile);
 
 }  // namespace spindle::device

@@ -16,7 +16,7 @@ namespace spindle::device {
 class MotorWatch {
  public:
   /// `polled` are values that are read anyhow: what is among them needs no turn.
-  MotorWatch(Motor motor, const std::vector<catalogue::Parameter>& polled);
+  MotorWatch(MotorMonitor motor, const std::vector<catalogue::Parameter>& polled);
 
   /// Reads the next piece, or nothing where all of it is among the polled values. Gives back what
   /// happened since it was read last, also on an earlier connection; at first there is nothing to
@@ -32,9 +32,10 @@ class MotorWatch {
  private:
   [[nodiscard]] const std::vector<catalogue::Parameter>& next_piece();
   Result<MotorState> look(Device& device) const;
+  [[nodiscard]] bool knows_running() const;
   [[nodiscard]] Result<MotorState> with(std::span<const Reading> readings);
 
-  Motor motor_;
+  MotorMonitor motor_;
   MotorState state_ = {};            ///< as seen last
   std::set<std::string> seen_ = {};  ///< parameters that were read at least once
   /// What one request can read each; the first one holds the alarm, where that needs a turn.

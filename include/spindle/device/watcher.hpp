@@ -85,7 +85,8 @@ enum class Reconnection : std::uint8_t { forever, never };
 struct WatchPlan {
   EventMode events = EventMode::push;
   std::vector<catalogue::Parameter> values = {};
-  std::optional<Motor> motor = std::nullopt;  ///< looked at between the values for what it does
+  std::optional<MotorMonitor> motor =
+      std::nullopt;  ///< looked at between the values for what it does
   Duration interval = std::chrono::milliseconds(200);  ///< from one poll to the next, above zero
   Samples samples = Samples::changes;
 };

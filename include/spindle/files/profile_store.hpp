@@ -37,7 +37,7 @@ class ProfileStore {
   [[nodiscard]] Result<catalogue::Profile> load(std::string_view name_or_file) const;
 
   /// The start state for the simulated tool (the file's YAML document `part: simulation`, or that
-  /// of the nearest file it extends). `bad_file` when there is none.
+  /// of the nearest file it extends); empty facts where there is none.
   [[nodiscard]] Result<catalogue::SimulationFacts> load_simulation(
       std::string_view name_or_file) const;
 

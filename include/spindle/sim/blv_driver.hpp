@@ -49,7 +49,13 @@ class BlvBus : public Server {
   virtual void power_cycle(std::uint8_t unit, TimePoint now) = 0;
 };
 
-/// Requires a profile with `run` and `refusals`.
+/// Devices of any profile: registers with limits, exceptions and start values; with the run model
+/// command-register also their motor. Over TCP there is one, which answers to any unit.
+std::unique_ptr<BlvBus> make_profile_bus(const catalogue::Profile& profile,
+                                         const catalogue::SimulationFacts& start,
+                                         const BlvOptions& options, const Bytes& identity);
+
+/// Requires a profile with the run model command-word.
 std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
                                      const catalogue::SimulationFacts& start,
                                      const BlvOptions& options);

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "spindle/device/motor.hpp"
-#include "spindle/device/run_guard.hpp"
+#include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
 
 namespace spindle::work {
@@ -18,9 +17,8 @@ bool leaves_open(const Result<device::StopResult>& stopped);
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Environment& environment);
 
-/// Tells every motor on the line to stop, more than once, as none of them acknowledges it. Which
-/// bit starts what on each of them can not be asked.
-Result<void> broadcast_stop(device::Device& device, const device::Motor& motor,
+/// Tells every motor on the line to stop, more than once, as none of them acknowledges it.
+Result<void> broadcast_stop(device::Device& device, const device::RunModel& model,
                             catalogue::StopMode mode);
 
 }  // namespace spindle::work

@@ -1,4 +1,4 @@
-#include "tool_setup.hpp"
+#include "start_action_setup.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,16 +8,11 @@
 
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
-#include "stops.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using catalogue::Action;
-using catalogue::Profile;
-
-constexpr std::string_view select_preset = "select-preset";
-constexpr std::string_view direction = "direction";
 
 /// Whether the action can be sent with this value.
 bool takes(const Action& action, std::int64_t value) {
@@ -42,37 +37,11 @@ std::string last_words(const std::string& name) {
 
 }  // namespace
 
-Result<ToolPlan> plan_tool(const RemoteStartOptions& options, const Profile& profile,
-                           const Target& target) {
-  auto start = find_start(profile);
-  if (!start) return tl::unexpected(std::move(start.error()));
-  if (!profile.events || start->confirm.empty()) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "a run of this product can not be followed",
-                                .hint = "its profile lacks 'events', or 'confirm' of its start",
-                                .name = profile.id});
-  }
-  auto alarm_reset = profile.find_action("alarm-reset");
-  if (!alarm_reset) return tl::unexpected(std::move(alarm_reset.error()));
-  ToolPlan plan{.selections = {}, .start = *start, .alarm_reset = std::move(*alarm_reset)};
-  for (const auto& [name, value] :
-       {std::pair(select_preset, &options.preset), std::pair(direction, &options.direction)}) {
-    if (value->empty()) continue;
-    auto request = parse_action(fmt::format("{}={}", name, *value), profile);
-    if (!request) return tl::unexpected(std::move(request.error()));
-    auto allowed = check_evidence(request->action, target, options.acceptance);
-    if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    plan.selections.push_back(std::move(*request));
-  }
-  return check_evidence(plan.start, target, options.acceptance).map([&] {
-    return std::move(plan);
-  });
-}
-
-Result<void> ToolSetup::look() {
+Result<void> StartActionSetup::look() {
   device::Device& device = tool_->device;
-  const Action& reset = plan_->alarm_reset;
-  const auto alarm_free = device.shows(reset.confirm, reset.confirm_value.value_or(0));
+  const std::string& alarm = plan_->facts.alarm;
+  const Result<device::Shown> alarm_free =
+      alarm.empty() ? device::Shown::yes : device.shows(alarm, 0);
   if (!alarm_free) return tl::unexpected(alarm_free.error());
   if (*alarm_free == device::Shown::no) {
     return tl::unexpected(not_ready(tool_->target, "the tool has an alarm, so it was not started",
@@ -96,7 +65,7 @@ Result<void> ToolSetup::look() {
 }
 
 /// Empty where the tool does not say.
-Result<std::optional<catalogue::Value>> ToolSetup::shown_by(const Action& action) {
+Result<std::optional<catalogue::Value>> StartActionSetup::shown_by(const Action& action) {
   if (action.confirm.empty()) return std::nullopt;
   const auto parameter = tool_->profile->find(action.confirm);
   if (!parameter) return tl::unexpected(parameter.error());
@@ -106,10 +75,10 @@ Result<std::optional<catalogue::Value>> ToolSetup::shown_by(const Action& action
   return *readings->front().value;
 }
 
-Result<std::string> ToolSetup::describe() {
+Result<std::string> StartActionSetup::describe() {
   std::vector<std::string> words;
-  for (const std::string_view action : {select_preset, direction}) {
-    auto described = describe(action);
+  for (const catalogue::StartOption& option : plan_->facts.selections) {
+    auto described = describe(option.action);
     if (!described) return tl::unexpected(std::move(described.error()));
     if (*described) words.push_back(std::move(**described));
   }
@@ -117,7 +86,7 @@ Result<std::string> ToolSetup::describe() {
 }
 
 /// What was asked for of it, else what the tool shows; empty where it has no such action.
-Result<std::optional<std::string>> ToolSetup::describe(std::string_view name) {
+Result<std::optional<std::string>> StartActionSetup::describe(std::string_view name) {
   const auto known = tool_->profile->find_action(name);
   if (!known) return std::nullopt;
   const auto selected =
@@ -130,7 +99,7 @@ Result<std::optional<std::string>> ToolSetup::describe(std::string_view name) {
   return describe_value({.action = *known, .value = (*shown)->number.mantissa()});
 }
 
-Result<std::string> ToolSetup::describe_value(const ActionRequest& request) {
+Result<std::string> StartActionSetup::describe_value(const ActionRequest& request) {
   const std::string value = value_words(request.action, request.value);
   std::string words = request.action.labels.empty()
                           ? fmt::format("{} {}", last_words(request.action.confirm), value)
@@ -149,7 +118,7 @@ Result<std::string> ToolSetup::describe_value(const ActionRequest& request) {
                      unit_lacks ? ", unit not known" : unit);
 }
 
-Result<void> ToolSetup::select() {
+Result<void> StartActionSetup::select() {
   for (Selected& selected : selected_) {
     const ActionRequest& request = selected.request;
     selected.tried = true;
@@ -162,7 +131,7 @@ Result<void> ToolSetup::select() {
   return {};
 }
 
-std::vector<Left> ToolSetup::put_back() {
+std::vector<Left> StartActionSetup::put_back() {
   std::vector<Left> left;
   for (auto selected = selected_.rbegin(); selected != selected_.rend(); ++selected) {
     const auto& [request, before, tried] = *selected;
@@ -191,7 +160,7 @@ std::vector<Left> ToolSetup::put_back() {
   return left;
 }
 
-std::vector<Left> ToolSetup::left() const {
+std::vector<Left> StartActionSetup::left() const {
   std::vector<Left> left;
   for (const Selected& selected : selected_) {
     if (!selected.tried || selected.before == selected.request.value) continue;
@@ -200,7 +169,7 @@ std::vector<Left> ToolSetup::left() const {
   return left;
 }
 
-Left ToolSetup::left_of(const Selected& selected, std::string trouble) {
+Left StartActionSetup::left_of(const Selected& selected, std::string trouble) {
   const Action& action = selected.request.action;
   return {.name = action.name,
           .set = value_words(action, selected.request.value),

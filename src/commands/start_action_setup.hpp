@@ -14,22 +14,19 @@
 
 namespace spindle::commands {
 
-/// Everything about the run of a tool with events that is decided before it is touched.
-struct ToolPlan {
-  std::vector<ActionRequest> selections;  ///< preset and direction, as far as they were given
+/// Everything about the run of such a tool that is decided before it is touched.
+struct StartActionPlan {
+  catalogue::StartActionFacts facts;
+  std::vector<ActionRequest> selections;  ///< what may be selected before, as far as it was given
   catalogue::Action start;
-  catalogue::Action alarm_reset;  ///< its confirming parameter tells whether there is an alarm
 };
 
-/// Errors name the option or the action that is wrong, or what the product lacks.
-Result<ToolPlan> plan_tool(const RemoteStartOptions& options, const catalogue::Profile& profile,
-                           const Target& target);
-
 /// What a tool is set to before it is started, and what of it is set back afterwards.
-class ToolSetup {
+class StartActionSetup {
  public:
   /// All must outlive it.
-  ToolSetup(const ToolPlan& plan, OpenTool& tool, Context& context, work::ChangeLog& log)
+  StartActionSetup(const StartActionPlan& plan, OpenTool& tool, Context& context,
+                   work::ChangeLog& log)
       : plan_(&plan), tool_(&tool), context_(&context), log_(&log), calm_line_(tool, context) {}
 
   /// Checks that the tool has no alarm and stands still (whether it is locked can not be read on
@@ -63,7 +60,7 @@ class ToolSetup {
   Result<std::string> describe_value(const ActionRequest& request);
   [[nodiscard]] static Left left_of(const Selected& selected, std::string trouble);
 
-  const ToolPlan* plan_;
+  const StartActionPlan* plan_;
   OpenTool* tool_;
   Context* context_;
   work::ChangeLog* log_;

@@ -1,0 +1,118 @@
+#include "run.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "change_log.hpp"
+#include "command_register_run.hpp"
+#include "command_word_run.hpp"
+#include "start_action_run.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Profile;
+
+/// The options of a start that only some models have, and whether each was given.
+std::vector<std::pair<std::string_view, bool>> given_options(const RemoteStartOptions& options) {
+  return {{"--preset", !options.preset.empty()},
+          {"--direction", !options.direction.empty()},
+          {"--speed", !options.speed.empty()},
+          {"--reverse", options.direction_of_motor == catalogue::Direction::reverse},
+          {"--operation", options.operation.has_value()},
+          {"--acceleration", !options.acceleration.empty()},
+          {"--deceleration", !options.deceleration.empty()},
+          {"--watchdog", options.watchdog.has_value()},
+          {"--stop", options.stop.has_value()}};
+}
+
+Result<void> check_options(const RemoteStartOptions& options, const Profile& profile) {
+  const std::vector<std::string> declared = start_options(profile);
+  for (const auto& [option, is_given] : given_options(options)) {
+    const bool is_known = std::find(declared.begin(), declared.end(), option) != declared.end();
+    if (!is_given || is_known) continue;
+    return tl::unexpected(
+        bad_option(option,
+                   fmt::format("{} is run by the model {}, which has no such option", profile.id,
+                               catalogue::to_text(profile.run->kind())),
+                   fmt::format("it takes {}", fmt::join(declared, ", "))));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> start_options(const Profile& profile) {
+  std::vector<std::string> options;
+  if (!profile.run) return options;
+  if (const auto* action = profile.run->action()) {
+    for (const auto& selection : action->selections) {
+      options.push_back(fmt::format("--{}", selection.option));
+    }
+  }
+  if (const auto* word = profile.run->word()) {
+    options = {"--speed", "--reverse", "--operation", "--acceleration", "--deceleration", "--stop"};
+    if (!word->watchdog.empty()) options.emplace_back("--watchdog");
+  }
+  if (const auto* values = profile.run->command_register()) {
+    if (!values->set_point.empty()) options.emplace_back("--speed");
+    if (values->reverse) options.emplace_back("--reverse");
+    if (values->instant) options.emplace_back("--stop");
+  }
+  options.emplace_back("--for");
+  return options;
+}
+
+ToolRun::ToolRun(OpenTool& tool, Context& context)
+    : tool_(&tool), context_(&context), log_(change_log("remote-start", tool, context)) {}
+
+Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options, const Profile& profile,
+                                          const Target& target) {
+  const auto model = device::RunModel::of(profile);
+  if (!model) return tl::unexpected(model.error());
+  if (auto known = check_options(options, profile); !known) return tl::unexpected(known.error());
+  switch (profile.run->kind()) {
+    case catalogue::RunKind::start_action:
+      return plan_start_action(options, profile, target);
+    case catalogue::RunKind::command_word:
+      return plan_command_word(options, profile, target);
+    case catalogue::RunKind::command_register:
+      break;
+  }
+  return plan_command_register(options, profile, target);
+}
+
+Result<Outcome> run_guarded(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
+                            Context& context) {
+  GuardedRun guarded(tool, context);
+  if (auto guardian = guarded.set_guardian(run.settings_in_words(), mode); !guardian) {
+    return tl::unexpected(std::move(guardian.error()));
+  }
+  if (auto ready = run.prepare(); !ready) {
+    return tl::unexpected(with_left(std::move(ready.error()), run.put_back()));
+  }
+  Listing listing(context, run.columns());
+  work::LoggedChange started = run.start_change();
+  const std::string id = run.log().begin(started);
+  auto [followed, stop] = guarded.run(
+      run.motion(), [&] { run.begin(guarded, listing); }, [&] { return run.follow(); });
+  run.look_back(followed, stop);
+  const bool stands = stop.result == device::StopResult::confirmed;
+  guarded.leave(stands ? run.put_back() : run.left());
+  const RunEnd end = run.judge(followed);
+  started.result = log_word(end.logged, stop);
+  run.log().end(id, started);
+  return guarded.end(listing, stop, end);
+}
+
+Error bad_option(std::string_view option, std::string message, std::string hint) {
+  return {.code = Errc::usage,
+          .message = std::move(message),
+          .hint = std::move(hint),
+          .name = std::string(option)};
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+
+#include "run.hpp"
+
+namespace spindle::commands {
+
+/// remote-start by the run model start-action. Errors name the option that is missing or wrong.
+Result<std::unique_ptr<RunPlan>> plan_start_action(const RemoteStartOptions& options,
+                                                   const catalogue::Profile& profile,
+                                                   const Target& target);
+
+}  // namespace spindle::commands

@@ -1,0 +1,112 @@
+#include "spindle/device/command_register.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "standstill.hpp"
+
+namespace spindle::device {
+namespace {
+
+using catalogue::CommandRegisterFacts;
+using catalogue::StopMode;
+
+/// What a reading before a stop may cost.
+constexpr Duration hurried_answer = std::chrono::milliseconds(200);
+
+}  // namespace
+
+CommandRegister::CommandRegister(const CommandRegisterFacts& facts, catalogue::Parameter command)
+    : facts_(facts), command_(std::move(command)) {}
+
+CommandRegister::CommandRegister(CommandRegister&& other) noexcept
+    : facts_(std::move(other.facts_)),
+      command_(std::move(other.command_)),
+      stop_(std::move(other.stop_)),
+      monitor_(std::move(other.monitor_)) {}
+
+Result<CommandRegister> CommandRegister::of(const catalogue::Profile& profile) {
+  const CommandRegisterFacts& facts = *profile.run->command_register();
+  auto command = profile.find(facts.command);
+  if (!command) return tl::unexpected(std::move(command.error()));
+  CommandRegister model(facts, std::move(*command));
+  if (!facts.stop_register.empty()) {
+    auto stop = profile.find(facts.stop_register);
+    if (!stop) return tl::unexpected(std::move(stop.error()));
+    model.stop_ = std::move(*stop);
+  }
+  const catalogue::MonitorFacts& monitor = facts.monitor;
+  if (monitor.status.empty() && monitor.command_speed.empty() && monitor.feedback_speed.empty()) {
+    return model;
+  }
+  auto made = MotorMonitor::of(monitor, profile);
+  if (!made) return tl::unexpected(std::move(made.error()));
+  model.monitor_ = std::move(*made);
+  return model;
+}
+
+std::unique_ptr<Stopper> CommandRegister::stopper(StopMode mode) const {
+  return std::make_unique<CommandRegisterStopper>(*this, mode);
+}
+
+std::uint32_t CommandRegister::enabling_bit() const {
+  const catalogue::EnableFacts& enable = facts_.enable;
+  return enable.bit && enable.parameter == facts_.command ? std::uint32_t{1} << *enable.bit : 0;
+}
+
+std::optional<std::uint32_t> CommandRegister::stop_value(StopMode mode) const {
+  return mode == StopMode::instant && facts_.instant ? facts_.instant : facts_.stop;
+}
+
+Result<void> CommandRegister::command(Device& device, std::uint32_t value) const {
+  return device.send(command_, Decimal(value));
+}
+
+/// One that fails keeps the other one from nothing.
+Result<void> CommandRegister::send_stop(Device& device, StopMode mode,
+                                        std::uint32_t enabling) const {
+  Result<void> sent;
+  if (stop_) sent = device.send(*stop_, Decimal(facts_.stop_value));
+  const auto value = stop_value(mode);
+  if (!value) return sent;
+  auto commanded = command(device, *value | enabling);
+  return sent ? commanded : sent;
+}
+
+Result<void> CommandRegister::broadcast_stop(Device& device, StopMode mode) const {
+  Result<void> sent;
+  if (stop_) sent = device.broadcast(*stop_, {Decimal(facts_.stop_value), {}});
+  const auto value = stop_value(mode);
+  if (!sent || !value) return sent;
+  return device.broadcast(command_, {Decimal(*value), {}});
+}
+
+void CommandRegisterStopper::observe(Device& device) {
+  if (model_->enabling_bit() == 0) return;
+  link::Session& session = device.session();
+  const Duration patience = session.options().answer_timeout;
+  session.set_answer_timeout(std::min(patience, hurried_answer));
+  const auto readings = device.read_each({model_->command_parameter()}, Limits::skip);
+  session.set_answer_timeout(patience);
+  if (!readings || !readings->front().value) return;
+  const auto value = static_cast<std::uint32_t>(readings->front().value->number.mantissa());
+  enabling_ = value & model_->enabling_bit();
+}
+
+Result<void> CommandRegisterStopper::send(Device& device) {
+  return model_->send_stop(device, mode_, enabling_);
+}
+
+Result<StopResult> CommandRegisterStopper::stop(Device& device, Clock& clock) {
+  auto sent = send(device);
+  if (!sent) return tl::unexpected(std::move(sent.error()));
+  const MotorMonitor* monitor = model_->monitor();
+  if (monitor == nullptr) return StopResult::sent;
+  const TimePoint deadline =
+      clock.now() + model_->facts().stopping + device.session().options().answer_timeout;
+  auto stopped = await_standstill(*monitor, device, clock, deadline);
+  if (stopped == StopResult::unconfirmed) mode_ = StopMode::instant;  // the gentle one did not help
+  return stopped;
+}
+
+}  // namespace spindle::device
