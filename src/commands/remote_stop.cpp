@@ -33,7 +33,7 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
     const auto profile = load_profile(targets[index], context);
     if (!profile) continue;  // told when its turn comes, as all that fails here
     const auto model = device::RunModel::of(*profile);
-    if (!model) continue;
+    if (!model || !device::has_motor(*profile)) continue;
     Context hurried = context;
     hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / haste;
     hurried.common.retries = 0;
@@ -107,16 +107,27 @@ std::optional<Error> fault_of_file(const RemoteStopOptions& options, const Conte
   return std::nullopt;
 }
 
-Summary summary_of(const Outcome& outcome, Reach reach) {
+/// `unproven`: so many were acknowledged, and nothing that can be read proves them.
+Summary summary_of(const Outcome& outcome, Reach reach, std::size_t unproven) {
   const bool everybody = reach == Reach::everybody;
-  return {.counts = {{everybody ? "sent" : "stopped", count(outcome.succeeded())},
-                     {"failed", count(outcome.failed())}},
-          .sentence =
-              fmt::format("{} {}, {} failed{}", outcome.succeeded(),
-                          everybody ? "sent, not acknowledged" : "stopped", outcome.failed(),
-                          outcome.failed() == 0
-                              ? ""
-                              : "; what could not be stopped may still run: stop it at the tool")};
+  const std::size_t stopped = everybody ? 0 : outcome.succeeded() - unproven;
+  const std::size_t sent = everybody ? outcome.succeeded() : unproven;
+  Summary summary;
+  std::string words;
+  if (!everybody) {
+    summary.counts.push_back({"stopped", count(stopped)});
+    words = fmt::format("{} stopped, ", stopped);
+  }
+  if (sent > 0 || everybody) {
+    summary.counts.push_back({"sent", count(sent)});
+    words += fmt::format("{} sent, not {}, ", sent, everybody ? "acknowledged" : "confirmed");
+  }
+  summary.counts.push_back({"failed", count(outcome.failed())});
+  const bool has_failed = outcome.failed() > 0;
+  summary.sentence = fmt::format(
+      "{}{} failed{}", words, outcome.failed(),
+      has_failed ? "; what could not be stopped may still run: stop it at the tool" : "");
+  return summary;
 }
 
 }  // namespace
@@ -143,6 +154,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   if (auto fault = fault_of_file(options, context)) faults.push_back(std::move(*fault));
   Outcome outcome;
   Listing listing(context, stop_columns());
+  std::size_t unproven = 0;
   const auto fail = [&](const Error& error) {
     outcome.fail(error);
     listing.add(error);
@@ -150,11 +162,12 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   for (std::size_t index = 0; index < pursuits.size(); ++index) {
     const Result<device::StopResult> result = pursuits[index]->result();
     if (result) listing.add(stop_record(*result, targets[index], context.clock));
+    if (result == device::StopResult::sent) ++unproven;
     const auto failure = failure_of(result, targets[index], pursuits[index]->profile());
     failure ? fail(*failure) : outcome.succeed();
   }
   std::for_each(faults.begin(), faults.end(), fail);
-  return finish(listing, outcome, summary_of(outcome, options.reach), context);
+  return finish(listing, outcome, summary_of(outcome, options.reach, unproven), context);
 }
 
 }  // namespace spindle::commands

@@ -148,7 +148,7 @@ Result<StopResult> StopPursuit::stop(device::Device& device, Clock& clock) {
 }
 
 Result<StopResult> StopPursuit::send_stop(device::Device& device, Clock& clock) {
-  if (target_.reach == Reach::everybody) {
+  if (target_.reach == Reach::everybody && device::has_motor(*profile_)) {
     return broadcast_stop(device, *model_, mode_).map([] { return StopResult::sent; });
   }
   if (!std::exchange(was_observed_, true)) stopper_->observe(device);

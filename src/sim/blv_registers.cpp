@@ -159,6 +159,7 @@ void BlvRegisters::add(const catalogue::NumberedFacts& facts) {
 
 void BlvRegisters::begin(const catalogue::Parameter& parameter) {
   const Place& place = places_.at(parameter.name);
+  if (place.writable && !place.stored) return;  // no command is given at first
   const auto value = steps_of(parameter.default_value, parameter.encoding.scale);
   const std::int64_t number = value.value_or(place.minimum.value_or(0));
   if (number != 0) set_number(place, number);

@@ -39,11 +39,17 @@ ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::Sim
   if (const auto* facts = profile.run->command_register()) run_ = *facts;
   if (auto reset = profile.find_action(profile.run->alarm_reset)) alarm_reset_ = std::move(*reset);
   if (!run_) return;
+  begin_stopped();
   for (const std::string* name :
        {&run_->command, &run_->stop_register, &run_->enable.parameter, &run_->set_point,
         &run_->monitor.command_speed, &run_->monitor.feedback_speed}) {
     if (auto parameter = profile.find(*name)) parameters_.push_back(std::move(*parameter));
   }
+}
+
+/// Where nothing else was said of the command.
+void ProfileUnit::begin_stopped() {
+  if (run_ && run_->stop && number(run_->command) == 0) registers_.set(run_->command, *run_->stop);
 }
 
 const Parameter* ProfileUnit::find(const std::string& name) const {
@@ -118,8 +124,9 @@ ProfileUnit::Refusal ProfileUnit::write(std::uint16_t first, RegisterView values
 }
 
 void ProfileUnit::act_on(const BlvRegisters::Cell& cell, std::uint32_t raw, TimePoint now) {
-  const bool resets = alarm_reset_ && alarm_reset_->address.value == cell.first &&
-                      alarm_reset_->value && *alarm_reset_->value == raw;
+  const unsigned end = unsigned{cell.first} + catalogue::register_count(cell.kind);
+  const bool resets = alarm_reset_ && alarm_reset_->address.value >= cell.first &&
+                      alarm_reset_->address.value < end && raw == alarm_reset_->value;
   if (resets && run_) {
     const std::int64_t present = registers_.get(run_->monitor.alarm);
     const bool stays = std::find(permanent_alarms_.begin(), permanent_alarms_.end(), present) !=
@@ -230,6 +237,7 @@ void ProfileUnit::power_cycle(TimePoint now) {
   registers_.restart();
   motor_.brake(now);
   stopped_ = false;
+  begin_stopped();
 }
 
 }  // namespace spindle::sim

@@ -39,6 +39,7 @@ class ProfileUnit final : public BusUnit {
   Refusal write(std::uint16_t first, RegisterView values, TimePoint now);
   void act_on(const BlvRegisters::Cell& cell, std::uint32_t raw, TimePoint now);
 
+  void begin_stopped();
   [[nodiscard]] bool is_enabled() const;
   [[nodiscard]] Wish wish() const;
   [[nodiscard]] std::int64_t wanted_speed() const;
