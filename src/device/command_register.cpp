@@ -62,22 +62,21 @@ Result<void> CommandRegister::command(Device& device, std::uint32_t value) const
   return device.send(command_, Decimal(value));
 }
 
-/// One that fails keeps the other one from nothing.
+/// The command is what holds the motor stopped, so its acknowledgement is the one that counts.
 Result<void> CommandRegister::send_stop(Device& device, StopMode mode,
                                         std::uint32_t enabling) const {
   Result<void> sent;
   if (stop_) sent = device.send(*stop_, Decimal(facts_.stop_value));
   const auto value = stop_value(mode);
   if (!value) return sent;
-  auto commanded = command(device, *value | enabling);
-  return sent ? commanded : sent;
+  return command(device, *value | enabling);
 }
 
 Result<void> CommandRegister::broadcast_stop(Device& device, StopMode mode) const {
   Result<void> sent;
   if (stop_) sent = device.broadcast(*stop_, {Decimal(facts_.stop_value), {}});
   const auto value = stop_value(mode);
-  if (!sent || !value) return sent;
+  if (!value) return sent;
   return device.broadcast(command_, {Decimal(*value), {}});
 }
 

@@ -59,7 +59,7 @@ struct Bench {
   }
 
   Interrupt never = Interrupt();
-  FakeClock clock = {};
+  test::FakeClock clock = {};
   catalogue::Profile profile;
   std::unique_ptr<sim::BlvBus> bus;
   sim::AnswerCounter answers = {};

@@ -97,6 +97,20 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
   CHECK(offered({}).candidates.size() == offered({""}).candidates.size());
 }
 
+TEST_CASE("complete: options are those that the profile declares") {
+  CHECK(has({"remote-start", "sim:doga-bm", "--"}, "--preset"));
+  CHECK_FALSE(has({"remote-start", "sim:doga-bm", "--"}, "--speed"));
+  CHECK(has({"remote-start", "sim:orientalmotor-blv", "--"}, "--watchdog"));
+  CHECK_FALSE(has({"remote-start", "sim:orientalmotor-blv", "--"}, "--direction"));
+  CHECK(has({"remote-start", "sim:doga-bm", "--"}, "--for"));
+  CHECK(has({"remote-start", "--"}, "--speed"));
+  CHECK(has({"simulate", "doga-bm", "--"}, "--rundown-every"));
+  CHECK_FALSE(has({"simulate", "doga-bm", "--"}, "--busy"));
+  CHECK(has({"simulate", "orientalmotor-blv", "--"}, "--busy"));
+  CHECK_FALSE(has({"simulate", "orientalmotor-blv", "--"}, "--firmware"));
+  CHECK(has({"simulate", "orientalmotor-blv", "--"}, "--units"));
+}
+
 TEST_CASE("complete: a group is offered where several tools make sense") {
   for (const char* command :
        {"identify", "get", "set", "do", "watch", "remote-stop", "alarms", "backup", "ping"}) {

@@ -44,6 +44,7 @@ Profile machine() {
                      action("lock", 50, Hazard::locks), action("look", 12, Hazard::none)};
   profile.actions[0].stop_value = 0;
   profile.actions[1].rest = 0;
+  profile.run.emplace().model = StartActionFacts{.start = "start"};
   return profile;
 }
 
@@ -107,6 +108,27 @@ TEST_CASE("no backup holds what is no setting") {
   CHECK(contains(names, "speed"));
   CHECK(contains(names, "p11"));
   CHECK(stored.size() == 40 - 3);
+}
+
+TEST_CASE("a guarded start is proposed only where the profile has a run model") {
+  Profile profile = machine();
+  const std::string guarded = danger_of(profile.parameters[0], profile)->remedy();
+  CHECK(guarded.find("remote-start") != std::string::npos);
+  profile.run->model = StartActionFacts{.start = "look"};
+  CHECK(danger_of(profile.parameters[0], profile)->remedy().empty());
+  profile.run.reset();
+  CHECK(danger_of(profile.parameters[0], profile)->remedy().empty());
+}
+
+TEST_CASE("every register that commands a motor is no setting") {
+  Profile profile;
+  profile.parameters = {parameter("go", 1), parameter("halt", 2), parameter("hold", 3),
+                        parameter("speed", 4)};
+  CommandRegisterFacts facts{.command = "go", .stop_register = "halt", .set_point = "speed"};
+  facts.enable.parameter = "hold";
+  profile.run.emplace().model = facts;
+  CHECK(names_of(stored_parameters(profile)) == std::vector<std::string>{"speed"});
+  CHECK(danger_of(profile.parameters[2], profile)->runs_motor);
 }
 
 TEST_CASE("the gravest hazard of a register counts") {

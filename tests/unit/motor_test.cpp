@@ -319,7 +319,7 @@ TEST_CASE("following tells what happens, and why it is over") {
   SUBCASE("over before it could be looked at") {
     bench.write(command, 0x2A);
     options.deadline = bench.clock.now();
-    const auto followed = follow_motor(device, motor, stopper, options);
+    const auto followed = follow_motor(device, *motor.monitor(), stopper, options);
     REQUIRE_FALSE(followed);
     CHECK(followed.error().code == Errc::negative);
     CHECK(news.empty());
