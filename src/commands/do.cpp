@@ -19,15 +19,17 @@ using catalogue::Hazard;
 using catalogue::Profile;
 
 /// A started motion needs somebody who stops it again, and this command ends at once.
-Result<void> check_guard(const ActionRequest& request) {
+Result<void> check_guard(const ActionRequest& request, const Profile& profile) {
   const bool starts = request.action.motion == catalogue::Motion::start ||
                       (request.action.stop_value && request.value != *request.action.stop_value);
   if (request.action.hazard != Hazard::moves || !starts) return {};
-  return tl::unexpected(
-      Error{.code = Errc::usage,
-            .message = "it starts a motion, and 'do' does not stay to stop it",
-            .hint = "'spindle remote-start' starts it under a guard that always ends in a stop",
-            .name = request.action.name});
+  return tl::unexpected(Error{
+      .code = Errc::usage,
+      .message = "it starts a motion, and 'do' does not stay to stop it",
+      .hint = profile.is_guarded_start(request.action.name)
+                  ? "'spindle remote-start' starts it under a guard that always ends in a stop"
+                  : "",
+      .name = request.action.name});
 }
 
 Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const Profile& profile,
@@ -36,8 +38,9 @@ Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const P
   for (const std::string& text : options.actions) {
     auto request = parse_action(text, profile);
     if (!request) return tl::unexpected(std::move(request.error()));
-    auto allowed = check_guard(*request).and_then(
-        [&] { return check_evidence(request->action, target, options.acceptance); });
+    auto allowed = check_guard(*request, profile).and_then([&] {
+      return check_evidence(request->action, target, options.acceptance);
+    });
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
     requests.push_back(std::move(*request));
   }
