@@ -119,7 +119,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
       {.clock = world.clock,
        .interrupt = world.interrupt,
        .open = world.open,
-       .calm = world.calm,
+       .uninterruptible = world.uninterruptible,
        .disk = world.disk,
        .state_folder = state,
        .version = version,

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <utility>
 #include <variant>
 
+#include "backup_paths.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
@@ -21,57 +21,9 @@ using catalogue::Missing;
 using report::Align;
 using report::Column;
 
-constexpr std::string_view standard_output = "-";
-
 const std::array<Column, 3> columns = {{{"FILE", "file"},
                                         {"PARAMETERS", "parameters", Align::right},
                                         {"MISSING", "missing", Align::right}}};
-
-Error bad_request(std::string message, std::string hint = {}) {
-  return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
-}
-
-/// Where the backup of each target goes, by the target's name.
-using Paths = std::map<std::string, std::string>;
-
-std::string path_of(const Target& target, const BackupOptions& options) {
-  if (!options.file.empty()) return options.file;
-  const std::string name = file_name_of(target.shown) + ".yaml";
-  return options.folder.empty() ? name : fmt::format("{}/{}", options.folder, name);
-}
-
-/// All that can be known to be wrong before a tool is asked.
-Result<Paths> check_paths(const std::vector<Target>& targets, const BackupOptions& options,
-                          const Context& context) {
-  if (!options.file.empty() && !options.folder.empty()) {
-    return tl::unexpected(bad_request("--file and --dir exclude each other", "give one of them"));
-  }
-  if (!options.file.empty() && targets.size() > 1) {
-    return tl::unexpected(
-        bad_request(fmt::format("{} tools do not fit into one file", targets.size()),
-                    "--dir FOLDER writes one file a tool"));
-  }
-  Paths paths;
-  std::map<std::string, std::string> owners;
-  for (const Target& target : targets) {
-    std::string path = path_of(target, options);
-    const auto [owner, is_new] = owners.emplace(path, target.shown);
-    if (!is_new) {
-      return tl::unexpected(bad_request(fmt::format("'{}' and '{}' would both be written to {}",
-                                                    owner->second, target.shown, path),
-                                        "back them up one by one, each into a --file of its own"));
-    }
-    const bool taken = path != standard_output && context.disk.exists(path);
-    if (taken && options.overwrite == Overwrite::refuse) {
-      Error error = bad_request("this file exists already",
-                                "choose another name, or add --force to replace it");
-      error.name = path;
-      return tl::unexpected(std::move(error));
-    }
-    paths.emplace(target.shown, std::move(path));
-  }
-  return paths;
-}
 
 /// A profile that can not be read is told before a tool is asked.
 Result<void> check_profiles(const std::vector<Target>& targets, const Context& context) {
@@ -111,7 +63,8 @@ struct Saved {
 /// What it refers to does not change while it runs.
 class Backup final : public Verb<std::monostate, Saved> {
  public:
-  Backup(const BackupOptions& options, const Paths& paths) : options_(&options), paths_(&paths) {}
+  Backup(const BackupOptions& options, const BackupPaths& paths)
+      : options_(&options), paths_(&paths) {}
 
   Result<Plan> plan(const catalogue::Profile& /*profile*/,
                     const Target& /*target*/) const override {
@@ -191,7 +144,7 @@ class Backup final : public Verb<std::monostate, Saved> {
   }
 
   const BackupOptions* options_;
-  const Paths* paths_;
+  const BackupPaths* paths_;
 };
 
 }  // namespace
@@ -199,7 +152,7 @@ class Backup final : public Verb<std::monostate, Saved> {
 Result<Outcome> backup(const BackupOptions& options, Context& context) {
   auto tools = resolve_compatible_targets(options.targets, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
-  const auto paths = check_paths(*tools, options, context);
+  const auto paths = choose_paths(*tools, options, context);
   if (!paths) return tl::unexpected(paths.error());
   if (auto known = check_profiles(*tools, context); !known) return tl::unexpected(known.error());
   if (!options.folder.empty()) {

@@ -132,12 +132,13 @@ Result<void> check_model(const Profile& profile, const Target& target, Acceptanc
   const bool is_weak = profile.run->evidence == catalogue::Evidence::sibling ||
                        profile.run->evidence == catalogue::Evidence::inferred;
   if (!is_weak || acceptance == Acceptance::unverified) return {};
-  return tl::unexpected(target.blamed(
+  return tl::unexpected(with_target(
       {.code = Errc::unverified,
        .message = fmt::format("it is not certain that these commands run this tool: evidence {} "
                               "({})",
                               catalogue::to_text(profile.run->evidence), profile.run->source),
-       .hint = "try it where nothing can be hurt; then add --accept-unverified"}));
+       .hint = "try it where nothing can be hurt; then add --accept-unverified"},
+      target));
 }
 
 Result<RegisterPlan> make_plan(const RemoteStartOptions& options, const Profile& profile) {

@@ -73,12 +73,14 @@ Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context&
   if (!again) return tl::unexpected(std::move(again.error()));
   const auto now = again->device.identity();
   if (identity && now && identity->serial != now->serial) {
-    return tl::unexpected(tool.target.blamed(
-        {.code = Errc::mismatch,
-         .message = fmt::format("another tool answers now: serial {}, and it was {} before the "
-                                "question",
-                                now->serial, identity->serial),
-         .hint = "nothing was done"}));
+    return tl::unexpected(with_target(
+        Error{
+            .code = Errc::mismatch,
+            .message = fmt::format("another tool answers now: serial {}, and it was {} before the "
+                                   "question",
+                                   now->serial, identity->serial),
+            .hint = "nothing was done"},
+        tool.target));
   }
   again->target = tool.target;
   tool = std::move(*again);

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "diff_side.hpp"
 #include "listing.hpp"
-#include "progress.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
@@ -23,94 +23,15 @@ using catalogue::Snapshot;
 using report::Align;
 using report::Column;
 
-constexpr std::string_view defaults = "defaults";
-
 const std::array<Column, 5> columns = {{{"NAME", "name"},
                                         {"REGISTER", "register", Align::right},
                                         {"A", "a", Align::right},
                                         {"B", "b", Align::right},
                                         {"UNIT", "unit"}}};
 
-/// One side of a comparison before it is read.
-struct Side {
-  std::string text;
-  std::optional<Target> target = std::nullopt;
-  std::optional<files::BackupFile> file = std::nullopt;
-
-  [[nodiscard]] bool is_defaults() const { return text == defaults; }
-};
-
-bool is_file(const std::string& text, const Context& context) {
-  if (is_target(text, context)) return false;
-  return text.find('/') != std::string::npos || text.ends_with(".yaml") ||
-         context.disk.exists(text);
-}
-
-Result<Side> understand(const std::string& text, const Context& context) {
-  Side side{.text = text};
-  if (side.is_defaults()) return side;
-  if (is_file(text, context)) {
-    auto file = read_backup_file(text, context);
-    if (!file) return tl::unexpected(std::move(file.error()));
-    side.file = std::move(*file);
-    return side;
-  }
-  auto target = resolve_target(text, context,
-                               {.why = "each side of a comparison is one",
-                                .instead = "compare them one by one, beginning with"});
-  if (!target) return tl::unexpected(std::move(target.error()));
-  side.target = std::move(*target);
-  return side;
-}
-
-/// Profile that a side names without being asked; empty when it is not known yet.
-std::string profile_of(const Side& side, const Context& context) {
-  if (!context.common.profile.empty()) return context.common.profile;
-  if (side.file) return side.file->head.profile;
-  return side.target ? side.target->profile : std::string();
-}
-
-/// What a side holds, and the profile by which it was read.
-struct Content {
-  Snapshot snapshot;
-  std::vector<Error> unreadable = {};
-  Profile profile = {};
-};
-
-Result<Content> read_tool(const Side& side, const Context& context) {
-  auto profile = load_profile(*side.target, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tool = open_tool(*side.target, std::move(*profile), Need::named_registers, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
-  ProgressLine progress(context);
-  auto taken =
-      take_snapshot(*tool, Secrets::include, context, progress.counter(side.text + ": reading"));
-  if (!taken) return tl::unexpected(std::move(taken.error()));
-  return Content{std::move(taken->snapshot), std::move(taken->unreadable), tool->device.profile()};
-}
-
-Result<Content> read_file(const Side& side, const Context& context) {
-  auto profile = context.profiles.load(profile_of(side, context));
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto snapshot = files::understand_backup(*side.file, *profile);
-  if (!snapshot) return tl::unexpected(std::move(snapshot.error()));
-  return Content{std::move(*snapshot), {}, std::move(*profile)};
-}
-
-Result<Content> read_side(const Side& side, const Context& context) {
-  return side.file ? read_file(side, context) : read_tool(side, context);
-}
-
-Result<Content> read_defaults(const Profile& profile) {
-  Content content{.snapshot = catalogue::snapshot_of_defaults(profile), .profile = profile};
-  if (!content.snapshot.entries.empty()) return content;
-  return tl::unexpected(Error{.code = Errc::usage,
-                              .message = fmt::format("profile {} knows no defaults", profile.id),
-                              .hint = "compare with a backup of a tool that is set right"});
-}
-
 /// Patterns are checked as early as they can be: before a tool is asked where its profile is known.
-Result<void> check_patterns(const Side& side, const DiffOptions& options, const Context& context) {
+Result<void> check_patterns(const DiffSide& side, const DiffOptions& options,
+                            const Context& context) {
   const std::string id = profile_of(side, context);
   if (id.empty()) return {};
   const auto profile = context.profiles.load(id);
@@ -118,10 +39,10 @@ Result<void> check_patterns(const Side& side, const DiffOptions& options, const 
   return Selection::make(options.patterns, options.ignored, *profile).map([](const Selection&) {});
 }
 
-using Contents = std::pair<Content, Content>;
+using Contents = std::pair<SideContent, SideContent>;
 
-Result<Contents> read_sides(const Side& a, const Side& b, const Context& context) {
-  const Side& first = a.is_defaults() ? b : a;
+Result<Contents> read_sides(const DiffSide& a, const DiffSide& b, const Context& context) {
+  const DiffSide& first = a.is_defaults() ? b : a;
   auto read = read_side(first, context);
   if (!read) return tl::unexpected(std::move(read.error()));
   const bool with_defaults = a.is_defaults() || b.is_defaults();
@@ -173,7 +94,7 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
   }
   outcome.succeed();
   if (!comparison.differences.empty()) outcome.negate();
-  for (const Content* content : {&contents.first, &contents.second}) {
+  for (const SideContent* content : {&contents.first, &contents.second}) {
     for (const Error& error : content->unreadable) {
       outcome.fail(error);
       listing.add(error);
@@ -191,16 +112,16 @@ Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& co
 }  // namespace
 
 Result<Outcome> diff(const DiffOptions& options, Context& context) {
-  if (options.a == defaults && options.b == defaults) {
+  if (options.a == factory_defaults && options.b == factory_defaults) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "one side must be a tool or a backup",
                                 .hint = "write for example 'spindle diff station3 defaults'"});
   }
-  const auto a = understand(options.a, context);
+  const auto a = resolve_side(options.a, context);
   if (!a) return tl::unexpected(a.error());
-  const auto b = understand(options.b, context);
+  const auto b = resolve_side(options.b, context);
   if (!b) return tl::unexpected(b.error());
-  for (const Side* side : {&*a, &*b}) {
+  for (const DiffSide* side : {&*a, &*b}) {
     if (auto checked = check_patterns(*side, options, context); !checked) {
       return tl::unexpected(std::move(checked.error()));
     }
@@ -214,7 +135,7 @@ Result<Outcome> diff(const DiffOptions& options, Context& context) {
   const auto comparison =
       catalogue::compare(contents->first.snapshot, contents->second.snapshot, *selection,
                          with_defaults ? Lacking::is_not_compared : Lacking::differs);
-  const Side& tool = a->target ? *a : *b;
+  const DiffSide& tool = a->target ? *a : *b;
   return tell(comparison, *contents, tool.target ? tool.text : std::string(), context);
 }
 

@@ -47,25 +47,26 @@ std::string log_word(std::string_view result, const device::StopReport& stop) {
 }
 
 Error not_ready(const Target& target, std::string message, std::string hint) {
-  return target.blamed(
-      {.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)});
+  return with_target(
+      Error{.code = Errc::negative, .message = std::move(message), .hint = std::move(hint)},
+      target);
 }
 
 GuardedRun::GuardedRun(OpenTool& tool, Context& context)
-    : tool_(&tool), context_(&context), progress_(context), calm_line_(tool, context) {}
+    : tool_(&tool), context_(&context), progress_(context), uninterruptible_line_(tool, context) {}
 
 Result<void> GuardedRun::set_guardian(std::string settings, catalogue::StopMode mode) {
   const bool simulated = tool_->target.endpoint.medium == link::Medium::simulated;
-  if (simulated || !context_->calm.start_guardian) return {};
-  auto tell_safe = context_->calm.start_guardian(
+  if (simulated || !context_->uninterruptible.start_guardian) return {};
+  auto tell_safe = context_->uninterruptible.start_guardian(
       [this, mode, settings = std::move(settings)] { return take_over(settings, mode); });
-  if (!tell_safe) return tl::unexpected(tool_->target.blamed(std::move(tell_safe.error())));
+  if (!tell_safe) return tl::unexpected(with_target(std::move(tell_safe.error()), tool_->target));
   tell_safe_ = std::move(*tell_safe);
   return {};
 }
 
 std::string GuardedRun::take_over(const std::string& settings, catalogue::StopMode mode) const {
-  const Context calm = calm_context(*context_);
+  const Context calm = uninterruptible_context(*context_);
   StopPursuit pursuit(*tool_, mode, calm);
   const device::StopReport report = pursuit.stop();
   const bool stopped = report.result != device::StopResult::unconfirmed;
@@ -100,16 +101,17 @@ std::string GuardedRun::words_of_death() const {
 device::RunGuard::Reopen GuardedRun::reopener() {
   return [this](Duration patience) {
     progress_.show("the link is lost; trying to stop the tool");
-    return calm_line_.connect(patience);
+    return uninterruptible_line_.connect(patience);
   };
 }
 
 std::pair<Result<void>, device::StopReport> GuardedRun::run(
     device::GuardedMotion motion, const std::function<void()>& begin,
     const std::function<Result<void>()>& follow) {
-  if (context_->calm.stay_awake) context_->calm.stay_awake();
+  if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
   out_.emplace(context_->io, context_->interrupt);
-  device::RunGuard guard(tool_->device, std::move(motion), reopener(), context_->calm.clock);
+  device::RunGuard guard(tool_->device, std::move(motion), reopener(),
+                         context_->uninterruptible.clock);
   const LastWords last_words(*context_, words_of_death());
   begin();
   auto followed = guard.start().and_then(follow);
@@ -137,7 +139,7 @@ void GuardedRun::fail(const Error& error) {
 
 void GuardedRun::fail_following(const Error& error) {
   if (error.code != Errc::closed_pipe) {
-    fail(tool_->target.blamed(error));
+    fail(with_target(error, tool_->target));
     return;
   }
   fail(not_ready(tool_->target,
@@ -147,12 +149,13 @@ void GuardedRun::fail_following(const Error& error) {
 void GuardedRun::fail(const device::StopReport& unconfirmed) {
   outcome_ = {};
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(unconfirmed.tried).count();
-  fail(tool_->target.blamed(
-      {.code = Errc::no_answer,
-       .message = fmt::format("THE TOOL MAY STILL RUN: the stop was tried for {} s ({} times) and "
-                              "could not be confirmed: {}",
-                              seconds, unconfirmed.attempts, unconfirmed.trouble),
-       .hint = where_to_stop(tool_->profile.get())}));
+  fail(with_target(Error{.code = Errc::no_answer,
+                         .message = fmt::format(
+                             "THE TOOL MAY STILL RUN: the stop was tried for {} s ({} times) and "
+                             "could not be confirmed: {}",
+                             seconds, unconfirmed.attempts, unconfirmed.trouble),
+                         .hint = where_to_stop(tool_->profile.get())},
+                   tool_->target));
 }
 
 Result<void> GuardedRun::tell_errors() {

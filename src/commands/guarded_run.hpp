@@ -108,7 +108,7 @@ class GuardedRun {
   ProgressLine progress_;
   /// From the start on: a motor must not run on because its reader is slow.
   std::optional<PatientOut> out_ = std::nullopt;
-  UninterruptibleLine calm_line_;
+  UninterruptibleLine uninterruptible_line_;
   std::function<void()> tell_safe_ = {};  ///< empty: there is no guardian, or it knows
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};

@@ -18,7 +18,7 @@ class LastWords {
 
  private:
   void set(std::string_view words) {
-    if (context_->calm.set_last_words) context_->calm.set_last_words(words);
+    if (context_->uninterruptible.set_last_words) context_->uninterruptible.set_last_words(words);
   }
 
   const Context* context_;

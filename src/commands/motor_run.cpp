@@ -164,17 +164,19 @@ class MotorRun final : public ToolRun {
         return not_ready(target, "the motor stopped before its time, and not by this program",
                          "does somebody else command it?");
       case MotorEnding::ignored:
-        return target.blamed(
+        return with_target(
             {.code = Errc::mismatch,
              .message = "the driver acknowledged the start, but the motor does not run",
-             .hint = setup_->hint_not_started()});
+             .hint = setup_->hint_not_started()},
+            target);
       case MotorEnding::too_fast:
-        return target.blamed(
+        return with_target(
             {.code = Errc::mismatch,
              .message = fmt::format("the driver ran faster than the {} asked for, so the motor was "
                                     "stopped",
                                     plan_->speed_in_words()),
-             .hint = setup_->hint_too_fast()});
+             .hint = setup_->hint_too_fast()},
+            target);
       case MotorEnding::unseen:
         return not_ready(target,
                          "start and stop were acknowledged, but nothing that can be read says "

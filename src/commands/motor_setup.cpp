@@ -102,11 +102,11 @@ std::vector<Left> MotorSetup::put_back() {
   std::vector<Left> left;
   add_left(left);
   if (changer_.sent().empty()) return left;
-  if (context_->calm.stay_awake) context_->calm.stay_awake();
+  if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
   begin_put_back();
   device::Rollback rollback(
-      tool_->device, [this](Duration patience) { return calm_line_.connect(patience); },
-      context_->calm.clock);
+      tool_->device, [this](Duration patience) { return uninterruptible_line_.connect(patience); },
+      context_->uninterruptible.clock);
   for (const device::PutBackReport& report : changer_.put_back(rollback)) {
     const bool as_before =
         report.result == device::PutBack::done || report.result == device::PutBack::kept;

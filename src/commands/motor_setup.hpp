@@ -54,7 +54,7 @@ class MotorSetup {
         tool_(&tool),
         context_(&context),
         changer_(tool.device, log),
-        calm_line_(tool, context) {}
+        uninterruptible_line_(tool, context) {}
   MotorSetup(const MotorSetup&) = delete;
   MotorSetup& operator=(const MotorSetup&) = delete;
   virtual ~MotorSetup() = default;
@@ -116,7 +116,7 @@ class MotorSetup {
   OpenTool* tool_;
   Context* context_;
   work::Changer changer_;
-  UninterruptibleLine calm_line_;
+  UninterruptibleLine uninterruptible_line_;
 };
 
 }  // namespace spindle::commands

@@ -10,7 +10,7 @@ bool ends_all(ExitStatus status) {
 
 }  // namespace
 
-Context calm_context(const Context& context) {
+Context uninterruptible_context(const Context& context) {
   const Surroundings& surroundings = context;
   const Telling& telling = context;
   return {uninterruptible(context), surroundings, telling};

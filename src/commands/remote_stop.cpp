@@ -139,7 +139,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
     target.reach = options.reach;
     target.endpoint.claim = link::Claim::beside;
   }
-  const Context calm = calm_context(context);
+  const Context calm = uninterruptible_context(context);
   SharedLines shared(targets, calm);
   const device::OpenTransport open = shared.opener();
   const Context own = with_lines(calm, open);

@@ -90,7 +90,7 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       task_(&task),
       tool_(&tool),
       context_(&context),
-      calm_line_(tool, context),
+      uninterruptible_line_(tool, context),
       log_(change_log("restore", tool, context)),
       changer_(tool.device, log_),
       progress_(context) {}
@@ -132,7 +132,7 @@ void RestoreRun::write_all() {
   const std::vector<PlannedWrite>& writes = task_->plan.writes;
   for (const PlannedWrite& write : writes) {
     if (context_->interrupt.signalled()) {
-      fail(tool_->target.blamed(context_->interrupt.error()));
+      fail(context_->interrupt.error());
     } else if (auto done = write_one(write); !done) {
       fail(done.error());
     }
@@ -153,8 +153,8 @@ void RestoreRun::verify() {
   if (!task_->plan.writes.empty()) compare_everything();
   for (const catalogue::SkippedEntry& skipped : task_->plan.skipped) {
     if (skipped.why != Skip::absent) continue;
-    fail(tool_->target.blamed(about(
-        skipped.parameter, "the backup has a value for it, but the tool has no such register")));
+    fail(about(skipped.parameter,
+               "the backup has a value for it, but the tool has no such register"));
   }
 }
 
@@ -176,7 +176,7 @@ void RestoreRun::compare_everything() {
                                     said(difference.b), said(difference.a)));
     error.hint = fmt::format("{} writes what is left; what the tool held before is in {}",
                              command_to_finish(), saved_);
-    fail(tool_->target.blamed(error));
+    fail(error);
   }
 }
 
@@ -184,7 +184,7 @@ void RestoreRun::compare_everything() {
 device::Rollback::Reopen RestoreRun::reopener() {
   return [this](Duration patience) -> Result<device::Device> {
     progress_.show("the link is lost; trying to put the tool back");
-    auto opened = calm_line_.connect(patience);
+    auto opened = uninterruptible_line_.connect(patience);
     if (!opened) return opened;
     auto known = opened->require_known_registers().and_then([&] { return same_tool(*opened); });
     if (!known) return tl::unexpected(std::move(known.error()));
@@ -205,7 +205,7 @@ Result<void> RestoreRun::same_tool(const device::Device& opened) const {
 void RestoreRun::roll_back() {
   if (changer_.sent().empty() || options_->on_failure == OnFailure::leave) return;
   progress_.show(fmt::format("{}: putting it back", tool_->target.shown));
-  device::Rollback rollback(tool_->device, reopener(), context_->calm.clock);
+  device::Rollback rollback(tool_->device, reopener(), context_->uninterruptible.clock);
   const auto reports = changer_.put_back(rollback);
   const bool complete = std::all_of(reports.begin(), reports.end(), [](const auto& report) {
     return report.result == PutBack::done || report.result == PutBack::kept;
@@ -231,7 +231,7 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
   if (report.result == PutBack::unknown) error.code = Errc::no_answer;
   error.hint = fmt::format("{} puts everything back, {} finishes the restore",
                            command_for(tool_->target, *context_, saved_), command_to_finish());
-  fail(tool_->target.blamed(error));
+  fail(error);
 }
 
 /// What was not written may have changed all the same.
@@ -240,11 +240,11 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
   for (const auto& entry : task_->present.entries) parameters.push_back(entry.parameter);
   const auto readings = rollback.read_again(parameters);
   if (!readings) {
-    fail(tool_->target.blamed(
-        {.code = Errc::no_answer,
-         .message = fmt::format("what was written is put back, but the rest could not be checked: "
-                                "{}",
-                                message_of(readings.error()))}));
+    fail(Error{
+        .code = Errc::no_answer,
+        .message = fmt::format("what was written is put back, but the rest could not be checked: "
+                               "{}",
+                               message_of(readings.error()))});
     return;
   }
   for (std::size_t index = 0; index < readings->size(); ++index) {
@@ -256,7 +256,7 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
                                     value->to_string(), before.to_string()));
     error.hint =
         fmt::format("{} puts everything back", command_for(tool_->target, *context_, saved_));
-    fail(tool_->target.blamed(error));
+    fail(error);
   }
 }
 
@@ -267,7 +267,7 @@ void RestoreRun::note(const Parameter& parameter, const Value& before, Ending en
 
 void RestoreRun::fail(const Error& error) {
   outcome_.fail(error);
-  errors_.push_back(error);
+  errors_.push_back(with_target(error, tool_->target));
 }
 
 std::string RestoreRun::command_to_finish() const {
@@ -279,9 +279,11 @@ void RestoreRun::tell_what_stays() {
   const std::size_t planned = task_->plan.writes.size();
   const bool left = !errors_.empty() && written_ < planned && rolled_back_ == 0;
   if (!left || options_->on_failure != OnFailure::leave) return;
-  Error error = tool_->target.blamed(
-      {.code = errors_.front().code,
-       .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)});
+  Error error = with_target(
+      Error{
+          .code = errors_.front().code,
+          .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)},
+      tool_->target);
   error.hint = fmt::format("{} writes the rest", command_to_finish());
   errors_.push_back(error);
 }

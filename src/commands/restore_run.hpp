@@ -64,7 +64,7 @@ class RestoreRun {
   const RestoreTask* task_;
   OpenTool* tool_;
   Context* context_;
-  UninterruptibleLine calm_line_;
+  UninterruptibleLine uninterruptible_line_;
   work::ChangeLog log_;
   work::Changer changer_;
   ProgressLine progress_;

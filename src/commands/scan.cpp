@@ -20,8 +20,8 @@ Result<Target> resolve_bus(const ScanOptions& options, const Context& context) {
   auto bus = resolve_target(options.bus, context);
   if (!bus) return bus;
   const auto refuse = [&](std::string message, std::string hint) {
-    return tl::unexpected(
-        bus->blamed({.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)}));
+    return tl::unexpected(with_target(
+        Error{.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)}, *bus));
   };
   if (bus->endpoint.unit && bus->shown == bus->endpoint.text) {
     return refuse("scan asks many units, and the target names one",
@@ -35,9 +35,10 @@ Result<catalogue::Profile> load_bus_profile(const Target& bus, const Context& co
   const bool serial = bus.endpoint.medium != link::Medium::simulated || !profile ||
                       profile->link.framing == modbus::Framing::rtu;
   if (serial) return profile;
-  return tl::unexpected(bus.blamed({.code = Errc::usage,
-                                    .message = "this simulated tool is not on a serial line",
-                                    .hint = "'spindle ping' asks it"}));
+  return tl::unexpected(with_target(Error{.code = Errc::usage,
+                                          .message = "this simulated tool is not on a serial line",
+                                          .hint = "'spindle ping' asks it"},
+                                    bus));
 }
 
 report::Record unit_record(modbus::UnitId unit, const device::Probe& probe, const Target& bus,

@@ -147,17 +147,18 @@ class StartActionRun final : public ToolRun {
     }
     if (ended_ && ended_->ending == RunEnding::ignored && !kind) {
       guarded_->fail(
-          tool().target.blamed({.code = Errc::mismatch,
-                                .message = "the tool acknowledged the start, but does not run",
-                                .hint = "is it locked, or without a battery charge?",
-                                .name = plan_->start.name}));
+          with_target(Error{.code = Errc::mismatch,
+                            .message = "the tool acknowledged the start, but does not run",
+                            .hint = "is it locked, or without a battery charge?",
+                            .name = plan_->start.name},
+                      tool().target));
       return;
     }
     if (ended_ && ended_->ending == RunEnding::ended && !kind) {
-      guarded_->fail(
-          tool().target.blamed({.code = Errc::no_answer,
-                                .message = "the tool ran, but never sent a result",
-                                .hint = "'spindle get' with 'event.*' shows its last event"}));
+      guarded_->fail(with_target(Error{.code = Errc::no_answer,
+                                       .message = "the tool ran, but never sent a result",
+                                       .hint = "'spindle get' with 'event.*' shows its last event"},
+                                 tool().target));
       return;
     }
     // Success is a screw that is tight, and nothing else.

@@ -140,7 +140,7 @@ std::vector<Left> StartActionSetup::put_back() {
       left.push_back(left_of(*selected, before ? "no command selects that" : ""));
       continue;
     }
-    if (context_->calm.stay_awake) context_->calm.stay_awake();
+    if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
     work::LoggedChange change{.name = request.action.name,
                               .register_address = request.action.address.value,
                               .old_value = Decimal(request.value),
@@ -148,7 +148,8 @@ std::vector<Left> StartActionSetup::put_back() {
     const std::string id = log_->begin(change);
     const auto report = device::undo(
         {request.action, request.value, *before}, tool_->device,
-        [this](Duration patience) { return calm_line_.connect(patience); }, context_->calm.clock);
+        [this](Duration patience) { return uninterruptible_line_.connect(patience); },
+        context_->uninterruptible.clock);
     if (report.found) change.old_value = Decimal(*report.found);
     const bool done =
         report.result == device::PutBack::done || report.result == device::PutBack::kept;

@@ -27,7 +27,11 @@ class StartActionSetup {
   /// All must outlive it.
   StartActionSetup(const StartActionPlan& plan, OpenTool& tool, Context& context,
                    work::ChangeLog& log)
-      : plan_(&plan), tool_(&tool), context_(&context), log_(&log), calm_line_(tool, context) {}
+      : plan_(&plan),
+        tool_(&tool),
+        context_(&context),
+        log_(&log),
+        uninterruptible_line_(tool, context) {}
 
   /// Checks that the tool has no alarm and stands still (whether it is locked can not be read on
   /// every product), and reads what is going to be changed. Only reads.
@@ -64,7 +68,7 @@ class StartActionSetup {
   OpenTool* tool_;
   Context* context_;
   work::ChangeLog* log_;
-  UninterruptibleLine calm_line_;
+  UninterruptibleLine uninterruptible_line_;
   std::vector<Selected> selected_ = {};
 };
 

@@ -134,7 +134,7 @@ Result<void> StopPursuit::adopt(std::unique_ptr<const Profile> profile) {
 
 Result<void> StopPursuit::prepare_stop() {
   auto model = device::RunModel::of(*profile_);
-  if (!model) return tl::unexpected(target_.blamed(std::move(model.error())));
+  if (!model) return tl::unexpected(with_target(std::move(model.error()), target_));
   model_ = std::move(*model);
   stopper_ = model_->stopper(mode_);
   return {};

@@ -43,10 +43,11 @@ std::string where_to_stop(const catalogue::Profile* profile) {
 }
 
 Error still_runs(const Target& target, const catalogue::Profile* profile) {
-  return target.blamed(
-      {.code = Errc::mismatch,
-       .message = "the stop was acknowledged, but the tool still says that it runs",
-       .hint = where_to_stop(profile)});
+  return with_target(
+      Error{.code = Errc::mismatch,
+            .message = "the stop was acknowledged, but the tool still says that it runs",
+            .hint = where_to_stop(profile)},
+      target);
 }
 
 }  // namespace spindle::commands

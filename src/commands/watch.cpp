@@ -370,7 +370,7 @@ void watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, S
   device::Watcher watcher(open, plan, options.reconnection, context.clock,
                           [&](const device::News& news) { return stage.tell(news, voice); });
   const auto of_tool = [&](Error error) {
-    if (is_about_tool(error)) return tool.target().blamed(std::move(error));
+    if (is_about_tool(error)) return with_target(std::move(error), tool.target());
     error.asked_of = tool.target().shown;
     return error;
   };

@@ -58,8 +58,10 @@ Result<Bytes> ask_identity(OpenTool& tool) {
   }
   auto answer = tool.device.report_server_id();
   if (answer || answer.error().code != Errc::exception_response) return answer;
-  return tl::unexpected(tool.target.blamed(unknown_product(
-      Errc::mismatch, fmt::format("no profile can be found: {}", message_of(answer.error())))));
+  return tl::unexpected(with_target(
+      unknown_product(Errc::mismatch,
+                      fmt::format("no profile can be found: {}", message_of(answer.error()))),
+      tool.target));
 }
 
 /// A tool whose profile was not named: ask it, and go on with what its answer fits.
@@ -70,10 +72,11 @@ Result<void> find_profile(OpenTool& tool, const Environment& environment) {
   if (!identification) return tl::unexpected(std::move(identification.error()));
   if (identification->candidates.empty()) {
     const bool later = identification->generation == catalogue::Generation::later;
-    return tl::unexpected(tool.target.blamed(
-        unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
-                        fmt::format("no profile fits what the tool says of itself: {}",
-                                    fmt::join(identification->identity.notes, "; ")))));
+    return tl::unexpected(
+        with_target(unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
+                                    fmt::format("no profile fits what the tool says of itself: {}",
+                                                fmt::join(identification->identity.notes, "; "))),
+                    tool.target));
   }
   // Products that their answer does not tell apart share the register map of their common base.
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
@@ -127,7 +130,7 @@ Result<void> check_reach(const Target& target, const catalogue::Profile& profile
     error.message = "--broadcast is for everybody on a serial line, but this is one tool";
     error.hint = "give unit=0 in the URL, as in rtu:///dev/ttyUSB0?unit=0";
   }
-  return tl::unexpected(target.blamed(std::move(error)));
+  return tl::unexpected(with_target(std::move(error), target));
 }
 
 link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& profile) {

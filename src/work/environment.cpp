@@ -8,7 +8,7 @@ Environment with(const Environment& environment, Clock& clock, const Interrupt& 
   return {.clock = clock,
           .interrupt = interrupt,
           .open = open,
-          .calm = environment.calm,
+          .uninterruptible = environment.uninterruptible,
           .disk = environment.disk,
           .state_folder = environment.state_folder,
           .version = environment.version,
@@ -21,7 +21,7 @@ Environment with(const Environment& environment, Clock& clock, const Interrupt& 
 }  // namespace
 
 Environment uninterruptible(const Environment& environment) {
-  const Uninterruptible& calm = environment.calm;
+  const Uninterruptible& calm = environment.uninterruptible;
   return with(environment, calm.clock, calm.interrupt, calm.open);
 }
 

@@ -89,14 +89,11 @@ void add_named(const std::string& name, const Environment& environment, Resoluti
 
 }  // namespace
 
-Error Target::blamed(Error error) const {
-  error.target = shown;
-  if (endpoint.text != shown) error.endpoint = endpoint.text;
-  return error;
-}
-
 Error with_target(Error error, const Target& target) {
-  return error.target.empty() ? target.blamed(std::move(error)) : error;
+  if (!error.target.empty()) return error;
+  error.target = target.shown;
+  if (target.endpoint.text != target.shown) error.endpoint = target.endpoint.text;
+  return error;
 }
 
 Target reopening(Target target) {
@@ -115,11 +112,12 @@ std::string shared_line(const link::Endpoint& endpoint) {
 }
 
 Error unproven(const Target& target) {
-  return target.blamed(
-      {.code = Errc::usage,
-       .message = "a tool on a serial line can not prove what it is",
-       .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
-               "shows all"});
+  return with_target(
+      Error{.code = Errc::usage,
+            .message = "a tool on a serial line can not prove what it is",
+            .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
+                    "shows all"},
+      target);
 }
 
 bool names_group(std::string_view text) { return text.starts_with('@'); }

@@ -264,10 +264,10 @@ class Stage {
         .open = [this](const auto& endpoint, const auto& facts,
                        Duration) { return open(endpoint, facts); },
         // Enough of a server: it is listening, and nobody comes.
-        .calm = {clock_, calm_,
-                 [this](const auto& endpoint, const auto& facts, Duration) {
-                   return open(endpoint, facts);
-                 }},
+        .uninterruptible = {clock_, calm_,
+                            [this](const auto& endpoint, const auto& facts, Duration) {
+                              return open(endpoint, facts);
+                            }},
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },

@@ -337,7 +337,7 @@ class Program {
         .clock = clock_,
         .interrupt = interrupt_.emplace(),
         .open = nobody,
-        .calm = {clock_, never_, nobody},
+        .uninterruptible = {clock_, never_, nobody},
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },

@@ -37,7 +37,7 @@ struct Bench {
     return {.clock = clock,
             .interrupt = interrupt,
             .open = open,
-            .calm = calm,
+            .uninterruptible = uninterruptible,
             .disk = disk,
             .state_folder = state_folder,
             .version = "1.2.3",
@@ -64,7 +64,7 @@ struct Bench {
   device::OpenTransport open = [this](const auto& endpoint, const auto&, Duration) {
     return connect_to(endpoint);
   };
-  work::Uninterruptible calm{clock, interrupt, open};
+  work::Uninterruptible uninterruptible{clock, interrupt, open};
   Disk disk = {};
   std::string state_folder = {};
   files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};

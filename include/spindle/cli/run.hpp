@@ -18,7 +18,7 @@ struct World {
   Clock& clock;
   const Interrupt& interrupt;
   device::OpenTransport open;  ///< real lines
-  work::Uninterruptible calm;
+  work::Uninterruptible uninterruptible;
   sim::Serve serve;                 ///< puts a simulated tool on a port
   std::function<void()> end_waits;  ///< ends every wait, as a signal would
   std::function<std::optional<std::string>(std::string_view name)> environment;

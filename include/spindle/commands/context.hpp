@@ -51,7 +51,7 @@ struct Telling {
 struct Context : work::Environment, Surroundings, Telling {};
 
 /// The same context with a clock and lines that signals do not end.
-Context calm_context(const Context& context);
+Context uninterruptible_context(const Context& context);
 
 /// The same context with another renderer, which must outlive it.
 Context with_renderer(const Context& context, report::Renderer& renderer);

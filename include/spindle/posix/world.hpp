@@ -13,6 +13,7 @@
 #include "spindle/link/transport.hpp"
 #include "spindle/posix/clock.hpp"
 #include "spindle/posix/guardian.hpp"
+#include "spindle/posix/signals.hpp"
 #include "spindle/posix/streams.hpp"
 
 namespace spindle::posix {
@@ -24,6 +25,18 @@ line_opener(Clock& clock, const Interrupt& interrupt);
 
 /// The same for lines that no signal ends.
 inline auto line_opener(CalmTime& calm) { return line_opener(calm.clock, calm.interrupt); }
+
+/// The line and the clock that no signal ends, and what keeps a run guarded, as the layers above
+/// name it. Both must outlive it.
+template <typename Uninterruptible>
+Uninterruptible uninterruptible(SignalWatch& signals, CalmTime& calm) {
+  return {calm.clock,
+          calm.interrupt,
+          line_opener(calm),
+          [&signals] { signals.stay_awake(); },
+          [&signals](std::string_view words) { signals.set_last_words(words); },
+          start_guardian};
+}
 
 /// A variable of the environment; empty when it is not set.
 std::optional<std::string> environment(std::string_view name);

@@ -48,7 +48,7 @@ struct Environment {
   Clock& clock;
   const Interrupt& interrupt;
   const device::OpenTransport& open;  ///< real lines; simulated tools are opened inside the program
-  const Uninterruptible& calm;
+  const Uninterruptible& uninterruptible;
   const Disk& disk;
   const std::string& state_folder;  ///< where records of changes are kept; empty: nowhere is known
   std::string_view version;         ///< of spindle

@@ -21,9 +21,6 @@ struct Target {
   std::vector<std::string> verified = {};
   Reach reach = Reach::one;
   link::Reopening reopening = link::Reopening::never;
-
-  /// The error as one of this tool, with its address beside its name.
-  [[nodiscard]] Error blamed(Error error) const;
 };
 
 /// The error as one of this tool, with its address beside its name, unless it is one of a tool

@@ -1,0 +1,117 @@
+#include "restore_warnings.hpp"
+
+#include <fmt/format.h>
+
+#include "spindle/catalogue/danger.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Profile;
+using catalogue::Skip;
+using catalogue::Snapshot;
+
+std::string shown_model(const Snapshot& snapshot) {
+  if (!snapshot.identity) return fmt::format("profile {}", snapshot.profile);
+  const auto& [model, code, serial, firmware, raw] = *snapshot.identity;
+  return model.empty() ? fmt::format("code {}", code.value_or(0)) : model;
+}
+
+/// The same model by its own code; where a product does not say it, by its profile.
+bool is_same_model(const Snapshot& backup, const Snapshot& present) {
+  if (!backup.identity || !present.identity) return backup.profile == present.profile;
+  return backup.identity->model_code == present.identity->model_code;
+}
+
+std::string shown_firmware(const Snapshot& snapshot) {
+  const bool known = snapshot.identity && snapshot.identity->firmware;
+  return known ? std::to_string(*snapshot.identity->firmware) : std::string("unknown");
+}
+
+/// A torque in another unit is another torque.
+const catalogue::PlannedWrite* find_other_unit(const RestoreTask& task) {
+  for (const catalogue::PlannedWrite& write : task.plan.writes) {
+    const auto* entry = task.backup.find(write.parameter.name);
+    const auto sides = task.destination == catalogue::Destination::same_tool
+                           ? catalogue::Sides::one_tool
+                           : catalogue::Sides::two_tools;
+    const auto units = catalogue::units_of(write.parameter, entry->unit, write.unit, sides);
+    if (units != catalogue::Units::same) return &write;
+  }
+  return nullptr;
+}
+
+/// How the tool and the profile of the backup differ from those of the restore.
+void warn_of_origin(const Snapshot& backup, const Snapshot& present,
+                    std::vector<std::string>& warnings) {
+  if (!is_same_model(backup, present)) {
+    warnings.push_back(fmt::format("the backup is of a {}, and this tool is a {}",
+                                   shown_model(backup), shown_model(present)));
+  }
+  if (backup.identity && present.identity && backup.identity->serial != present.identity->serial) {
+    warnings.push_back(fmt::format("the backup is of serial {}, and this tool is serial {}",
+                                   backup.identity->serial, present.identity->serial));
+  }
+  if (shown_firmware(backup) != shown_firmware(present)) {
+    warnings.push_back(fmt::format("the backup is of firmware {}, and this tool has {}",
+                                   shown_firmware(backup), shown_firmware(present)));
+  }
+  if (backup.profile != present.profile) {
+    warnings.push_back(fmt::format("the backup was made with profile {}, not {}", backup.profile,
+                                   present.profile));
+  } else if (backup.fingerprint != present.fingerprint) {
+    warnings.push_back(
+        fmt::format("the backup was made with another version of profile {}", backup.profile));
+  }
+}
+
+std::string why_skipped(const catalogue::Parameter& parameter, Skip why, const Profile& profile) {
+  if (why == Skip::absent) return "this tool has no such register";
+  const auto danger = catalogue::danger_of(parameter, profile);
+  if (!danger) return "it is not copied to another tool";
+  const std::string remedy = danger->remedy();
+  return danger->effect() + (remedy.empty() ? "" : "; ") + remedy;
+}
+
+/// What the writes themselves bring with them, and what is not written.
+void warn_of_plan(const RestoreTask& task, const Profile& profile,
+                  std::vector<std::string>& warnings) {
+  if (const auto* other = find_other_unit(task); other != nullptr && task.plan.findings.empty()) {
+    const auto named = [](const std::string& unit) {
+      return unit.empty() ? std::string("a unit that is not known") : unit;
+    };
+    warnings.push_back(
+        fmt::format("{} is in {} in the backup, and in {} on this tool", other->parameter.name,
+                    named(task.backup.find(other->parameter.name)->unit), named(other->unit)));
+  }
+  for (const auto& write : task.plan.writes) {
+    if (write.parameter.risk.empty()) continue;
+    warnings.push_back(fmt::format("{}: {}", write.parameter.name, write.parameter.risk));
+  }
+  for (const auto& [parameter, why] : task.plan.skipped) {
+    if (why == Skip::read_only || why == Skip::equal) continue;
+    warnings.push_back(
+        fmt::format("{} is skipped: {}", parameter.name, why_skipped(parameter, why, profile)));
+  }
+}
+
+}  // namespace
+
+Result<void> check_model(const Snapshot& backup, const Snapshot& present,
+                         const RestoreOptions& options) {
+  if (options.model == ModelCheck::off || is_same_model(backup, present)) return {};
+  return tl::unexpected(Error{.code = Errc::wrong_model,
+                              .message = fmt::format("the backup is of a {}, and this tool is a {}",
+                                                     shown_model(backup), shown_model(present)),
+                              .hint = "--force restores it all the same",
+                              .name = options.file});
+}
+
+std::vector<std::string> warnings_for(const RestoreTask& task, const Profile& profile) {
+  std::vector<std::string> warnings;
+  warn_of_origin(task.backup, task.present, warnings);
+  warn_of_plan(task, profile, warnings);
+  return warnings;
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "restore_run.hpp"
+
+namespace spindle::commands {
+
+/// Refuses the backup of another model, unless it is wanted. Error `wrong_model`.
+Result<void> check_model(const catalogue::Snapshot& backup, const catalogue::Snapshot& present,
+                         const RestoreOptions& options);
+
+/// What the user should know before the restore: how the tool and its profile differ from those of
+/// the backup, what the writes bring with them, and what is not written.
+std::vector<std::string> warnings_for(const RestoreTask& task, const catalogue::Profile& profile);
+
+}  // namespace spindle::commands
