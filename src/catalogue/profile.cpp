@@ -121,19 +121,59 @@ std::vector<Parameter> match_numbered(const Profile& profile, std::string_view p
   return found;
 }
 
-Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view name) {
+/// Whether a parameter is looked up to be read, or only to be shown.
+enum class Purpose : std::uint8_t { reading, description };
+
+Result<Parameter> find_any(const Profile& profile, std::string_view name) {
+  if (auto raw = parse_raw_register(name)) return find_raw(profile, std::move(*raw));
+  for (const Parameter& parameter : profile.parameters) {
+    if (parameter.name == name) return profile.with_secrecy(parameter);
+  }
+  if (profile.numbered) {
+    auto found = find_numbered(*profile.numbered, name);
+    if (found) return profile.with_secrecy(*std::move(found));
+  }
+  return tl::unexpected(unknown(name, fmt::format("no such parameter in profile {}", profile.id),
+                                hint_for(profile, name)));
+}
+
+void leave_out_consumed(const Profile& profile, std::vector<Parameter>& parameters) {
+  std::erase_if(parameters, [&](const Parameter& one) { return profile.consumes(one); });
+}
+
+Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view name,
+                                      Purpose purpose) {
   if (!is_pattern(name)) {
-    auto one = profile.find(name);
+    auto one = purpose == Purpose::reading ? profile.find(name) : find_any(profile, name);
     if (!one) return tl::unexpected(std::move(one.error()));
     return std::vector<Parameter>{std::move(*one)};
   }
   auto found = match_named(profile, name);
   if (found.empty() && profile.numbered) found = match_numbered(profile, name);
+  if (purpose == Purpose::reading) leave_out_consumed(profile, found);
   if (found.empty()) {
     return tl::unexpected(
         unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {}));
   }
   return found;
+}
+
+Result<std::vector<Parameter>> select_for(const Profile& profile,
+                                          const std::vector<std::string>& names, Purpose purpose) {
+  std::vector<Parameter> selected;
+  if (names.empty()) {
+    selected = profile.parameters;
+    if (purpose == Purpose::reading) leave_out_consumed(profile, selected);
+  }
+  std::unordered_set<std::string> seen;
+  for (const std::string& name : names) {
+    auto found = expand(profile, name, purpose);
+    if (!found) return tl::unexpected(std::move(found.error()));
+    for (Parameter& parameter : *found) {
+      if (seen.insert(parameter.name).second) selected.push_back(std::move(parameter));
+    }
+  }
+  return selected;
 }
 
 Error bad_raw_register(std::string_view text) {
@@ -209,29 +249,27 @@ bool RefusalFacts::is_busy(std::int64_t code) const {
 }
 
 Result<Parameter> Profile::find(std::string_view name) const {
-  if (auto raw = parse_raw_register(name)) return find_raw(*this, std::move(*raw));
-  for (const Parameter& parameter : parameters) {
-    if (parameter.name == name) return with_secrecy(parameter);
-  }
-  if (numbered) {
-    if (auto found = find_numbered(*numbered, name)) return with_secrecy(*std::move(found));
-  }
+  auto found = find_any(*this, name);
+  if (!found || !consumes(*found)) return found;
   return tl::unexpected(
-      unknown(name, fmt::format("no such parameter in profile {}", id), hint_for(*this, name)));
+      Error{.code = Errc::usage,
+            .message = "reading it clears it, and the result that it tells of would be lost",
+            .hint = "'spindle watch' reads it, and the result behind it",
+            .name = std::string(name)});
 }
 
 Result<std::vector<Parameter>> Profile::select(const std::vector<std::string>& names) const {
-  if (names.empty()) return parameters;
-  std::vector<Parameter> selected;
-  std::unordered_set<std::string> seen;
-  for (const std::string& name : names) {
-    auto found = expand(*this, name);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    for (Parameter& parameter : *found) {
-      if (seen.insert(parameter.name).second) selected.push_back(std::move(parameter));
-    }
-  }
-  return selected;
+  return select_for(*this, names, Purpose::reading);
+}
+
+Result<std::vector<Parameter>> Profile::describe(const std::vector<std::string>& names) const {
+  return select_for(*this, names, Purpose::description);
+}
+
+bool Profile::consumes(const Parameter& parameter) const {
+  return std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& named) {
+    return named.reading == Reading::consumes && overlap(named, parameter);
+  });
 }
 
 Parameter Profile::numbered_parameter(std::uint16_t number) const {
@@ -287,6 +325,10 @@ std::optional<Profile::LimitRegisters> Profile::limit_registers(const Parameter&
     return RegisterAddress{static_cast<std::uint16_t>(number + offset)};
   };
   return LimitRegisters{mirror(limits->minimum_offset), mirror(limits->maximum_offset)};
+}
+
+bool sends_unasked(const Profile& profile) {
+  return profile.events && profile.events->model == EventModel::push;
 }
 
 Judgement judge(const Profile& profile, const Identity& identity) {

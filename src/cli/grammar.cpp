@@ -641,7 +641,7 @@ Result<void> understand_watch(const TypedWatch& typed, commands::WatchOptions& o
   options.idle_timeout = *idle_timeout;
   if (typed.initial) options.samples = device::Samples::changes_and_first;
   if (typed.all) options.samples = device::Samples::all;
-  if (typed.no_push) options.events = device::EventMode::poll;
+  if (typed.no_push) options.events = device::EventMode::unarmed;
   if (typed.no_reconnect) options.reconnection = device::Reconnection::never;
   return {};
 }

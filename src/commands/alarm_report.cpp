@@ -16,8 +16,6 @@ using catalogue::Profile;
 using report::Column;
 
 constexpr std::string_view present_list = "present";
-/// Registers whose meaning is not known: their numbers are shown, not explained.
-constexpr std::string_view data_list = "alarm-data";
 
 const std::array<Column, 5> columns = {{{"LIST", "list"},
                                         {"INDEX", "index", report::Align::right},
@@ -25,35 +23,16 @@ const std::array<Column, 5> columns = {{{"LIST", "list"},
                                         {"TEXT", "text"},
                                         {"REMEDY", "remedy"}}};
 
-/// The lists that the profile names.
-Result<std::vector<AlarmSource>> plan_lists(const Profile& profile) {
-  std::vector<AlarmSource> sources;
-  for (const catalogue::AlarmList& list : profile.alarm_lists) {
-    auto parameters = profile.select(list.parameters);
-    if (!parameters) return tl::unexpected(std::move(parameters.error()));
-    for (Parameter& parameter : *parameters) {
-      sources.push_back({list.name, std::move(parameter), list.codes});
-    }
-  }
-  return sources;
-}
-
-Error no_alarms(const Profile& profile) {
-  return {.code = Errc::usage,
-          .message = fmt::format("profile {} names no alarms", profile.id),
-          .hint = "'alarm-lists' in the profile names what is shown, see spindle-profile(5)"};
-}
-
-report::Record alarm_record(const std::string& list, std::size_t index,
+report::Record alarm_record(const AlarmSource& source, std::size_t index,
                             const catalogue::Value& value, const catalogue::CodeText* text,
                             const Target& target, const Clock& clock) {
   const std::int64_t code = value.number.mantissa();
-  const bool is_free = code == 0 && list != data_list;
+  const bool is_free = code == 0 && source.table != catalogue::CodeTable::none;
   const std::string meaning = text != nullptr ? text->text : is_free ? "none" : "";
   return {.type = "alarm",
           .target = target.shown,
           .time = clock.wall(),
-          .fields = {{"list", list},
+          .fields = {{"list", source.list},
                      {"index", count(index)},
                      {"code", number(code), value.to_string()},
                      {"text", text_or_null(meaning)},
@@ -65,6 +44,7 @@ const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table
                                    const catalogue::CodeTables& tables, const OpenTool& tool) {
   const auto& refusals = tool.profile->refusals;
   const catalogue::CodeTexts* texts = &tables.error;
+  if (table == catalogue::CodeTable::none) return nullptr;
   if (table == catalogue::CodeTable::warning) texts = &tables.warning;
   if (table == catalogue::CodeTable::refusal && refusals) texts = &refusals->codes;
   const auto known = texts->find(code);
@@ -86,40 +66,33 @@ void tell(const AlarmSource& source, std::size_t index, const device::Reading& r
   report.outcome.succeed();
   // The rest of a history that is not full says nothing.
   const bool unused = index > 1 && reading.value->number == Decimal(0);
-  if (unused && !tool.profile->alarm_lists.empty()) return;
-  const catalogue::CodeText* text = nullptr;
-  if (source.list != data_list) {
-    text = text_of(reading.value->number.mantissa(), source.table, tables, tool);
-  }
+  if (unused && source.table != catalogue::CodeTable::none) return;
+  const catalogue::CodeText* text =
+      text_of(reading.value->number.mantissa(), source.table, tables, tool);
   if (tells_present && !report.was_present()) {
     report.present = *reading.value;
     if (text != nullptr) report.resettable = text->resettable;
   }
-  listing.add(alarm_record(source.list, index, *reading.value, text, tool.target, clock));
+  listing.add(alarm_record(source, index, *reading.value, text, tool.target, clock));
 }
 
 }  // namespace
 
-/// The present alarm is what proves a reset; the last event's error and the raw alarm data stand
-/// beside it.
+/// The present alarm is what proves a reset.
 Result<std::vector<AlarmSource>> alarm_sources(const Profile& profile) {
-  if (!profile.alarm_lists.empty()) return plan_lists(profile);
   std::vector<AlarmSource> sources;
-  const auto reset = profile.find_action(alarm_reset_action);
-  if (reset && !reset->confirm.empty()) {
-    auto present = profile.find(reset->confirm);
-    if (!present) return tl::unexpected(std::move(present.error()));
-    sources.push_back({std::string(present_list), std::move(*present)});
+  for (const catalogue::AlarmList& list : profile.alarm_lists) {
+    auto parameters = profile.select(list.parameters);
+    if (!parameters) return tl::unexpected(std::move(parameters.error()));
+    for (Parameter& parameter : *parameters) {
+      sources.push_back({list.name, std::move(parameter), list.codes});
+    }
   }
-  if (auto error = profile.find("event.error")) {
-    sources.push_back({"last-event", std::move(*error)});
-  }
-  if (auto data = profile.select({"alarm.*"})) {
-    for (Parameter& parameter : *data)
-      sources.push_back({std::string(data_list), std::move(parameter)});
-  }
-  if (sources.empty()) return tl::unexpected(no_alarms(profile));
-  return sources;
+  if (!sources.empty()) return sources;
+  return tl::unexpected(
+      Error{.code = Errc::usage,
+            .message = fmt::format("profile {} names no alarms", profile.id),
+            .hint = "'alarm-lists' in the profile names what is shown, see spindle-profile(5)"});
 }
 
 Result<void> show_alarms(const std::vector<AlarmSource>& sources, OpenTool& tool,

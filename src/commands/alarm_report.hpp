@@ -10,9 +10,6 @@
 
 namespace spindle::commands {
 
-/// The action that ends the present alarm, where a product has one.
-inline constexpr std::string_view alarm_reset_action = "alarm-reset";
-
 /// One parameter that holds a code, and the list in which it is shown.
 struct AlarmSource {
   std::string list;

@@ -36,19 +36,17 @@ Summary summary_of(report::Cell present, const Outcome& outcome, std::string sen
 
 Result<ActionRequest> plan_reset(const Profile& profile, const Target& target,
                                  Acceptance acceptance) {
-  if (!profile.find_action(alarm_reset_action)) {
+  if (profile.alarm_reset.empty()) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("profile {} has no action that resets alarms", profile.id),
-              .hint = fmt::format("an action '{}' in the profile does it, see spindle-profile(5)",
-                                  alarm_reset_action)});
+              .hint = "'alarm-reset' in the profile names it, see spindle-profile(5)"});
   }
-  return parse_action(std::string(alarm_reset_action), profile)
-      .and_then([&](ActionRequest request) {
-        return check_evidence(request.action, target, acceptance).map([&] {
-          return std::move(request);
-        });
-      });
+  return parse_action(profile.alarm_reset, profile).and_then([&](ActionRequest request) {
+    return check_evidence(request.action, target, acceptance).map([&] {
+      return std::move(request);
+    });
+  });
 }
 
 /// How many tools of a group had an alarm, have one still, do not say, and could not be examined or

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <utility>
 
 #include "motor_records.hpp"
@@ -20,11 +22,46 @@ using report::Field;
 using report::Record;
 using report::Tone;
 
-/// "event.screw-count" is "screw_count" in JSON.
-std::string key_of(const std::string& name) {
-  std::string key = name.substr(name.rfind('.') + 1);
-  std::replace(key.begin(), key.end(), '-', '_');
-  return key;
+/// Keys of an event record that are no registers.
+constexpr std::array<std::string_view, 12> reserved_keys = {
+    "schema", "type", "time",   "target",     "kind",        "source",
+    "raw",    "text", "result", "remembered", "torque_unit", "error_text"};
+
+/// "event.screw-count" is "screw_count" in JSON; where that is not clear, "event_screw_count".
+std::vector<std::string> keys_of(const catalogue::EventLayout& layout) {
+  std::map<std::string, std::size_t> taken;
+  const auto last_word = [](const std::string& name) { return name.substr(name.rfind('.') + 1); };
+  for (const auto& field : layout.fields()) ++taken[last_word(field.parameter->name)];
+  std::vector<std::string> keys;
+  for (const auto& field : layout.fields()) {
+    std::string key = last_word(field.parameter->name);
+    const bool is_reserved =
+        std::find(reserved_keys.begin(), reserved_keys.end(), key) != reserved_keys.end();
+    const bool is_number = key.find_first_not_of("0123456789") == std::string::npos;
+    if (is_reserved || is_number || taken[key] > 1) key = field.parameter->name;
+    std::replace(key.begin(), key.end(), '-', '_');
+    std::replace(key.begin(), key.end(), '.', '_');
+    keys.push_back(std::move(key));
+  }
+  return keys;
+}
+
+/// Those that the profile wants to see, where it has events.
+std::vector<report::Column> result_columns(const catalogue::Profile& profile) {
+  std::vector<report::Column> columns;
+  if (!profile.events) return columns;
+  const catalogue::EventLayout layout(profile);
+  const auto keys = keys_of(layout);
+  for (const catalogue::EventColumn& wanted : profile.events->columns) {
+    for (std::size_t index = 0; index < keys.size(); ++index) {
+      const catalogue::Parameter& parameter = *layout.fields()[index].parameter;
+      if (parameter.name != wanted.parameter) continue;
+      const auto align = parameter.labels.empty() ? report::Align::right : report::Align::left;
+      const std::size_t width = std::max<std::size_t>(wanted.width, wanted.heading.size());
+      columns.push_back({wanted.heading, keys[index], align, width});
+    }
+  }
+  return columns;
 }
 
 Field only_shown(std::string key, std::string text, Tone tone = Tone::plain) {
@@ -40,13 +77,13 @@ Field result_of(EventKind kind) {
   return only_shown("result", "");
 }
 
-std::string_view to_text(device::EventSource source) {
+std::string_view to_text(device::EventOrigin source) {
   switch (source) {
-    case device::EventSource::push:
+    case device::EventOrigin::push:
       return "push";
-    case device::EventSource::poll:
+    case device::EventOrigin::poll:
       return "poll";
-    case device::EventSource::catch_up:
+    case device::EventOrigin::catch_up:
       return "catch-up";
   }
   return "";
@@ -79,7 +116,12 @@ NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile
     : target_(&target), tables_(std::move(tables)) {
   if (!profile.events) return;
   layout_.emplace(profile);
-  for (const auto& field : layout_->fields()) keys_.push_back(key_of(field.parameter->name));
+  keys_ = keys_of(*layout_);
+  for (std::size_t index = 0; index < keys_.size(); ++index) {
+    const catalogue::Parameter& parameter = *layout_->fields()[index].parameter;
+    if (parameter.name == profile.events->error) error_at_ = index;
+    if (parameter.unit == catalogue::torque_unit) has_torque_ = true;
+  }
 }
 
 Record NewsRecords::blank(std::string type, WallTime time) const {
@@ -109,14 +151,14 @@ Record NewsRecords::event(const device::EventNews& news) const {
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
     record.fields.push_back({keys_[index], value->number, value->to_string()});
-    if (keys_[index] != "error") continue;
+    if (index != error_at_) continue;
     std::string meaning = error_text(value->number.mantissa());
     if (value->number.mantissa() != 0) {
       text = fmt::format("E{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ", meaning);
     }
-    record.fields.push_back({"error_text", text_or_null(std::move(meaning))});
+    record.fields.push_back({keys_[index] + "_text", text_or_null(std::move(meaning))});
   }
-  record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
+  if (has_torque_) record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
   record.fields.push_back({"raw", news.block});
   if (news.standing == device::Standing::remembered) {
     record.fields.push_back({"remembered", true});
@@ -198,16 +240,20 @@ Record NewsRecords::link(const device::LinkNews& news, WallTime time) const {
   return record;
 }
 
-std::vector<report::Column> news_columns(Tools tools) {
+std::vector<report::Column> news_columns(Tools tools,
+                                         const std::vector<const catalogue::Profile*>& profiles) {
   using report::Align;
   std::vector<report::Column> columns = {{"TIME", "time", Align::left, 24}};
   if (tools == Tools::several) columns.push_back({"TARGET", "target", Align::left, 16});
-  columns.insert(columns.end(), {{"KIND", "kind", Align::left, 16},
-                                 {"NUMBER", "number", Align::right, 6},
-                                 {"PRESET", "preset", Align::right, 6},
-                                 {"TORQUE", "torque", Align::right, 7},
-                                 {"ANGLE", "a3", Align::right, 6},
-                                 {"RESULT", "result", Align::left, 6},
+  columns.push_back({"KIND", "kind", Align::left, 16});
+  for (const catalogue::Profile* profile : profiles) {
+    for (report::Column& column : result_columns(*profile)) {
+      const bool known = std::any_of(columns.begin(), columns.end(),
+                                     [&](const auto& other) { return other.key == column.key; });
+      if (!known) columns.push_back(std::move(column));
+    }
+  }
+  columns.insert(columns.end(), {{"RESULT", "result", Align::left, 6},
                                  {"SOURCE", "source", Align::left, 8},
                                  {"TEXT", "text", Align::left, 1}});
   return columns;

@@ -42,11 +42,14 @@ class NewsRecords {
   const Target* target_;
   std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
   std::vector<std::string> keys_ = {};  ///< in JSON, side by side with the layout's fields
+  std::optional<std::size_t> error_at_ = std::nullopt;  ///< of the code that the texts explain
+  bool has_torque_ = false;                             ///< in the unit that is set on the tool
   catalogue::CodeTables tables_;
 };
 
-/// Columns of a stream of news, drawn row by row.
+/// Columns of a stream of news, drawn row by row, with those that the profiles of its tools want.
 enum class Tools : std::uint8_t { one, several };
-std::vector<report::Column> news_columns(Tools tools);
+std::vector<report::Column> news_columns(Tools tools,
+                                         const std::vector<const catalogue::Profile*>& profiles);
 
 }  // namespace spindle::commands

@@ -103,8 +103,9 @@ std::string state_words(OpenTool& tool) {
 Result<Duration> meet_once(OpenTool& tool) {
   auto round_trip = tool.device.ping();
   const bool silent = !round_trip && round_trip.error().code == Errc::no_answer;
-  if (!silent || tool.profile->link.loopback || tool.profile->parameters.empty()) return round_trip;
-  const auto read = tool.device.read_each({tool.profile->parameters.front()}, device::Limits::skip);
+  const auto readable = tool.profile->select({});  // nothing that reading clears
+  if (!silent || tool.profile->link.loopback || !readable || readable->empty()) return round_trip;
+  const auto read = tool.device.read_each({readable->front()}, device::Limits::skip);
   if (!read) return tl::unexpected(read.error());
   return tool.device.session().last_round_trip();
 }

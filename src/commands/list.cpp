@@ -62,7 +62,7 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
 Result<Outcome> list(const ListOptions& options, Context& context) {
   const auto subject = subject_of(options, context);
   if (!subject) return tl::unexpected(subject.error());
-  auto parameters = subject->profile.select(subject->patterns);
+  auto parameters = subject->profile.describe(subject->patterns);
   if (!parameters) {
     parameters.error().asked_of = subject->target;
     return tl::unexpected(std::move(parameters.error()));

@@ -43,6 +43,8 @@ Error useless(std::string_view option, const catalogue::Profile& profile, std::s
 
 constexpr std::string_view no_identity = "its simulation has no identity";
 constexpr std::string_view no_events = "it has no operator who drives screws";
+constexpr std::string_view no_alarm = "no list 'present' of its profile shows it";
+constexpr std::string_view no_alarm_of_run = "its 'run' names no alarm";
 constexpr std::string_view no_warnings = "its 'run' names no warning";
 constexpr std::string_view no_motor = "it has no motor that a command word runs";
 
@@ -65,7 +67,8 @@ std::optional<Error> useless_option(const SimulateOptions& options,
       {"--rundown-every", bm.rundown_every.has_value(), able.operated, no_events},
       {"--busy", options.tool.busy.has_value(), able.configuration, no_motor},
       {"--warning", !options.tool.warnings.empty(), able.warnings, no_warnings},
-      {"--alarm", !options.tool.alarms.empty(), able.alarms, "its 'run' names no alarm"},
+      {"--alarm", !options.tool.alarms.empty(), able.alarms,
+       able.operated ? no_alarm : no_alarm_of_run},
       {"--no-gap", options.gaps == sim::LineModel::Gaps::ignored,
        profile.link.framing == modbus::Framing::tcp || !profile.link.serial.gaps.empty(),
        "it asks for no gaps"},
@@ -85,7 +88,7 @@ std::string_view why_not_felt(sim::FaultKind kind, const catalogue::Profile& pro
     case sim::FaultNeed::serial_line:
       return serial ? "" : "it speaks Modbus TCP";
     case sim::FaultNeed::events:
-      return sim::abilities_of(profile).operated ? "" : "it sends nothing unasked";
+      return sim::abilities_of(profile).pushes ? "" : "it sends nothing unasked";
     case sim::FaultNeed::screwdriver:
       return sim::abilities_of(profile).operated ? "" : "it stores what is written";
     case sim::FaultNeed::nothing:

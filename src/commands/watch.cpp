@@ -123,7 +123,7 @@ class Stage {
       ++remembered_;
       return record;
     }
-    if (news.source == device::EventSource::catch_up) ++caught_up_;
+    if (news.source == device::EventOrigin::catch_up) ++caught_up_;
     const catalogue::EventKind kind = records.kind_of(news.block);
     ++events_;
     if (kind == catalogue::EventKind::fastening_ok) ++ok_;
@@ -274,9 +274,49 @@ class Stage {
   bool closed_ = false;
 };
 
+/// Whether there is something to watch, and something to poll where it is said how.
+Result<device::WatchPlan> check_purpose(const WatchOptions& options,
+                                        const catalogue::Profile& profile, device::WatchPlan plan) {
+  const bool polls_values = plan.motor || !plan.values.empty();
+  if (plan.events == device::EventMode::none && !polls_values) {
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "this tool sends no events, so name what to watch",
+                                .hint = "such as 'status.*'",
+                                .name = profile.id});
+  }
+  const bool polls_events =
+      plan.events != device::EventMode::none &&
+      (plan.events == device::EventMode::unarmed || !catalogue::sends_unasked(profile));
+  const bool says_how = options.interval || options.samples != device::Samples::changes;
+  if (says_how && !polls_values && !polls_events) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "--all, --initial and --interval are about polled values",
+              .hint = "name some behind the tool, such as 'status.*'"});
+  }
+  return plan;
+}
+
+/// Why the counter alone can not be polled instead; empty: it can.
+std::string_view why_not_unarmed(const catalogue::Profile& profile) {
+  if (!profile.events) return "it has no events";
+  if (!catalogue::sends_unasked(profile)) return "its events are polled, it sends nothing unasked";
+  return profile.events->arm ? "" : "it sends its events whether they are wanted or not";
+}
+
+/// The usual pace is that of the profile, or ours.
 Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::Profile& profile) {
   device::WatchPlan plan{.events = options.events, .samples = options.samples};
+  if (profile.events && profile.events->interval) plan.interval = *profile.events->interval;
   plan.interval = options.interval.value_or(plan.interval);
+  if (options.events == device::EventMode::unarmed) {
+    if (const auto why = why_not_unarmed(profile); !why.empty()) {
+      return tl::unexpected(Error{.code = Errc::usage,
+                                  .message = fmt::format("--no-push does nothing here: {}", why),
+                                  .hint = "leave it out",
+                                  .name = profile.id});
+    }
+  }
   if (!profile.events) plan.events = device::EventMode::none;
   const auto model = device::RunModel::of(profile);
   if (model && (*model)->monitor() != nullptr) plan.motor = *(*model)->monitor();
@@ -286,21 +326,7 @@ Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::
     if (!values) return tl::unexpected(std::move(values.error()));
     plan.values = std::move(*values);
   }
-  if (plan.events == device::EventMode::none && !plan.motor && plan.values.empty()) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "this tool sends no events, so name what to watch",
-                                .hint = "such as 'status.*'",
-                                .name = profile.id});
-  }
-  const bool polls = plan.events == device::EventMode::poll || plan.motor || !plan.values.empty();
-  const bool says_how = options.interval || options.samples != device::Samples::changes;
-  if (says_how && !polls) {
-    return tl::unexpected(
-        Error{.code = Errc::usage,
-              .message = "--all, --initial and --interval are about polled values",
-              .hint = "name some behind the tool, such as 'status.*'"});
-  }
-  return plan;
+  return check_purpose(options, profile, std::move(plan));
 }
 
 /// Whether what was asked for can be watched on some tool that is known.
@@ -328,16 +354,32 @@ Result<void> check(const WatchOptions& options, const WatchedTool& tool, Profile
   return plan_of(options, tool.known()->profile).map([](const device::WatchPlan&) {});
 }
 
+/// What a tool may be of which nothing is known yet.
+std::vector<const catalogue::Profile*> candidates(ProfileShelf& shelf, const Context& context) {
+  std::vector<const catalogue::Profile*> profiles;
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto known = shelf.take(entry.id);
+    if (known && (*known)->profile.identity) profiles.push_back(&(*known)->profile);
+  }
+  return profiles;
+}
+
 /// Motors have other columns than tools that count their results.
-std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools,
-                                        const WatchOptions& options) {
+std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, ProfileShelf& shelf,
+                                        const WatchOptions& options, const Context& context) {
   const bool one = tools.size() == 1 && !names_group(options.targets.front());
   const Tools shown = one ? Tools::one : Tools::several;
   const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
     return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&
            !tool.known()->profile.events;
   });
-  return motors ? motor_columns(shown) : news_columns(shown);
+  if (motors) return motor_columns(shown);
+  std::vector<const catalogue::Profile*> profiles;
+  for (const WatchedTool& tool : tools) {
+    if (tool.known() == nullptr) return news_columns(shown, candidates(shelf, context));
+    profiles.push_back(&tool.known()->profile);
+  }
+  return news_columns(shown, profiles);
 }
 
 /// Whether the error is one of the tool or its link that does not say yet whose it is.
@@ -396,7 +438,7 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   for (const WatchedTool& tool : *tools) targets.push_back(tool.target());
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
-  Stage stage(options, tools->size(), columns_for(*tools, options), context);
+  Stage stage(options, tools->size(), columns_for(*tools, shelf, options, context), context);
   for_each_side_by_side(
       *tools, [&](WatchedTool& tool) { watch_one(tool, open_transport, stage, options, context); });
   return stage.finish();

@@ -96,7 +96,9 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
     limits.absent.push_back(
         {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
   }
-  if (profile.events) limits.forbidden_shapes.push_back(read_of(shape_of(*profile.events)));
+  if (catalogue::sends_unasked(profile)) {
+    limits.forbidden_shapes.push_back(read_of(shape_of(*profile.events)));
+  }
   for (const link::SpontaneousShape& shape : unasked) {
     limits.forbidden_shapes.push_back(read_of(shape));
   }
@@ -125,7 +127,7 @@ link::Units units_of(const catalogue::Profile& profile) {
 
 link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
   link::DemuxRules rules{.framing = framing, .units = units_of(profile)};
-  if (profile.events) rules.spontaneous.push_back(shape_of(*profile.events));
+  if (catalogue::sends_unasked(profile)) rules.spontaneous.push_back(shape_of(*profile.events));
   return rules;
 }
 
@@ -418,6 +420,11 @@ Result<void> Device::require_known_registers() {
 
 Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& parameters,
                                                Limits limits, const link::Progress& progress) {
+  for (const Parameter& parameter : parameters) {
+    if (!profile_->consumes(parameter)) continue;
+    return tl::unexpected(about({.code = Errc::usage, .message = "reading it clears it"},
+                                parameter.name, parameter.address));
+  }
   std::vector<RegisterRange> wanted;
   wanted.reserve(parameters.size());
   for (const Parameter& parameter : parameters) {
@@ -870,10 +877,12 @@ Result<Registers> Device::read_raw(const RegisterRange& range) {
 }
 
 Result<void> Device::switch_events(EventOutput output) {
-  const catalogue::EventFacts& events = *profile_->events;
-  const std::uint16_t value = output == EventOutput::on ? events.arm_value : events.disarm_value;
-  return client_.write(modbus::RegisterAddress{events.arm_register}, value)
-      .map_error([this](Error error) { return located(std::move(error)); });
+  const auto& arm = profile_->events->arm;
+  if (!arm) return {};
+  const std::uint16_t value = output == EventOutput::on ? arm->value : arm->disarm;
+  return client_.write(modbus::RegisterAddress{arm->address}, value).map_error([this](Error error) {
+    return located(std::move(error));
+  });
 }
 
 Result<std::uint16_t> Device::event_number() {
@@ -884,26 +893,56 @@ Result<std::uint16_t> Device::event_number() {
   });
 }
 
-Result<std::optional<Registers>> Device::last_event() {
+Result<Registers> Device::event_block() {
   const catalogue::EventFacts& events = *profile_->events;
   const auto table = catalogue::table_of(events);
-  const auto all_but_one = static_cast<std::uint16_t>(events.count - 1);
-  const auto last = static_cast<std::uint16_t>(events.first + all_but_one);
-  const auto number = profile_->find(events.number);
+  // What is read in one piece looks like a frame that was sent unasked.
+  const unsigned unlike = catalogue::sends_unasked(*profile_) ? events.count - 1U : events.count;
+  const unsigned most = std::clamp<unsigned>(profile_->link.max_read, 1, std::max(unlike, 1U));
+  Registers block;
+  while (block.size() < events.count) {
+    const auto left = static_cast<unsigned>(events.count - block.size());
+    const auto first = static_cast<std::uint16_t>(events.first + block.size());
+    auto part = read_raw({table, first, static_cast<std::uint16_t>(std::min(left, most))});
+    if (!part) return part;
+    block.insert(block.end(), part->begin(), part->end());
+  }
+  return block;
+}
+
+Result<std::optional<Registers>> Device::last_event() {
+  const auto number = profile_->find(profile_->events->number);
   if (!number) return tl::unexpected(number.error());
-  const std::size_t number_at = number->address.value - events.first;
+  const std::size_t number_at = number->address.value - profile_->events->first;
   for (int attempt = 0; attempt < max_event_reads; ++attempt) {
-    auto block = read_raw({table, events.first, all_but_one});
+    auto block = event_block();
     if (!block) return tl::unexpected(std::move(block.error()));
-    const auto tail = read_raw({table, last, 1});
-    if (!tail) return tl::unexpected(tail.error());
     const auto again = event_number();
     if (!again) return tl::unexpected(again.error());
-    if (*again != (*block)[number_at]) continue;
-    block->push_back(tail->front());
-    return std::move(*block);
+    if (*again == (*block)[number_at]) return std::move(*block);
   }
   return std::nullopt;
+}
+
+Result<Shown> Device::take_event_flag() {
+  if (session_->options().rules.framing == modbus::Framing::rtu) {
+    return tl::unexpected(
+        located({.code = Errc::usage,
+                 .message = "a flag that reading clears can not be read on a serial line",
+                 .hint = "connect the tool by Modbus TCP"}));
+  }
+  for (const Parameter& parameter : profile_->parameters) {
+    if (parameter.name != profile_->events->flag) continue;
+    return client_.read_once_ever(range_of(parameter))
+        .map_error([this](Error error) { return located(std::move(error)); })
+        .map([](const Registers& registers) {
+          const bool is_set = std::any_of(registers.begin(), registers.end(),
+                                          [](std::uint16_t word) { return word != 0; });
+          return is_set ? Shown::yes : Shown::no;
+        });
+  }
+  return tl::unexpected(
+      located({.code = Errc::usage, .message = "the profile says of no flag of events"}));
 }
 
 Result<Duration> Device::ping() {

@@ -37,7 +37,13 @@ Result<void> RunFollower::prepare() {
   const auto number = device_->event_number();
   if (!number) return tl::unexpected(number.error());
   tracker_.set_baseline(*number);
-  arm_due_ = clock_->now() + device_->profile().events->arm_every;
+  return arm();
+}
+
+/// The next time is due before the output expires; never where nothing arms it.
+Result<void> RunFollower::arm() {
+  const auto& arming = device_->profile().events->arm;
+  arm_due_ = arming ? clock_->now() + arming->every : TimePoint::max();
   return device_->switch_events(EventOutput::on);
 }
 
@@ -81,11 +87,7 @@ Result<std::optional<FollowedRun>> RunFollower::step(TimePoint deadline) {
   return FollowedRun{*event ? RunEnding::result : RunEnding::ended, std::move(*event)};
 }
 
-Result<void> RunFollower::keep_armed() {
-  if (clock_->now() < arm_due_) return {};
-  arm_due_ = clock_->now() + device_->profile().events->arm_every;
-  return device_->switch_events(EventOutput::on);
-}
+Result<void> RunFollower::keep_armed() { return clock_->now() < arm_due_ ? Result<void>() : arm(); }
 
 /// Reads whether the tool runs, and keeps its output armed.
 Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
@@ -108,7 +110,7 @@ Result<std::optional<EventNews>> RunFollower::next_result(TimePoint until) {
     auto frame = device_->session().next_spontaneous(until);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     if (!*frame) return std::nullopt;
-    auto result = sift({EventSource::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
+    auto result = sift({EventOrigin::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
     if (result) return result;
   } while (clock_->now() < until);
   return std::nullopt;
@@ -118,7 +120,7 @@ Result<std::optional<EventNews>> RunFollower::fetch_result() {
   auto block = device_->last_event();
   if (!block) return tl::unexpected(std::move(block.error()));
   if (!*block) return std::nullopt;
-  return sift({EventSource::catch_up, std::move(**block), clock_->wall()});
+  return sift({EventOrigin::catch_up, std::move(**block), clock_->wall()});
 }
 
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "spindle/modbus/pdu.hpp"
-
 namespace spindle::device {
 namespace {
 
@@ -29,12 +27,6 @@ constexpr Duration lag_told_every = std::chrono::minutes(1);
 
 /// How long a wait may be before it is asked anew when to end.
 constexpr Duration longest_pause = std::chrono::seconds(1);
-
-/// The last words to a tool must not hold up the end of the program.
-constexpr Duration farewell_timeout = std::chrono::milliseconds(500);
-
-/// How many frames are taken at once: a tool that never falls silent must not keep us from others.
-constexpr std::size_t max_taken = 4096;
 
 /// Whether who refused says that it only can not do it now (1.1b3, section 7).
 bool is_busy(std::uint8_t exception) {
@@ -71,40 +63,6 @@ Result<void> ask_twice(Ask ask) {
   Result<void> answered = ask();
   if (!answered && link::is_lost_answer(answered.error())) answered = ask();
   return answered;
-}
-
-/// Whether one event number is older than another, across the end of the counter.
-bool is_before(std::uint16_t number, std::uint16_t other) {
-  constexpr std::uint16_t half = 0x8000;
-  return number != other && static_cast<std::uint16_t>(other - number) < half;
-}
-
-std::optional<GapNews> gap_of(const Tracked& tracked, EventSource source) {
-  switch (tracked.novelty) {
-    case Novelty::restart:
-      return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
-    case Novelty::doubtful:
-      return GapNews{std::nullopt,
-                     "the tool may have been restarted while nobody was connected, and count its "
-                     "events anew"};
-    case Novelty::wrap:
-      return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
-    case Novelty::jump:
-      break;
-    case Novelty::baseline:
-    case Novelty::repeat:
-    case Novelty::next:
-      return std::nullopt;
-  }
-  switch (source) {
-    case EventSource::catch_up:
-      return GapNews{tracked.missed, "events while nobody was connected"};
-    case EventSource::poll:
-      return GapNews{tracked.missed, "events came faster than they were polled"};
-    case EventSource::push:
-      break;
-  }
-  return GapNews{tracked.missed, "the tool's event counter jumped"};
 }
 
 }  // namespace
@@ -214,8 +172,10 @@ Result<void> Watcher::learn(const catalogue::Profile& profile) {
   motor_.reset();
   if (plan_.motor) motor_.emplace(*plan_.motor, plan_.values);
   profile_ = &profile;
-  layout_.reset();
-  if (profile.events) layout_.emplace(profile);
+  source_ = EventSource::make(profile, plan_.events, *clock_, [this](const auto& news) {
+    if (std::holds_alternative<EventNews>(news)) served_ = true;
+    std::visit([this](const auto& one) { tell(one); }, news);
+  });
   return {};
 }
 
@@ -228,38 +188,26 @@ void Watcher::compare_identity(const std::string& identity) {
     message += ": " + identity;
   }
   known_identity_ = identity;
+  if (source_ && !std::exchange(caveat_told_, true) && !source_->caveat().empty()) {
+    message += fmt::format("; {}", source_->caveat());
+  }
   tell(LinkNews{LinkState::connected, attempts_, message});
   if (!other) return;
-  if (plan_.events != EventMode::none) {
+  if (source_) {
     tell(GapNews{std::nullopt, "what the tool of before did after its link was lost is not known"});
+    source_->forget();
   }
-  tracker_ = {};
   previous_.assign(plan_.values.size(), std::nullopt);
 }
 
-/// The counter is read before the output is armed, and the last event once more after it: whatever
-/// happens in between is either pushed or fetched.
 Result<void> Watcher::begin() {
   const TimePoint now = clock_->now();
   keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
   poll_due_ = std::max(now, poll_due_);
   beat_ = {.since = poll_due_, .missed = beat_.missed};
   meanings_known_ = false;
-  if (plan_.events == EventMode::none) return {};
-  if (tracker_.last()) {
-    tracker_.look_again(now - seen_at_);
-  } else {
-    const auto number = link_->device.event_number();
-    if (!number) return tl::unexpected(number.error());
-    tracker_.set_baseline(*number);
-    take_waiting();  // pushed before the counter was read, so they are old
-  }
-  if (plan_.events == EventMode::push) {
-    auto armed = ask_twice([&] { return link_->device.switch_events(EventOutput::on); });
-    if (!armed) return armed;
-    arm_due_ = now + with_margin(profile_->events->arm_every);
-  }
-  return fetch_last(EventSource::catch_up).map([this](Fetched) { seen_at_ = clock_->now(); });
+  if (!source_) return {};
+  return source_->attach(link_->device, now - seen_at_).map([this] { seen_at_ = clock_->now(); });
 }
 
 // ---- serving ----
@@ -280,18 +228,16 @@ Result<void> Watcher::serve(const Until& until) {
 TimePoint Watcher::next_due() const {
   TimePoint due = clock_->now() + longest_pause;
   if (profile_->link.keep_alive > Duration::zero()) due = std::min(due, keep_alive_due_);
-  if (plan_.events == EventMode::push) due = std::min(due, arm_due_);
+  if (source_) due = std::min(due, source_->next_due());
   if (polls()) due = std::min(due, poll_due_);
   return due;
 }
 
 Result<void> Watcher::run_due() {
   const TimePoint now = clock_->now();
-  if (plan_.events == EventMode::push && now >= arm_due_) {
-    arm_due_ = now + with_margin(profile_->events->arm_every);
-    if (auto armed = ask([&] { return link_->device.switch_events(EventOutput::on); }); !armed) {
-      return armed;
-    }
+  if (source_) {
+    auto armed = source_->run_due([this](const auto& request) { return ask(request); });
+    if (!armed) return armed;
   }
   if (profile_->link.keep_alive > Duration::zero() && now >= keep_alive_due_) {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
@@ -342,12 +288,8 @@ Result<void> Watcher::ask(const std::function<Result<void>()>& request) {
 }
 
 Result<void> Watcher::poll() {
-  if (plan_.events == EventMode::poll) {
-    const auto number = link_->device.event_number();
-    if (!number) return tl::unexpected(number.error());
-    if (*number != tracker_.last()) {
-      if (auto fetched = fetch_polled(*number); !fetched) return fetched;
-    }
+  if (source_ && source_->polls()) {
+    if (auto polled = source_->poll(); !polled) return polled;
     seen_at_ = clock_->now();
   }
   if (!polls_values()) return {};
@@ -355,17 +297,6 @@ Result<void> Watcher::poll() {
     served_ = true;
     seen_at_ = clock_->now();
   });
-}
-
-/// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
-Result<void> Watcher::fetch_polled(std::uint16_t number) {
-  const auto fetched = fetch_last(EventSource::poll);
-  if (!fetched) return tl::unexpected(fetched.error());
-  if (*fetched == Fetched::yes) return {};
-  const auto missed = static_cast<std::uint16_t>(number - tracker_.last().value_or(number));
-  tracker_.set_baseline(number);
-  tell(GapNews{missed, "events came faster than they could be read"});
-  return {};
 }
 
 /// The values on every beat; what else has to be known between them.
@@ -452,63 +383,14 @@ void Watcher::tell_reading(std::size_t index, Reading& reading) {
 
 // ---- events ----
 
-/// Events may have been pushed while the last one was fetched: it is told in its place among them,
-/// and only if it is not one of them.
-Result<Watcher::Fetched> Watcher::fetch_last(EventSource source) {
-  const auto block = link_->device.last_event();
-  const WallTime fetched = clock_->wall();
-  const auto pushed = take_waiting();
-  const auto block_of = [](const link::Spontaneous& frame) {
-    return modbus::registers_of(frame.pdu);
-  };
-  const bool read = block && *block;
-  const bool needed =
-      read && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
-        return number_of(block_of(frame)) == number_of(**block);
-      });
-  auto next = pushed.begin();
-  for (; needed && next != pushed.end(); ++next) {
-    if (!is_before(number_of(block_of(*next)), number_of(**block))) break;
-    hear(*next);
-  }
-  if (needed) judge(source, **block, fetched);
-  for (; next != pushed.end(); ++next) hear(*next);
-  if (!block) return tl::unexpected(block.error());
-  return read ? Fetched::yes : Fetched::too_fast;
-}
-
-/// What was pushed and not heard yet, without waiting.
-std::vector<link::Spontaneous> Watcher::take_waiting() {
-  std::vector<link::Spontaneous> waiting;
-  while (waiting.size() < max_taken) {
-    auto frame = link_->device.session().next_spontaneous(clock_->now());
-    if (!frame || !*frame) break;  // a broken line is noticed by whoever uses it next
-    waiting.push_back(std::move(**frame));
-  }
-  return waiting;
-}
-
 void Watcher::hear_waiting() {
-  for (const link::Spontaneous& frame : take_waiting()) hear(frame);
+  if (source_) source_->handle_waiting();
 }
 
 void Watcher::hear(const link::Spontaneous& frame) {
-  if (plan_.events == EventMode::none) return;
+  if (!source_) return;
   seen_at_ = clock_->now();
-  judge(EventSource::push, modbus::registers_of(frame.pdu), frame.wall);
-}
-
-void Watcher::judge(EventSource source, const Registers& block, WallTime time) {
-  const Tracked tracked = tracker_.track(number_of(block), block);
-  if (!tracked.is_new()) return;
-  if (const auto gap = gap_of(tracked, source)) tell(*gap);
-  // Since it was restarted the tool has had no event; what stands in its registers is none.
-  const bool nothing_yet = tracked.novelty == Novelty::restart && number_of(block) == 0 &&
-                           (source != EventSource::push || EventTracker::is_blank(block));
-  if (nothing_yet) return;
-  served_ = true;
-  const bool remembered = tracked.novelty == Novelty::restart && source != EventSource::push;
-  tell(EventNews{source, block, time, remembered ? Standing::remembered : Standing::result});
+  source_->handle(frame);
 }
 
 void Watcher::tell(const News& news) {
@@ -518,14 +400,7 @@ void Watcher::tell(const News& news) {
 // ---- leaving ----
 
 void Watcher::leave() {
-  if (!link_ || plan_.events != EventMode::push) return;
-  link::Session& session = link_->device.session();
-  session.shield();
-  session.set_answer_timeout(std::min(session.options().answer_timeout, farewell_timeout));
-  // The tool switches itself off when it hears nothing; a lost farewell costs only time.
-  const auto ignored = link_->device.switch_events(EventOutput::off);
-  static_cast<void>(ignored);
-  hear_waiting();
+  if (link_ && source_) source_->disarm();
 }
 
 }  // namespace spindle::device

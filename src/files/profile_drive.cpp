@@ -14,10 +14,11 @@ namespace {
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 
-constexpr std::array<std::pair<std::string_view, catalogue::CodeTable>, 3> table_of_codes = {
+constexpr std::array<std::pair<std::string_view, catalogue::CodeTable>, 4> table_of_codes = {
     {{"error-codes", catalogue::CodeTable::error},
      {"warning-codes", catalogue::CodeTable::warning},
-     {"refusals", catalogue::CodeTable::refusal}}};
+     {"refusals", catalogue::CodeTable::refusal},
+     {"none", catalogue::CodeTable::none}}};
 
 // ---- rules ----
 
@@ -207,6 +208,10 @@ void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findi
     map.finish();
     draft.profile.alarm_lists.push_back(std::move(list));
   }
+}
+
+void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+  assign(draft.profile.alarm_reset, to_text(node, findings));
 }
 
 void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings) {

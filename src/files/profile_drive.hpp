@@ -8,6 +8,7 @@ namespace spindle::files {
 /// lays its keys over the draft.
 void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings);
 void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findings);
+void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Findings& findings);
 void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings);
 
 /// Their rules, beside those of check_rules().

@@ -27,18 +27,14 @@ constexpr std::string_view counter = "{n}";
 constexpr std::array<std::pair<std::string_view, Kind>, 4> encoding_words = {
     {{"u16", Kind::u16}, {"i16", Kind::i16}, {"u32", Kind::u32}, {"i32", Kind::i32}}};
 
-/// "torque" stands for the torque unit that is set on the tool.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 24> unit_words = {{
-    {"", ""},         {"torque", "torque"}, {"%", "%"},           {"deg", "deg"},
-    {"rpm", "rpm"},   {"us", "us"},         {"ms", "ms"},         {"s", "s"},
-    {"min", "min"},   {"h", "h"},           {"degC", "degC"},     {"V", "V"},
-    {"mV", "mV"},     {"A", "A"},           {"mA", "mA"},         {"W", "W"},
-    {"Hz", "Hz"},     {"kgf.cm", "kgf.cm"}, {"kgf.m", "kgf.m"},   {"N.m", "N.m"},
-    {"cN.m", "cN.m"}, {"lbf.in", "lbf.in"}, {"ozf.in", "ozf.in"}, {"lbf.ft", "lbf.ft"},
-}};
+/// Longer ones would break every table.
+constexpr std::size_t longest_unit = 12;
 
 constexpr std::array<std::pair<std::string_view, catalogue::Cloning>, 2> clone_words = {
     {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}}};
+
+constexpr std::array<std::pair<std::string_view, catalogue::Reading>, 2> reading_words = {
+    {{"harmless", catalogue::Reading::harmless}, {"consumes", catalogue::Reading::consumes}}};
 
 constexpr std::array<std::pair<std::string_view, catalogue::Effect>, 5> effect_words = {
     {{"at-once", catalogue::Effect::at_once},
@@ -168,6 +164,20 @@ void read_scale(YamlMap& map, Parameter& parameter) {
   }
 }
 
+/// As documents print it; "torque" stands for the torque unit that is set on the tool.
+void read_unit(YamlMap& map, Parameter& parameter) {
+  auto unit = map.text("unit");
+  if (!unit) return;
+  const bool is_word = std::none_of(unit->begin(), unit->end(),
+                                    [](unsigned char c) { return c <= ' ' || c == 0x7F; });
+  if (is_word && unit->size() <= longest_unit) {
+    parameter.unit = std::move(*unit);
+  } else {
+    map.findings().add(map.get("unit")->at,
+                       fmt::format("a unit is one word of at most {} bytes", longest_unit));
+  }
+}
+
 std::string read_name(YamlMap& map, const YamlNode* group) {
   if (group == nullptr) return map.text("name", Need::required).value_or("");
   map.allow("name");
@@ -214,9 +224,7 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   assign(parameter.encoding.kind,
          map.word<Kind>("encoding", "encoding", encoding_words, Need::required));
   read_scale(map, parameter);
-  if (const auto unit = map.word<std::string_view>("unit", "unit", unit_words)) {
-    parameter.unit = *unit;
-  }
+  read_unit(map, parameter);
   read_limits(map, parameter);
   parameter.default_value = map.decimal("default");
   if (const YamlNode* labels = map.get("labels")) {
@@ -230,6 +238,7 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   assign(parameter.hazard, map.word<Hazard>("hazard", "hazard", hazard_words));
   assign(parameter.access,
          map.word<catalogue::Access>("access", "access", access_words, Need::required));
+  assign(parameter.reading, map.word<catalogue::Reading>("reading", "reading", reading_words));
   assign(parameter.evidence,
          map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
   assign(parameter.source, map.text("source", Need::required));

@@ -186,40 +186,70 @@ void read_identity(const YamlNode& node, ProfileDraft& draft, Findings& findings
 
 // ---- events, limits, numbered ----
 
+constexpr std::array<std::pair<std::string_view, catalogue::EventModel>, 3> source_words = {
+    {{"push", catalogue::EventModel::push},
+     {"counter", catalogue::EventModel::counter},
+     {"flag", catalogue::EventModel::flag}}};
+
 void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
   YamlMap map(node, findings);
-  assign(events.arm_register,
-         map.number<std::uint16_t>("register", need_of(events.arm_register != 0)));
-  assign(events.arm_value, map.number<std::uint16_t>("value"));
-  assign(events.disarm_value, map.number<std::uint16_t>("disarm"));
-  assign(events.arm_every, map.duration("every"));
-  assign(events.arm_expires, map.duration("expires"));
+  auto [arm, need] = section_of(events.arm);
+  assign(arm.address, map.number<std::uint16_t>("register", need));
+  assign(arm.value, map.number<std::uint16_t>("value"));
+  assign(arm.disarm, map.number<std::uint16_t>("disarm"));
+  assign(arm.every, map.duration("every"));
+  assign(arm.expires, map.duration("expires"));
   map.finish();
+}
+
+std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at,
+                                            Findings& findings) {
+  const auto kind = catalogue::parse_event_kind(name);
+  if (!kind) {
+    const auto& known = catalogue::event_kind_texts;
+    findings.add_once(at, unknown_word("event kind", name, {known.begin(), known.end()}));
+  }
+  return kind;
 }
 
 void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& findings) {
   std::map<std::int64_t, std::string> names;
   read_names(node, names, findings);
   for (const auto& [number, name] : names) {
-    if (const auto kind = catalogue::parse_event_kind(name)) {
-      events.kinds.insert_or_assign(number, *kind);
-    } else {
-      const auto& known = catalogue::event_kind_texts;
-      findings.add_once(node->at, unknown_word("event kind", name, {known.begin(), known.end()}));
-    }
+    const auto kind = to_kind(name, node->at, findings);
+    if (kind) events.kinds.insert_or_assign(number, *kind);
+  }
+}
+
+void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
+  expect(node, YamlNode::Kind::sequence, findings);
+  events.columns.clear();
+  for (const YamlNode& item : node.items) {
+    YamlMap map(item, findings);
+    catalogue::EventColumn column;
+    assign(column.heading, map.text("heading", Need::required));
+    assign(column.parameter, map.text("parameter", Need::required));
+    assign(column.width, map.number<std::uint8_t>("width"));
+    map.finish();
+    events.columns.push_back(std::move(column));
   }
 }
 
 void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   auto [events, need] = section_of(draft.profile.events);
-  if (const YamlNode* arm = map.get("arm", need)) read_arm(*arm, events, findings);
+  assign(events.model, map.word<catalogue::EventModel>("source", "source of events", source_words));
+  if (const YamlNode* arm = map.get("arm")) read_arm(*arm, events, findings);
   assign(events.function, map.number<std::uint8_t>("function", need));
   assign(events.first, map.number<std::uint16_t>("first", need));
   assign(events.count, map.number<std::uint16_t>("count", need));
-  assign(events.number, map.text("number", need));
+  assign(events.number, map.text("number"));
+  assign(events.flag, map.text("flag"));
   assign(events.kind, map.text("kind", need));
   read_kinds(map.get("kinds"), events, findings);
+  assign(events.error, map.text("error"));
+  if (const YamlNode* columns = map.get("columns")) read_columns(*columns, events, findings);
+  if (auto interval = map.duration("interval")) events.interval = *interval;
   map.finish();
 }
 
@@ -369,13 +399,13 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
   map.finish();
 }
 
-void read_simulated_values(const YamlNode& node, catalogue::SimulationFacts& facts,
-                           Findings& findings) {
+void read_raw_values(const YamlNode& node, std::vector<catalogue::SimulationFacts::Value>& values,
+                     Findings& findings) {
   expect(node, YamlNode::Kind::map, findings);
   for (const YamlEntry& entry : node.entries) {
     const auto raw = parse_integer(entry.value.text);
     if (raw) {
-      facts.values.push_back({entry.key, *raw});
+      values.push_back({entry.key, *raw});
     } else {
       findings.add_once(entry.value.at, "a whole number is expected here");
     }
@@ -393,9 +423,23 @@ void read_simulated_limits(const YamlNode& node, catalogue::SimulationFacts& fac
   }
 }
 
+void read_simulated_events(const YamlNode& node, catalogue::SimulationFacts& facts,
+                           Findings& findings) {
+  expect(node, YamlNode::Kind::map, findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto kind = to_kind(entry.key, entry.key_at, findings);
+    expect(entry.value, YamlNode::Kind::sequence, findings);
+    for (const YamlNode& item : entry.value.items) {
+      std::vector<catalogue::SimulationFacts::Value> values;
+      read_raw_values(item, values, findings);
+      if (kind) facts.events.push_back({*kind, std::move(values)});
+    }
+  }
+}
+
 void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry, std::int64_t raw,
                        Findings& findings) {
-  const auto meant = profile.select({entry.key});
+  const auto meant = profile.describe({entry.key});
   if (!meant) {
     findings.add(entry.key_at, message_of(meant.error()));
     return;
@@ -436,6 +480,7 @@ void ProfileDraft::leave_out_half_read() {
   if (!refusals.sound) profile.refusals.reset();
   if (!alarm_lists.sound) profile.alarm_lists.clear();
   if (!watched.sound) profile.watched.clear();
+  if (!alarm_reset.sound) profile.alarm_reset.clear();
 }
 
 ProfileHead read_head(const YamlNode& document, Findings& findings) {
@@ -473,6 +518,7 @@ void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findi
   read_section(map, "refusals", read_refusals, draft.refusals, draft);
   read_section(map, "alarm-lists", read_alarm_lists, draft.alarm_lists, draft);
   read_section(map, "watch", read_watched, draft.watched, draft);
+  read_section(map, "alarm-reset", read_alarm_reset, draft.alarm_reset, draft);
   if (const YamlNode* codes = map.get("exceptions")) {
     read_codes(*codes, profile.exceptions, findings);
   }
@@ -518,8 +564,9 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
   if (const YamlNode* node = map.get("identity")) {
     read_simulated_identity(*node, facts, findings);
   }
-  if (const YamlNode* node = map.get("values")) read_simulated_values(*node, facts, findings);
+  if (const YamlNode* node = map.get("values")) read_raw_values(*node, facts.values, findings);
   if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
+  if (const YamlNode* node = map.get("events")) read_simulated_events(*node, facts, findings);
   assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
   assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
   if (const YamlNode* alarms = map.get("permanent-alarms")) {
@@ -536,15 +583,21 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
 
 void check_simulation(const catalogue::Profile& profile, const YamlNode& document,
                       Findings& findings) {
-  if (const YamlNode* values = document.find("values")) {
-    for (const YamlEntry& entry : values->entries) {
+  const auto check_values = [&](const YamlNode& values) {
+    for (const YamlEntry& entry : values.entries) {
       const auto raw = parse_integer(entry.value.text).value_or(0);
       check_start_value(profile, entry, raw, findings);
     }
-  }
+  };
+  if (const YamlNode* values = document.find("values")) check_values(*values);
   if (const YamlNode* limits = document.find("limits")) {
     for (const YamlEntry& entry : limits->entries) {
       check_start_value(profile, entry, 0, findings);
+    }
+  }
+  if (const YamlNode* events = document.find("events")) {
+    for (const YamlEntry& event : events->entries) {
+      for (const YamlNode& item : event.value.items) check_values(item);
     }
   }
 }

@@ -38,6 +38,7 @@ struct ProfileDraft {
   Origin refusals = {};
   Origin alarm_lists = {};
   Origin watched = {};
+  Origin alarm_reset = {};
   std::unordered_map<std::string, std::size_t> parameter_index = {};
   /// Parameters that were left out because not all of them could be read.
   std::unordered_set<std::string> half_read = {};

@@ -426,6 +426,102 @@ void event_block_is_legal(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
+/// Each source has keys of its own.
+void event_source_is_complete(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events) return;
+  const catalogue::EventFacts& events = *draft.profile.events;
+  const bool pushes = events.model == catalogue::EventModel::push;
+  const bool flags = events.model == catalogue::EventModel::flag;
+  const auto add = [&](std::string_view key, std::string message) {
+    findings.add_once(draft.events.of(key), std::move(message));
+  };
+  if (!flags && events.number.empty()) add("number", "key 'number' is missing");
+  if (flags && events.flag.empty()) add("flag", "key 'flag' is missing");
+  if (!flags && !events.flag.empty()) add("flag", "a flag needs 'source: flag'");
+  if (!pushes && events.arm) add("arm", "only frames that come unasked are armed: 'source: push'");
+  if (events.interval && *events.interval <= Duration::zero()) {
+    add("interval", "an interval is above zero");
+  }
+  // There an answer may be proved by reading again, which would find a flag that is cleared.
+  if (flags && draft.profile.link.framing == modbus::Framing::rtu) {
+    add("source", "a flag that reading clears can not be read on a serial line");
+  }
+  const Parameter* number = parameter_named(draft, events.number);
+  if (number != nullptr && number->encoding.kind != catalogue::Kind::u16) {
+    add("number", fmt::format("{} counts events, so its encoding is u16", number->name));
+  }
+}
+
+void event_flag_is_consumed(const ProfileDraft& draft, Findings& findings) {
+  if (!draft.profile.events || draft.profile.events->flag.empty()) return;
+  const std::string& name = draft.profile.events->flag;
+  if (draft.lacks(name)) findings.add_once(draft.events.of("flag"), no_such_parameter(draft, name));
+  const Parameter* flag = parameter_named(draft, name);
+  if (flag == nullptr || flag->reading == catalogue::Reading::consumes) return;
+  findings.add_once(draft.events.of("flag"),
+                    fmt::format("{}: a flag is cleared by reading; say so there with "
+                                "'reading: consumes'",
+                                name));
+}
+
+bool share(const Span& span, RegisterTable table, unsigned first, unsigned last) {
+  return span.table == table && span.first <= last && first <= span.last;
+}
+
+/// What else reads registers that reading clears, in words; empty: nothing.
+std::string other_reader(const ProfileDraft& draft, const Span& span) {
+  const catalogue::Profile& profile = draft.profile;
+  for (const catalogue::Area& area : profile.link.contiguous) {
+    if (share(span, area.table, area.from, area.to)) return "'contiguous' reads it along";
+  }
+  const auto& numbered = profile.numbered;
+  if (numbered && share(span, numbered->table, numbered->from, numbered->to)) {
+    return "it has a number, too";
+  }
+  if (const auto& limits = profile.limits) {
+    for (const unsigned offset : {limits->minimum_offset, limits->maximum_offset}) {
+      if (share(span, RegisterTable::holding, limits->from + offset, limits->to + offset)) {
+        return "it stands among the tool's own limits";
+      }
+    }
+  }
+  if (const auto& events = profile.events) {
+    const unsigned last = events->first + std::max<unsigned>(events->count, 1) - 1U;
+    if (share(span, catalogue::table_of(*events), events->first, last)) {
+      return "it stands in the event block";
+    }
+  }
+  const std::string& name = profile.parameters[span.index].name;
+  for (const Action& action : profile.actions) {
+    if (action.confirm == name) return fmt::format("action '{}' reads it", action.name);
+  }
+  if (profile.refusals && profile.refusals->parameter == name) return "refusals read it";
+  for (std::size_t i = 0; i < profile.parameters.size(); ++i) {
+    const Span other = span_of(profile.parameters[i], i);
+    if (profile.parameters[i].bits_by == name) {
+      return fmt::format("the bits of {} depend on it", profile.parameters[i].name);
+    }
+    if (i != span.index && share(span, other.table, other.first, other.last)) {
+      return fmt::format("it shares a register with {}", profile.parameters[i].name);
+    }
+  }
+  return {};
+}
+
+void consumed_registers_have_one_reader(const ProfileDraft& draft, Findings& findings) {
+  for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
+    const Parameter& parameter = draft.profile.parameters[i];
+    if (parameter.reading != catalogue::Reading::consumes) continue;
+    const auto& events = draft.profile.events;
+    std::string why = other_reader(draft, span_of(parameter, i));
+    if (parameter.access != Access::read_only) why = "it would be read back behind a write";
+    if (!events || events->flag != parameter.name) why = "it is not the 'flag' of the events";
+    if (why.empty()) continue;
+    findings.add_once(draft.parameters[i].of("reading"),
+                      fmt::format("{}: reading clears it, but {}", parameter.name, why));
+  }
+}
+
 void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings) {
   if (!draft.profile.events) return;
   const catalogue::EventFacts& events = *draft.profile.events;
@@ -434,6 +530,7 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings
           ? RegisterTable::holding
           : RegisterTable::input;
   const auto check = [&](std::string_view key, const std::string& name) {
+    if (name.empty()) return;
     const Parameter* parameter = parameter_named(draft, name);
     if (draft.lacks(name)) findings.add_once(draft.events.of(key), no_such_parameter(draft, name));
     if (parameter == nullptr) return;
@@ -444,14 +541,28 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings
   };
   check("number", events.number);
   check("kind", events.kind);
+  check("error", events.error);
+  for (const catalogue::EventColumn& column : events.columns) check("columns", column.parameter);
 }
 
 void arming_is_no_parameter(const ProfileDraft& draft, Findings& findings) {
-  if (!draft.profile.events) return;
-  const modbus::RegisterAddress address{draft.profile.events->arm_register};
+  if (!draft.profile.events || !draft.profile.events->arm) return;
+  const modbus::RegisterAddress address{draft.profile.events->arm->address};
   if (!draft.profile.writable(address)) return;
   findings.add_once(draft.events.of("arm"),
                     fmt::format("register {} arms events, but is also a parameter", address.value));
+}
+
+void alarm_reset_is_an_action(const ProfileDraft& draft, Findings& findings) {
+  const std::string& name = draft.profile.alarm_reset;
+  if (name.empty() || draft.incomplete) return;
+  std::vector<std::string> names;
+  for (const Action& action : draft.profile.actions) names.push_back(action.name);
+  if (std::find(names.begin(), names.end(), name) != names.end()) return;
+  const std::string hint = suggestion(name, names);
+  findings.add_once(
+      draft.alarm_reset.entry->at,
+      fmt::format("'{}' is no action of this profile{}{}", name, hint.empty() ? "" : "; ", hint));
 }
 
 void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
@@ -512,7 +623,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Findings& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Findings&);
 
-constexpr std::array<Rule, 28> rules = {
+constexpr std::array<Rule, 32> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -536,8 +647,12 @@ constexpr std::array<Rule, 28> rules = {
     link_is_usable,
     identity_slices_fit,
     event_block_is_legal,
+    event_source_is_complete,
+    event_flag_is_consumed,
+    consumed_registers_have_one_reader,
     event_fields_are_in_the_block,
     arming_is_no_parameter,
+    alarm_reset_is_an_action,
     limits_are_in_the_table,
     numbered_are_usable,
     exception_codes_fit,

@@ -275,6 +275,12 @@ Result<Registers> Client::read_once(const RegisterRange& range) {
   return ask(request, retries_, others).map(modbus::registers_of);
 }
 
+Result<Registers> Client::read_once_ever(const RegisterRange& range) {
+  constexpr unsigned never = 0;
+  return ask(modbus::read_request(range.table, {range.first}, range.count), never)
+      .map(modbus::registers_of);
+}
+
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
                                         const Progress& progress) {
   return believed([&] { return read_each_once(wanted, progress); });

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "bm_identity.hpp"
 #include "bm_motion.hpp"
+#include "event_unit.hpp"
+#include "faulty_store.hpp"
 #include "register_bank.hpp"
 #include "spindle/modbus/pdu.hpp"
 
@@ -53,11 +54,15 @@ class SimulatedBm final : public BmTool {
                             TimePoint now) override;
   void advance(TimePoint now) override;
   [[nodiscard]] std::optional<TimePoint> next_change() const override;
-  std::vector<Push> take_pushes() override { return std::exchange(pushes_, {}); }
-  std::vector<Push> take_pushes(ConnectionId connection) override;
-  [[nodiscard]] std::optional<Pdu> event_frame() const override;
-  void connected(ConnectionId connection) override { disconnected(connection); }
-  void disconnected(ConnectionId connection) override;
+  std::vector<Push> take_pushes() override { return events_.take_pushes(); }
+  std::vector<Push> take_pushes(ConnectionId connection) override {
+    return events_.take_pushes(connection);
+  }
+  [[nodiscard]] std::optional<Pdu> event_frame() const override {
+    return events_.frame(registers_);
+  }
+  void connected(ConnectionId connection) override { events_.connected(connection); }
+  void disconnected(ConnectionId connection) override { events_.disconnected(connection); }
 
   void operator_rundown(Rundown outcome, TimePoint now) override;
   void raise_alarm(std::uint16_t code, TimePoint now) override;
@@ -89,10 +94,7 @@ class SimulatedBm final : public BmTool {
   [[nodiscard]] bool is_remote_input(std::uint16_t address) const;
   void use_remote_input(ConnectionId connection, const modbus::WriteSingleRequest& wanted,
                         TimePoint now);
-  void store(const modbus::WriteSingleRequest& wanted);
-  [[nodiscard]] const Fault* struck(FaultKind kind) const;
 
-  void arm(ConnectionId connection, std::uint16_t value, TimePoint now);
   void reset_alarm(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void lock(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void start_or_stop(const catalogue::Action& action, std::uint16_t value, TimePoint now);
@@ -113,14 +115,14 @@ class SimulatedBm final : public BmTool {
   void emit(EventKind kind, const EventData& data, TimePoint now);
 
   RegisterBank registers_;
-  catalogue::EventFacts events_;
+  EventUnit events_;
   std::vector<Deed> deeds_ = {};
   std::uint16_t max_read_;
   std::uint8_t limit_exception_;
   std::uint16_t stopped_error_;
   std::uint16_t screws_;  // in a new batch
   Bytes identity_;
-  FaultPlan faults_;
+  FaultyStore store_;
   std::optional<Duration> rundown_every_;
   unsigned ng_every_;
   unsigned burst_;
@@ -131,21 +133,18 @@ class SimulatedBm final : public BmTool {
   std::optional<TimePoint> begin_ = std::nullopt;
   std::vector<Raised> alarms_;  // still to come, the next one last
   unsigned triggers_ = 0;
-  std::uint32_t writes_ = 0;
-  std::map<ConnectionId, TimePoint> armed_until_ = {};
-  std::vector<Push> pushes_ = {};
 };
 
 SimulatedBm::SimulatedBm(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
                          const BmOptions& options)
     : registers_(profile, start),
-      events_(profile.events.value_or(catalogue::EventFacts{})),
+      events_(profile),
       max_read_(profile.link.max_read),
       limit_exception_(start.limit_exception),
       stopped_error_(start.stopped_error),
       screws_(registers_.get("status.screws-remaining")),
       identity_(make_identity(profile.identity, start, options)),
-      faults_(options.faults),
+      store_(options.faults),
       rundown_every_(options.rundown_every),
       ng_every_(options.ng_every),
       burst_(options.burst),
@@ -211,27 +210,26 @@ Pdu SimulatedBm::write(ConnectionId connection, const Pdu& request,
   if (verdict == WriteVerdict::outside_limits) {
     return modbus::exception_response(request.function, limit_exception_);
   }
-  ++writes_;
-  if (struck(FaultKind::ignore_write) == nullptr) {
+  if (store_.accept()) {
     if (remote_input) {
       use_remote_input(connection, wanted, now);
     } else {
-      store(wanted);
+      store_.store(wanted.address.value, wanted.value, registers_);
     }
   }
   return request;  // the echo
 }
 
 bool SimulatedBm::is_remote_input(std::uint16_t address) const {
-  return address == events_.arm_register ||
+  return events_.is_arming(address) ||
          std::any_of(deeds_.begin(), deeds_.end(),
                      [address](const Deed& deed) { return deed.action.address.value == address; });
 }
 
 void SimulatedBm::use_remote_input(ConnectionId connection,
                                    const modbus::WriteSingleRequest& wanted, TimePoint now) {
-  if (wanted.address.value == events_.arm_register) {
-    arm(connection, wanted.value, now);
+  if (events_.is_arming(wanted.address.value)) {
+    events_.arm(connection, wanted.value, now);
     return;
   }
   for (const Deed& deed : deeds_) {
@@ -240,32 +238,7 @@ void SimulatedBm::use_remote_input(ConnectionId connection,
   }
 }
 
-void SimulatedBm::store(const modbus::WriteSingleRequest& wanted) {
-  const Fault* other = struck(FaultKind::store_other);
-  const unsigned offset = other == nullptr ? 0U : number_of(*other);
-  registers_.store(wanted.address.value, static_cast<std::uint16_t>(wanted.value + offset));
-  if (const Fault* reset = struck(FaultKind::reset_neighbour)) {
-    registers_.store(static_cast<std::uint16_t>(wanted.address.value + number_of(*reset)), 0);
-  }
-}
-
-const Fault* SimulatedBm::struck(FaultKind kind) const {
-  const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const Fault& fault) {
-    return fault.kind == kind && fault.strikes(writes_);
-  });
-  return found == faults_.end() ? nullptr : &*found;
-}
-
 // ---- remote inputs ----
-
-void SimulatedBm::arm(ConnectionId connection, std::uint16_t value, TimePoint now) {
-  if (value == events_.arm_value) {
-    const bool expires = events_.arm_expires > Duration::zero();
-    armed_until_[connection] = expires ? now + events_.arm_expires : TimePoint::max();
-  } else if (value == events_.disarm_value) {
-    armed_until_.erase(connection);
-  }
-}
 
 void SimulatedBm::reset_alarm(const catalogue::Action& /*action*/, std::uint16_t /*value*/,
                               TimePoint now) {
@@ -331,7 +304,7 @@ RunPlan SimulatedBm::plan_run() const {
   constexpr std::uint64_t stride = 7;
   constexpr std::uint64_t per_mille = 1000;
   constexpr std::uint64_t highest = std::numeric_limits<std::int16_t>::max();
-  const std::uint64_t above = registers_.get(events_.number) * stride % spread;
+  const std::uint64_t above = events_.number(registers_) * stride % spread;
   const std::uint64_t reached = plan.target_torque * (per_mille + above) / per_mille;
   plan.final_torque = static_cast<std::uint16_t>(std::min<std::uint64_t>(reached, highest));
   return plan;
@@ -428,54 +401,21 @@ void SimulatedBm::pull_trigger(TimePoint now) {
 // ---- events ----
 
 void SimulatedBm::emit(EventKind kind, const EventData& data, TimePoint now) {
-  const auto row = std::find_if(events_.kinds.begin(), events_.kinds.end(),
-                                [kind](const auto& entry) { return entry.second == kind; });
-  const std::int64_t status = row == events_.kinds.end() ? 0 : row->first;
-  const auto number = static_cast<std::uint16_t>(registers_.get(events_.number) + 1U);
   const bool has_snug = preset_field("snug-torque") != 0;
-
-  registers_.set(events_.number, number);
-  registers_.set(events_.kind, static_cast<std::uint16_t>(status));
-  registers_.set("event.fastening-time", data.fastening_time);
-  registers_.set("event.preset", registers_.get("status.preset"));
-  registers_.set("event.target-torque", preset_field("target-torque"));
-  registers_.set("event.torque", data.motion.torque);
-  registers_.set("event.speed", data.speed);
-  registers_.set("event.a1", data.motion.angle_before_snug);
-  registers_.set("event.a2", data.motion.angle_after_snug);
-  registers_.set("event.a3", data.motion.angle);
-  registers_.set("event.screw-count", registers_.get("status.screws-remaining"));
-  registers_.set("event.error", data.error);
-  registers_.set("event.direction", registers_.get("status.direction"));
-  registers_.set("event.snug-angle", has_snug ? data.motion.angle_after_snug : std::uint16_t{0});
-
-  const auto frame = event_frame();
-  if (!frame) return;
-  for (const auto& [connection, until] : armed_until_) {
-    if (now < until) pushes_.push_back({connection, *frame});
-  }
-}
-
-std::optional<Pdu> SimulatedBm::event_frame() const {
-  const auto table = catalogue::table_of(events_);
-  const auto block = registers_.read(table, events_.first, events_.count);
-  if (!block) return std::nullopt;
-  return modbus::read_response(table, *block);
-}
-
-std::vector<Push> SimulatedBm::take_pushes(ConnectionId connection) {
-  const auto others = std::stable_partition(
-      pushes_.begin(), pushes_.end(),
-      [connection](const Push& push) { return push.connection == connection; });
-  std::vector<Push> taken(std::make_move_iterator(pushes_.begin()),
-                          std::make_move_iterator(others));
-  pushes_.erase(pushes_.begin(), others);
-  return taken;
-}
-
-void SimulatedBm::disconnected(ConnectionId connection) {
-  armed_until_.erase(connection);
-  static_cast<void>(take_pushes(connection));
+  const EventUnit::Values values = {
+      {"event.fastening-time", data.fastening_time},
+      {"event.preset", registers_.get("status.preset")},
+      {"event.target-torque", preset_field("target-torque")},
+      {"event.torque", data.motion.torque},
+      {"event.speed", data.speed},
+      {"event.a1", data.motion.angle_before_snug},
+      {"event.a2", data.motion.angle_after_snug},
+      {"event.a3", data.motion.angle},
+      {"event.screw-count", registers_.get("status.screws-remaining")},
+      {"event.error", data.error},
+      {"event.direction", registers_.get("status.direction")},
+      {"event.snug-angle", has_snug ? data.motion.angle_after_snug : std::uint16_t{0}}};
+  events_.emit(kind, values, registers_, now);
 }
 
 // ---- what happens to the tool ----
@@ -504,13 +444,11 @@ void SimulatedBm::reboot(TimePoint now) {
   advance(now);
   run_.reset();
   lock_ = Lock::off;
-  armed_until_.clear();
-  pushes_.clear();
+  events_.reboot(registers_);
   for (const char* name : {"status.running", "status.torque-up", "status.fastening-ok",
                            "status.alarm", "alarm.1", "alarm.2"}) {
     registers_.set(name, 0);
   }
-  registers_.set(events_.number, 0);
   show_motion(now);
   show_ready();
 }

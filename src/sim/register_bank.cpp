@@ -81,6 +81,18 @@ void RegisterBank::set(std::string_view name, std::uint16_t value) {
   if (word != all.end()) word->second = value;
 }
 
+void RegisterBank::set_raw(std::string_view name, std::int64_t raw) {
+  const auto place = places_.find(name);
+  if (place != places_.end()) start_value(place->second, raw);
+}
+
+std::optional<std::pair<RegisterTable, std::uint16_t>> RegisterBank::place_of(
+    std::string_view name) const {
+  const auto place = places_.find(name);
+  if (place == places_.end()) return std::nullopt;
+  return std::pair(place->second.table, place->second.address);
+}
+
 const RegisterBank::Words& RegisterBank::words(RegisterTable table) const {
   return table == RegisterTable::holding ? holding_ : input_;
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
@@ -36,6 +37,13 @@ class RegisterBank {
   [[nodiscard]] std::uint16_t get(std::string_view name) const;
   /// Nothing happens when the profile does not name it or it is a hole.
   void set(std::string_view name, std::uint16_t value);
+  /// All registers of a parameter by name, the highest first. Nothing happens when the profile does
+  /// not name it.
+  void set_raw(std::string_view name, std::int64_t raw);
+
+  /// Table and first address of a parameter by name; empty when the profile does not name it.
+  [[nodiscard]] std::optional<std::pair<modbus::RegisterTable, std::uint16_t>> place_of(
+      std::string_view name) const;
 
  private:
   struct Place {

@@ -17,7 +17,8 @@ std::vector<link::SpontaneousShape> unasked_shapes(const Environment& environmen
   std::vector<link::SpontaneousShape> shapes;
   for (const files::ProfileEntry& entry : environment.profiles.list()) {
     const auto profile = environment.profiles.load(entry.id);
-    if (profile && profile->events) shapes.push_back(device::shape_of(*profile->events));
+    if (!profile || !catalogue::sends_unasked(*profile)) continue;
+    shapes.push_back(device::shape_of(*profile->events));
   }
   return shapes;
 }

@@ -27,9 +27,9 @@ inline catalogue::Profile bm_profile() {
                                    .total_bytes = 17,
                                    .total = {13, 4},
                                    .models = {}};
-  profile.events = EventFacts{.arm_register = 4002,
-                              .arm_every = std::chrono::seconds(5),
-                              .arm_expires = std::chrono::seconds(10),
+  profile.events = EventFacts{.arm = catalogue::Arming{.address = 4002,
+                                                       .every = std::chrono::seconds(5),
+                                                       .expires = std::chrono::seconds(10)},
                               .function = 4,
                               .first = 3200,
                               .count = 14,
@@ -41,7 +41,8 @@ inline catalogue::Profile bm_profile() {
                                         {3, EventKind::direction_change},
                                         {4, EventKind::preset_change},
                                         {5, EventKind::alarm_reset},
-                                        {6, EventKind::error}}};
+                                        {6, EventKind::error}},
+                              .error = "event.error"};
   profile.limits = LimitFacts{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
   profile.numbered = NumberedFacts{.prefix = "p",
                                    .from = 1,

@@ -5,6 +5,7 @@
 //   [FAULT=SPEC]...
 //                         a tool that lives as long as the transcript; with an operator who drives
 //                         a screw now and then, every Nth of them NG
+//   %profiles FOLDER      profiles of that folder of the sources are known, too
 //   %bank URL [UNITS=N] [FAULT=SPEC]...
 //                         a serial line (rtu:// or rtu+tcp://) with units 1 to N that have nothing
 //                         but registers, and are strict about their gaps
@@ -56,6 +57,7 @@
 #include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
+#include "spindle/sim/plain_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "spindle/work/connect.hpp"
 #include "support/fake_clock.hpp"
@@ -147,11 +149,23 @@ class Stage {
       if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
     }
     options.faults = tool->faults;
-    tool->server = sim::make_bm_tool(*profile, *start, options);
+    if (catalogue::sends_unasked(*profile)) {
+      tool->server = sim::make_bm_tool(*profile, *start, options);
+    } else {
+      tool->server = sim::make_plain_tool(*profile, *start,
+                                          {.faults = options.faults,
+                                           .rundown_every = options.rundown_every,
+                                           .ng_every = options.ng_every});
+    }
     tool->profile = std::move(*profile);
     const auto endpoint = link::parse_endpoint(words.at(0)).value();
     tools_[address(endpoint.host, endpoint.port.value_or(tool->profile.link.port))] =
         std::move(tool);
+  }
+
+  void add_profiles(const std::string& folder) {
+    own_profiles_ = std::string(SPINDLE_SOURCE_DIR) + "/" + folder;
+    profiles_ = files::ProfileStore({own_profiles_, std::string(SPINDLE_SOURCE_DIR) + "/profiles"});
   }
 
   void add_bank(const std::vector<std::string>& words) {
@@ -271,10 +285,11 @@ class Stage {
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },
-        .environment =
-            [](std::string_view name) {
-              return name == "XDG_STATE_HOME" ? std::optional<std::string>("/state") : std::nullopt;
-            },
+        .environment = [this](std::string_view name) -> std::optional<std::string> {
+          if (name == "XDG_STATE_HOME") return "/state";
+          if (name == "SPINDLE_PROFILE_PATH" && !own_profiles_.empty()) return own_profiles_;
+          return std::nullopt;
+        },
         .disk = disk_.functions(),
         .installation = {SPINDLE_SOURCE_DIR, "3.1.6"}};
     status_ = cli::run(arguments, world);
@@ -322,6 +337,7 @@ class Stage {
   }
 
   files::ProfileStore profiles_;
+  std::string own_profiles_ = {};  ///< a folder beside that of the shipped ones; may be empty
   test::FakeClock clock_;
   const Interrupt calm_;
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
@@ -387,6 +403,7 @@ class Player {
     for (const std::string_view event : {"alarm", "warning", "power", "setter", "wait", "later"}) {
       if (what == event) stage_.happen(what, {words.begin() + 1, words.end()});
     }
+    if (words.at(0) == "profiles") stage_.add_profiles(words.at(1));
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
     if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));

@@ -573,9 +573,9 @@ TEST_CASE("doga-bm: link, events, limits") {
   CHECK(profile.link.absent.front().from == 564);
   CHECK(profile.link.absent.front().note == "60427 §3.5");
   REQUIRE(profile.events.has_value());
-  CHECK(profile.events->arm_register == 4002);
-  CHECK(profile.events->arm_every == std::chrono::seconds(5));
-  CHECK(profile.events->arm_expires == std::chrono::seconds(10));
+  CHECK(profile.events->arm->address == 4002);
+  CHECK(profile.events->arm->every == std::chrono::seconds(5));
+  CHECK(profile.events->arm->expires == std::chrono::seconds(10));
   CHECK(profile.events->count == 14);
   CHECK(profile.events->kinds.size() == 9);
   REQUIRE(profile.limits.has_value());

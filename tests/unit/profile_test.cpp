@@ -255,3 +255,33 @@ TEST_CASE("a secret is one by whatever name or number its registers are asked fo
   CHECK(profile.numbered_parameter(301).secrecy == Secrecy::secret);
   CHECK(profile.select({"p30?"}).value().at(1).secrecy == Secrecy::secret);
 }
+
+TEST_CASE("what reading clears is read by nothing but the source of events") {
+  Profile profile;
+  Parameter flag = named("result.new", RegisterTable::input, 294, Kind::u16, Access::read_only);
+  flag.reading = catalogue::Reading::consumes;
+  const Parameter other =
+      named("result.ok", RegisterTable::input, 303, Kind::u16, Access::read_only);
+  profile.parameters = {flag, other};
+  for (const char* name : {"result.new", "@input:294", "@input:293/u32", "@input:294/i32"}) {
+    CAPTURE(name);
+    const auto found = profile.find(name);
+    REQUIRE(!found.has_value());
+    CHECK(found.error().code == Errc::usage);
+    CHECK(!profile.select({name}).has_value());
+  }
+  CHECK(profile.find("@holding:294").has_value());
+  CHECK(profile.find("@input:295").has_value());
+  for (const std::vector<std::string>& names :
+       {std::vector<std::string>{}, {"*"}, {"result.*"}, {"result.ok"}}) {
+    const auto selected = profile.select(names);
+    REQUIRE(selected.has_value());
+    REQUIRE(selected->size() == 1);
+    CHECK(selected->front().name == "result.ok");
+  }
+  const auto only_it = profile.select({"result.n*"});
+  REQUIRE(!only_it.has_value());
+  CHECK(only_it.error().code == Errc::unknown_name);
+  CHECK(profile.describe({})->size() == 2);
+  CHECK(profile.describe({"result.new"})->front().name == "result.new");
+}

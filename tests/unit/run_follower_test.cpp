@@ -12,7 +12,7 @@ namespace {
 using namespace spindle;
 using namespace std::chrono_literals;
 using device::Device;
-using device::EventSource;
+using device::EventOrigin;
 using device::FollowedRun;
 using device::FollowOptions;
 using device::RunEnding;
@@ -66,7 +66,7 @@ TEST_CASE("the result of a run is its event") {
   REQUIRE(run);
   CHECK(run->ending == RunEnding::result);
   REQUIRE(run->event);
-  CHECK(run->event->source == EventSource::push);
+  CHECK(run->event->source == EventOrigin::push);
   CHECK(run->event->block[status_at] == 1);
   CHECK(run->event->block[number_at] == first_number + 1);
   CHECK(bench.took() < 1500ms);
@@ -160,7 +160,7 @@ TEST_CASE("a result whose push was lost is fetched") {
   REQUIRE(run);
   REQUIRE(run->event);
   CHECK(run->ending == RunEnding::result);
-  CHECK(run->event->source == EventSource::catch_up);
+  CHECK(run->event->source == EventOrigin::catch_up);
   CHECK(run->event->block[status_at] == 1);
 }
 
@@ -340,7 +340,7 @@ TEST_CASE("a long run: the output stays armed, progress is told, and no read loo
   REQUIRE(run);
   CHECK(run->ending == RunEnding::result);
   REQUIRE(run->event);
-  CHECK(run->event->source == EventSource::push);
+  CHECK(run->event->source == EventOrigin::push);
   CHECK(told > 100);
   CHECK(tool.writes_of(GuardedTool::arm, 1) >= 4);
   CHECK(tool.starts() == 1);

@@ -17,7 +17,7 @@ using namespace spindle;
 using namespace std::chrono_literals;
 using device::EventMode;
 using device::EventNews;
-using device::EventSource;
+using device::EventOrigin;
 using device::GapNews;
 using device::Heed;
 using device::LagNews;
@@ -208,7 +208,7 @@ TEST_CASE("pushed events are told once each, in order, with their blocks") {
   REQUIRE(numbers.size() > 20);
   for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
   for (const EventNews& event : shop.told<EventNews>()) {
-    CHECK(event.source == EventSource::push);
+    CHECK(event.source == EventOrigin::push);
     CHECK(event.block.size() == 14);
   }
   CHECK(shop.told<GapNews>().empty());
@@ -253,7 +253,7 @@ TEST_CASE("what is pushed while the last event is fetched keeps its place") {
       shop.happen();
     });
     CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
-    CHECK(shop.told<EventNews>().back().source == EventSource::push);
+    CHECK(shop.told<EventNews>().back().source == EventOrigin::push);
   }
   SUBCASE("the fetched one was not pushed") {
     while_fetching([&] {
@@ -262,7 +262,7 @@ TEST_CASE("what is pushed while the last event is fetched keeps its place") {
       shop.happen();
     });
     CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
-    CHECK(shop.told<EventNews>().back().source == EventSource::catch_up);
+    CHECK(shop.told<EventNews>().back().source == EventOrigin::catch_up);
   }
 }
 
@@ -271,7 +271,7 @@ TEST_CASE("output is armed again in time, the tool kept alive, and no block is r
   REQUIRE(shop.watch(60s));
   const auto arms = shop.times(write_single);
   REQUIRE(arms.size() >= 12);
-  CHECK(longest_pause(arms) <= shop.profile.events->arm_every);
+  CHECK(longest_pause(arms) <= shop.profile.events->arm->every);
   CHECK(longest_pause(shop.times(report_server_id)) <= 1s);
   CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
   for (std::size_t at = 0; at + 1 < shop.asked.size(); ++at) {
@@ -366,7 +366,7 @@ TEST_CASE("after a lost link the missed events are a gap and the last one is fet
     if (step == 1) continue;
     ++jumps;
     CHECK(step == *gaps.front().missed + 1);
-    CHECK(events[at].source == EventSource::catch_up);
+    CHECK(events[at].source == EventOrigin::catch_up);
   }
   CHECK(jumps == 1);
 }
@@ -466,7 +466,7 @@ TEST_CASE("a counter that comes to the last number, or just past it, hides no ev
   const auto events = shop.told<EventNews>();
   REQUIRE(events.size() == 1);
   CHECK(events.front().block.front() == since);
-  CHECK(events.front().source == EventSource::catch_up);
+  CHECK(events.front().source == EventOrigin::catch_up);
 }
 
 TEST_CASE("what a restarted tool remembers is told as such, and what it pushes is a result") {
@@ -483,7 +483,7 @@ TEST_CASE("what a restarted tool remembers is told as such, and what it pushes i
   CHECK(events[0].block.front() == 1);
   CHECK(events[0].standing == Standing::remembered);
   CHECK(events[1].block.front() == 2);
-  CHECK(events[1].source == EventSource::push);
+  CHECK(events[1].source == EventOrigin::push);
   CHECK(events[1].standing == Standing::result);
 }
 
@@ -496,7 +496,7 @@ TEST_CASE("an event that was missed for a moment is a result, and no doubt about
   REQUIRE(shop.watch(10s));
   const auto events = shop.told<EventNews>();
   REQUIRE(events.size() == 1);
-  CHECK(events.front().source == EventSource::catch_up);
+  CHECK(events.front().source == EventOrigin::catch_up);
   CHECK(events.front().standing == Standing::result);
   CHECK(shop.told<GapNews>().empty());
 }
@@ -575,7 +575,7 @@ TEST_CASE("an event is told at once, however long a keep-alive goes without an a
 
 TEST_CASE("a counter that runs away from whoever polls it is told as it was seen") {
   Workshop shop;
-  shop.plan.events = EventMode::poll;
+  shop.plan.events = EventMode::unarmed;
   std::uint16_t last = 0;
   shop.on_request = [&](const modbus::Pdu& request) {
     if (request.function != read_input) return;
@@ -595,19 +595,19 @@ TEST_CASE("a counter that runs away from whoever polls it is told as it was seen
 
 TEST_CASE("polling the counter finds every event and arms nothing") {
   Workshop shop(busy());
-  shop.plan.events = EventMode::poll;
+  shop.plan.events = EventMode::unarmed;
   REQUIRE(shop.watch(60s));
   const auto numbers = shop.numbers();
   REQUIRE(numbers.size() > 20);
   for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
-  CHECK(shop.told<EventNews>().front().source == EventSource::poll);
+  CHECK(shop.told<EventNews>().front().source == EventOrigin::poll);
   CHECK(shop.times(write_single).empty());
   CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
 }
 
 TEST_CASE("events that come between two polls are a gap") {
   Workshop shop(busy());
-  shop.plan.events = EventMode::poll;
+  shop.plan.events = EventMode::unarmed;
   shop.plan.interval = 10s;
   REQUIRE(shop.watch(35s));
   const auto gaps = shop.told<GapNews>();

@@ -18,10 +18,11 @@ class EventLayout {
     std::size_t at;  ///< index of its first register in the block
   };
 
-  /// Requires a profile with events, which must outlive it. That the number and the kind stand in
-  /// the block is a rule that every loaded profile keeps.
+  /// Requires a profile with events, which must outlive it. That the number, where there is one,
+  /// and the kind stand in the block is a rule that every loaded profile keeps.
   explicit EventLayout(const Profile& profile);
 
+  /// Requires a product that counts its events.
   [[nodiscard]] std::uint16_t number_of(RegisterView block) const { return block[number_at_]; }
 
   /// Empty for a value that the profile does not name.

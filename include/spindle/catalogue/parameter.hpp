@@ -17,6 +17,11 @@ enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
 enum class Access : std::uint8_t { read_only, read_write };
 /// Whether a value may be restored to another tool than its own.
 enum class Cloning : std::uint8_t { allowed, never };
+/// What reading does to the register.
+enum class Reading : std::uint8_t {
+  harmless,
+  consumes,  ///< it clears it: only who waits for what it says may read it
+};
 /// Whether backups hold a value without being told to.
 enum class Secrecy : std::uint8_t { open, secret };
 enum class Kind : std::uint8_t { u16, i16, u32, i32 };
@@ -102,6 +107,7 @@ struct Parameter {
   Access access = Access::read_only;
   Cloning cloning = Cloning::allowed;
   Secrecy secrecy = Secrecy::open;
+  Reading reading = Reading::harmless;
   Evidence evidence = Evidence::inferred;
   std::string source;  ///< document and section
   std::string note;  ///< what a user should know, such as when a change takes effect; may be empty

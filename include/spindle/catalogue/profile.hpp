@@ -96,19 +96,44 @@ inline constexpr std::array<std::string_view, 9> event_kind_texts = {
 std::string_view to_text(EventKind kind);
 std::optional<EventKind> parse_event_kind(std::string_view text);
 
-/// Frames that the tool sends unasked once armed (or always).
+/// How a tool lets it be known that something happened.
+enum class EventModel : std::uint8_t {
+  push,     ///< it sends frames unasked; a counter tells of those that were not seen
+  counter,  ///< a register counts up; it sends nothing unasked
+  flag,     ///< a register says that there is a new result, and reading clears it
+};
+
+/// How unasked frames are switched on. They stay on for `expires`; zero: until switched off.
+struct Arming {
+  std::uint16_t address = 0;  ///< holding register
+  std::uint16_t value = 1;
+  std::uint16_t disarm = 0;
+  Duration every = {};
+  Duration expires = {};
+};
+
+/// A column of a table or of CSV: what one parameter of the event block says.
+struct EventColumn {
+  std::string heading;
+  std::string parameter;
+  std::uint16_t width = 0;  ///< cells that a table keeps free for it
+};
+
+/// Results and what else happens: how it is learned of, and the registers that tell of it.
 struct EventFacts {
-  std::uint16_t arm_register = 0;
-  std::uint16_t arm_value = 1;
-  std::uint16_t disarm_value = 0;
-  Duration arm_every = {};
-  Duration arm_expires = {};
-  std::uint8_t function = 0;  ///< 3 or 4
-  std::uint16_t first = 0;    ///< first register of the block
-  std::uint16_t count = 0;    ///< registers in the block; the frame has 2 × count data bytes
-  std::string number;         ///< parameter that counts events up
-  std::string kind;           ///< parameter whose value names the kind
+  EventModel model = EventModel::push;
+  std::optional<Arming> arm = std::nullopt;  ///< of `push`; empty: frames come without
+  std::uint8_t function = 0;                 ///< 3 or 4
+  std::uint16_t first = 0;                   ///< first register of the block
+  std::uint16_t count = 0;  ///< registers in the block; a frame has 2 × count data bytes
+  /// Parameter that counts events up. Stands in the block; may be empty for a `flag`.
+  std::string number;
+  std::string flag = {};  ///< of `flag`: parameter that is not 0 when there is a new result
+  std::string kind;       ///< parameter whose value names the kind
   std::map<std::int64_t, EventKind> kinds = {};
+  std::string error = {};  ///< parameter of the block that the error codes explain; may be empty
+  std::vector<EventColumn> columns = {};
+  std::optional<Duration> interval = std::nullopt;  ///< between two polls; empty: as usual
 };
 
 /// The table that the event block stands in.
@@ -188,7 +213,12 @@ struct CodeText {
 using CodeTexts = std::map<std::int64_t, CodeText>;
 
 /// Which table explains the codes of a list.
-enum class CodeTable : std::uint8_t { error, warning, refusal };
+enum class CodeTable : std::uint8_t {
+  error,
+  warning,
+  refusal,
+  none,  ///< the numbers of the list are shown, not explained
+};
 
 /// The tables of a profile that are loaded only by those who show codes.
 struct CodeTables {
@@ -233,8 +263,14 @@ struct SimulationFacts {
     std::int64_t minimum = 0;  ///< raw
     std::int64_t maximum = 0;  ///< raw
   };
+  /// What the event block says of an event of one kind, beside its number and kind.
+  struct Event {
+    EventKind kind = EventKind::other;
+    std::vector<Value> values = {};  ///< by name
+  };
   std::vector<Value> values = {};
   std::vector<Limits> limits = {};
+  std::vector<Event> events = {};
   std::vector<Area> absent = {};  ///< registers that answer exception 02
 };
 
@@ -257,17 +293,27 @@ class Profile {
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
   std::optional<RunFacts> run = std::nullopt;  ///< how it is started and stopped; may be missing
   std::optional<RefusalFacts> refusals = std::nullopt;
-  std::vector<AlarmList> alarm_lists = {};  ///< empty: the present alarm and what else is named so
-  std::vector<std::string> watched = {};    ///< values that `watch` polls unless others are named
+  std::vector<AlarmList> alarm_lists = {};
+  std::string alarm_reset = {};           ///< action that resets an alarm; empty: none does
+  std::vector<std::string> watched = {};  ///< values that `watch` polls unless others are named
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
-  /// ("@holding:2", "@input:3204/i16"). Error `unknown_name` with a suggestion.
+  /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; `usage` for one
+  /// of whose registers reading clears one.
   [[nodiscard]] Result<Parameter> find(std::string_view name) const;
 
   /// All parameters meant, in the order asked for, each once; a pattern gives catalogue order. No
-  /// names: every named parameter. Error `unknown_name` for a name that does not exist or a pattern
-  /// that matches nothing.
+  /// names: every named parameter. What reading clears is in none of these. Errors: those of
+  /// find(); `unknown_name` for a pattern that matches nothing.
   [[nodiscard]] Result<std::vector<Parameter>> select(const std::vector<std::string>& names) const;
+
+  /// The same for those who show the catalogue and read nothing of a tool: with what reading
+  /// clears.
+  [[nodiscard]] Result<std::vector<Parameter>> describe(
+      const std::vector<std::string>& names) const;
+
+  /// Whether reading these registers clears one of them.
+  [[nodiscard]] bool consumes(const Parameter& parameter) const;
 
   /// The parameter with this number. Requires a profile with numbers.
   [[nodiscard]] Parameter numbered_parameter(std::uint16_t number) const;
@@ -297,6 +343,9 @@ class Profile {
   /// by whatever name or number it is asked for.
   [[nodiscard]] Parameter with_secrecy(Parameter parameter) const;
 };
+
+/// Whether the product sends frames that nothing asked for.
+bool sends_unasked(const Profile& profile);
 
 /// What a tool's identity says of a profile that was named for it.
 enum class Judgement : std::uint8_t {

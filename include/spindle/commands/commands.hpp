@@ -78,7 +78,7 @@ Result<Outcome> scan(const ScanOptions& options, Context& context);
 struct WatchOptions {
   std::vector<std::string> targets;
   std::vector<std::string> names;  ///< values to poll; none: events only
-  device::EventMode events = device::EventMode::push;
+  device::EventMode events = device::EventMode::declared;
   device::Samples samples = device::Samples::changes;
   device::Reconnection reconnection = device::Reconnection::forever;
   std::optional<Duration> interval;  ///< between two polls; empty: as usual

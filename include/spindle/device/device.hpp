@@ -160,7 +160,7 @@ class Device {
   [[nodiscard]] const std::string& identity_text() const { return identity_text_; }
 
   /// Reads all in the fewest requests, and the limits of what exists. A refused register stands in
-  /// its reading; anything else ends it.
+  /// its reading; anything else ends it, and first of all one that reading clears (`usage`).
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
                                          Limits limits, const link::Progress& progress = {});
 
@@ -203,17 +203,25 @@ class Device {
   Result<void> broadcast(const catalogue::Action& action, std::int64_t value);
   Result<void> broadcast_word(modbus::RegisterAddress address, std::uint16_t word);
 
-  /// Switches the tool's unasked event frames on or off; on expires unless it is repeated. Requires
-  /// a profile with events.
+  /// Switches the tool's unasked event frames on or off; on expires unless it is repeated. Does
+  /// nothing where the profile says of no way to do so. Requires a profile with events.
   Result<void> switch_events(EventOutput output);
 
-  /// The counter of events, read alone. Requires a profile with events.
+  /// The counter of events, read alone. Requires a profile whose events are counted.
   Result<std::uint16_t> event_number();
 
-  /// The whole last event, never in one read (whose answer would look like an event frame): all but
-  /// the last register, the last, and the number once more; read anew when an event came in
-  /// between. Empty when events come faster than that.
+  /// The whole last event, as it was while its number stood; read anew when an event came in
+  /// between. Empty when events come faster than that. Never in one read whose answer would look
+  /// like an event frame. Requires a profile whose events are counted.
   Result<std::optional<Registers>> last_event();
+
+  /// The registers of the event block as they are now. Requires a profile with events.
+  Result<Registers> event_block();
+
+  /// Whether the flag of events is set. Reading clears it, so it is asked once and never again:
+  /// where the answer is lost, it may have been set. Requires a profile whose events have a flag.
+  /// Error `usage` on a serial line, where an answer may be proved by another reading.
+  Result<Shown> take_event_flag();
 
   /// One exchange that touches no value: FC 08 where the profile has it, else FC 11h. An exception
   /// response counts as an answer.

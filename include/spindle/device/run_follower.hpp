@@ -60,6 +60,7 @@ class RunFollower {
   std::optional<EventNews> sift(EventNews event);
   [[nodiscard]] bool is_cut_short(const Error& error, TimePoint deadline) const;
   Result<std::optional<RunEnding>> look_at_tool();
+  Result<void> arm();
   Result<void> keep_armed();
 
   Device* device_;

@@ -8,34 +8,12 @@
 #include <variant>
 #include <vector>
 
-#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/device/device.hpp"
-#include "spindle/device/event_tracker.hpp"
+#include "spindle/device/event_source.hpp"
 #include "spindle/device/motor_follower.hpp"
 #include "spindle/device/motor_watch.hpp"
 
 namespace spindle::device {
-
-/// How an event became known.
-enum class EventSource : std::uint8_t {
-  push,      ///< the tool sent it unasked
-  poll,      ///< its counter was seen to change
-  catch_up,  ///< it was fetched after (re)connecting
-};
-
-/// What an event is worth.
-enum class Standing : std::uint8_t {
-  result,      ///< it happened, and was not told before
-  remembered,  ///< the tool held it when its counter was found restarted: it may be an old one
-};
-
-/// A new event. `block` are the registers of the profile's event block.
-struct EventNews {
-  EventSource source;
-  Registers block;
-  WallTime time;
-  Standing standing = Standing::result;
-};
 
 /// A polled value: its first reading, one that differs, or every sample.
 struct ValueNews {
@@ -43,12 +21,6 @@ struct ValueNews {
   Registers registers;
   catalogue::Value value;
   std::optional<catalogue::Value> previous;
-};
-
-/// Events that happened, or may have, and were not seen.
-struct GapNews {
-  std::optional<std::uint32_t> missed;  ///< empty: unknown
-  std::string reason;
 };
 
 /// Polls that could not be made in time, since the last time that this was told.
@@ -73,17 +45,11 @@ struct LinkNews {
 
 using News = std::variant<EventNews, ValueNews, GapNews, LagNews, LinkNews, MotorNews>;
 
-/// How events are learned of.
-enum class EventMode : std::uint8_t {
-  none,  ///< not at all
-  push,  ///< auto output is armed, repeated, and switched off at the end
-  poll,  ///< the counter alone is polled; for tools whose output another client uses
-};
 enum class Samples : std::uint8_t { changes, changes_and_first, all };
 enum class Reconnection : std::uint8_t { forever, never };
 
 struct WatchPlan {
-  EventMode events = EventMode::push;
+  EventMode events = EventMode::declared;
   std::vector<catalogue::Parameter> values = {};
   std::optional<MotorMonitor> motor =
       std::nullopt;  ///< looked at between the values for what it does
@@ -127,8 +93,6 @@ class Watcher {
   [[nodiscard]] std::optional<Error> unreached() const;
 
  private:
-  enum class Fetched : std::uint8_t { yes, too_fast };
-
   Result<void> watch(const Until& until);
   Result<void> connect(const Until& until);
   Result<void> pause(const Until& until);
@@ -150,21 +114,14 @@ class Watcher {
   Result<void> tell_motor(Result<std::vector<MotorNews>> news);
   [[nodiscard]] std::uint64_t requests() { return link_->device.session().counters().requests; }
   [[nodiscard]] bool polls_values() const { return !plan_.values.empty() || motor_; }
-  [[nodiscard]] bool polls() const { return plan_.events == EventMode::poll || polls_values(); }
+  [[nodiscard]] bool polls() const { return (source_ && source_->polls()) || polls_values(); }
   void tell_reading(std::size_t index, Reading& reading);
-  Result<Fetched> fetch_last(EventSource source);
-  Result<void> fetch_polled(std::uint16_t number);
-  std::vector<link::Spontaneous> take_waiting();
   void hear_waiting();
   void hear(const link::Spontaneous& frame);
-  void judge(EventSource source, const Registers& block, WallTime time);
   void tell(const News& news);
   void tell_trouble(const Error& error);
   void leave();
   [[nodiscard]] bool goes_on(const Until& until) const;
-  [[nodiscard]] std::uint16_t number_of(const Registers& block) const {
-    return layout_->number_of(block);
-  }
   [[nodiscard]] TimePoint next_due() const;
   [[nodiscard]] Duration back_off(unsigned failures) const;
 
@@ -177,8 +134,7 @@ class Watcher {
   WatchPlan plan_ = {};
   std::optional<Link> link_ = std::nullopt;
   std::string known_identity_ = {};
-  std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
-  EventTracker tracker_ = {};
+  std::unique_ptr<EventSource> source_ = nullptr;  ///< null where no events are learned of
   std::vector<std::optional<catalogue::Value>> previous_ = {};
   /// The values to poll, with the names of bits that count now.
   std::vector<catalogue::Parameter> polled_ = {};
@@ -187,7 +143,6 @@ class Watcher {
   std::uint64_t requests_owed_ = 0;  ///< for values, since something was read between them
   unsigned looks_between_ = 0;
   Duration last_look_ = {};  ///< what one request between the values took
-  TimePoint arm_due_ = {};
   TimePoint keep_alive_due_ = {};
   TimePoint poll_due_ = {};
   TimePoint retry_at_ = {};
@@ -197,6 +152,7 @@ class Watcher {
   unsigned short_lived_ = 0;  ///< attempts and links one after the other that did not last
   bool served_ = false;       ///< this link has kept the tool alive, or brought an event
   bool reached_ = false;      ///< there was a link
+  bool caveat_told_ = false;
   bool stopped_ = false;
   std::optional<Error> trouble_ = std::nullopt;  ///< the last one
   /// Since a lag was told, or since the link began.

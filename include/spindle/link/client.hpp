@@ -96,6 +96,9 @@ class Client {
   /// with the device's own where the limits say where it stands: it is read right after it.
   Result<Registers> read(const RegisterRange& range);
 
+  /// One request for what reading clears: never repeated, not even where no answer came. TCP only.
+  Result<Registers> read_once_ever(const RegisterRange& range);
+
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
   /// bisected, and what does not exist is remembered and not asked for again. Other exception
   /// responses stand in the image at the registers concerned; anything else ends it at once and is

@@ -11,13 +11,14 @@ namespace spindle::sim {
 struct Abilities {
   bool identity = false;       ///< it answers what it is
   bool operated = false;       ///< an operator drives screws, and it may spoil what is written
+  bool pushes = false;         ///< it sends frames unasked
   bool configuration = false;  ///< it configures itself, and is busy with that
   bool alarms = false;
   bool warnings = false;
 };
 Abilities abilities_of(const catalogue::Profile& profile);
 
-/// The tool that a profile describes: a screwdriver where it counts its results, a driver that
+/// The tool that a profile describes: one with an operator where it has events, a driver that
 /// follows a command word, or else registers, with the motor of a command register where there is
 /// one.
 std::unique_ptr<Server> make_simulated_server(const catalogue::Profile& profile,

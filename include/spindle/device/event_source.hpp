@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "spindle/base/clock.hpp"
+#include "spindle/device/device.hpp"
+
+namespace spindle::device {
+
+/// How an event became known.
+enum class EventOrigin : std::uint8_t {
+  push,      ///< the tool sent it unasked
+  poll,      ///< its counter or its flag was seen to change
+  catch_up,  ///< it was fetched after (re)connecting
+};
+
+/// What an event is worth.
+enum class Standing : std::uint8_t {
+  result,      ///< it happened, and was not told before
+  remembered,  ///< the tool held it when its counter was found restarted: it may be an old one
+};
+
+/// A new event. `block` are the registers of the profile's event block.
+struct EventNews {
+  EventOrigin source;
+  Registers block;
+  WallTime time;
+  Standing standing = Standing::result;
+};
+
+/// Events that happened, or may have, and were not seen.
+struct GapNews {
+  std::optional<std::uint32_t> missed;  ///< empty: unknown
+  std::string reason;
+};
+
+/// How events are learned of.
+enum class EventMode : std::uint8_t {
+  none,      ///< not at all
+  declared,  ///< as the profile says; what it arms is switched off at the end
+  unarmed,   ///< the counter alone is polled; for tools whose output another client uses
+};
+
+/// Learns of the events of one tool, over all its connections. Nothing is lost in silence and
+/// nothing is told twice, as far as the tool lets it be known. One thread.
+class EventSource {
+ public:
+  using Tell = std::function<void(const std::variant<EventNews, GapNews>&)>;
+
+  /// Null where there is nothing to learn: the profile has no events, or they are not wanted.
+  /// `profile` and `clock` must outlive it.
+  static std::unique_ptr<EventSource> make(const catalogue::Profile& profile, EventMode mode,
+                                           Clock& clock, Tell tell);
+
+  EventSource() = default;
+  EventSource(const EventSource&) = delete;
+  EventSource& operator=(const EventSource&) = delete;
+  virtual ~EventSource() = default;
+
+  /// What cannot be known of this tool's events, as part of a sentence; empty: nothing is lost
+  /// without a sign of it.
+  [[nodiscard]] virtual std::string_view caveat() const { return {}; }
+
+  /// Goes on with a new connection, behind a time in which the tool was not listened to, and
+  /// catches up with what happened meanwhile. The device must outlive the connection.
+  virtual Result<void> attach(Device& device, Duration unseen) = 0;
+
+  /// Another tool answers now: nothing of what is known counts.
+  virtual void forget() = 0;
+
+  /// When run_due() is next due; TimePoint::max(): never.
+  [[nodiscard]] virtual TimePoint next_due() const { return TimePoint::max(); }
+  /// Keeps armed what expires. `ask` makes a request while events are told as they come.
+  using Ask = std::function<Result<void>(const std::function<Result<void>()>&)>;
+  virtual Result<void> run_due(const Ask& ask) {
+    static_cast<void>(ask);
+    return {};
+  }
+
+  /// Whether poll() has to be called on every beat.
+  [[nodiscard]] virtual bool polls() const = 0;
+  virtual Result<void> poll() { return {}; }
+
+  /// A frame that the tool sent unasked.
+  virtual void handle(const link::Spontaneous& frame) { static_cast<void>(frame); }
+  /// What was sent unasked and not taken yet, without waiting.
+  virtual void handle_waiting() {}
+
+  /// Switches off what it armed. The tool does so by itself when it hears nothing, so a lost
+  /// request costs only time.
+  virtual void disarm() {}
+};
+
+}  // namespace spindle::device

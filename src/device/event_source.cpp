@@ -1,0 +1,328 @@
+#include "spindle/device/event_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "spindle/catalogue/event_layout.hpp"
+#include "spindle/device/event_tracker.hpp"
+#include "spindle/modbus/pdu.hpp"
+
+namespace spindle::device {
+namespace {
+
+/// The last words to a tool must not hold up the end of the program.
+constexpr Duration farewell_timeout = std::chrono::milliseconds(500);
+
+/// How many frames are taken at once: a tool that never falls silent must not keep us from others.
+constexpr std::size_t max_taken = 4096;
+
+/// A little earlier than asked for, so that the time between two is never longer than it.
+Duration with_margin(Duration period) { return period - period / 10; }
+
+/// Whether one event number is older than another, across the end of the counter.
+bool is_before(std::uint16_t number, std::uint16_t other) {
+  constexpr std::uint16_t half = 0x8000;
+  return number != other && static_cast<std::uint16_t>(other - number) < half;
+}
+
+std::optional<GapNews> gap_of(const Tracked& tracked, EventOrigin origin) {
+  switch (tracked.novelty) {
+    case Novelty::restart:
+      return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
+    case Novelty::doubtful:
+      return GapNews{std::nullopt,
+                     "the tool may have been restarted while nobody was connected, and count its "
+                     "events anew"};
+    case Novelty::wrap:
+      return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
+    case Novelty::jump:
+      break;
+    case Novelty::baseline:
+    case Novelty::repeat:
+    case Novelty::next:
+      return std::nullopt;
+  }
+  switch (origin) {
+    case EventOrigin::catch_up:
+      return GapNews{tracked.missed, "events while nobody was connected"};
+    case EventOrigin::poll:
+      return GapNews{tracked.missed, "events came faster than they were polled"};
+    case EventOrigin::push:
+      break;
+  }
+  return GapNews{tracked.missed, "the tool's event counter jumped"};
+}
+
+/// A tool that counts its events: polled, and its frames heard where it sends any.
+class CounterSource : public EventSource {
+ public:
+  CounterSource(const catalogue::Profile& profile, Clock& clock, Tell tell)
+      : layout_(profile), clock_(&clock), tell_(std::move(tell)) {}
+
+  Result<void> attach(Device& device, Duration unseen) override;
+  void forget() override { tracker_ = {}; }
+  [[nodiscard]] bool polls() const override { return true; }
+  Result<void> poll() override;
+  void handle(const link::Spontaneous& frame) override {
+    judge(EventOrigin::push, modbus::registers_of(frame.pdu), frame.wall);
+  }
+  void handle_waiting() override {
+    for (const link::Spontaneous& frame : take_waiting()) handle(frame);
+  }
+
+ protected:
+  /// Makes the tool send its events, between the reading of its counter and that of its last event.
+  virtual Result<void> arm() { return {}; }
+  [[nodiscard]] Device& device() const { return *device_; }
+  [[nodiscard]] Clock& clock() const { return *clock_; }
+
+ private:
+  enum class Fetched : std::uint8_t { yes, too_fast };
+
+  [[nodiscard]] std::uint16_t number_of(const link::Spontaneous& frame) const {
+    return layout_.number_of(modbus::registers_of(frame.pdu));
+  }
+  Result<Fetched> fetch_last(EventOrigin origin);
+  std::vector<link::Spontaneous> take_waiting();
+  void judge(EventOrigin origin, const Registers& block, WallTime time);
+
+  catalogue::EventLayout layout_;
+  Clock* clock_;
+  Tell tell_;
+  Device* device_ = nullptr;
+  EventTracker tracker_ = {};
+};
+
+/// The counter is read before the output is armed, and the last event once more after it: whatever
+/// happens in between is either pushed or fetched.
+Result<void> CounterSource::attach(Device& device, Duration unseen) {
+  device_ = &device;
+  if (tracker_.last()) {
+    tracker_.look_again(unseen);
+  } else {
+    const auto number = device.event_number();
+    if (!number) return tl::unexpected(number.error());
+    tracker_.set_baseline(*number);
+    take_waiting();  // pushed before the counter was read, so they are old
+  }
+  return arm().and_then([this] { return fetch_last(EventOrigin::catch_up).map([](Fetched) {}); });
+}
+
+/// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
+Result<void> CounterSource::poll() {
+  const auto number = device_->event_number();
+  if (!number) return tl::unexpected(number.error());
+  if (*number == tracker_.last()) return {};
+  const auto fetched = fetch_last(EventOrigin::poll);
+  if (!fetched) return tl::unexpected(fetched.error());
+  if (*fetched == Fetched::yes) return {};
+  const auto missed = static_cast<std::uint16_t>(*number - tracker_.last().value_or(*number));
+  tracker_.set_baseline(*number);
+  tell_(GapNews{missed, "events came faster than they could be read"});
+  return {};
+}
+
+/// Events may have been pushed while the last one was fetched: it is told in its place among them,
+/// and only if it is not one of them.
+Result<CounterSource::Fetched> CounterSource::fetch_last(EventOrigin origin) {
+  const auto block = device_->last_event();
+  const WallTime fetched = clock_->wall();
+  const auto pushed = take_waiting();
+  const bool read = block && *block;
+  const bool needed =
+      read && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
+        return number_of(frame) == layout_.number_of(**block);
+      });
+  auto next = pushed.begin();
+  for (; needed && next != pushed.end(); ++next) {
+    if (!is_before(number_of(*next), layout_.number_of(**block))) break;
+    handle(*next);
+  }
+  if (needed) judge(origin, **block, fetched);
+  for (; next != pushed.end(); ++next) handle(*next);
+  if (!block) return tl::unexpected(block.error());
+  return read ? Fetched::yes : Fetched::too_fast;
+}
+
+std::vector<link::Spontaneous> CounterSource::take_waiting() {
+  std::vector<link::Spontaneous> waiting;
+  while (waiting.size() < max_taken) {
+    auto frame = device_->session().next_spontaneous(clock_->now());
+    if (!frame || !*frame) break;  // a broken line is noticed by the next who uses it
+    waiting.push_back(std::move(**frame));
+  }
+  return waiting;
+}
+
+void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime time) {
+  const std::uint16_t number = layout_.number_of(block);
+  const Tracked tracked = tracker_.track(number, block);
+  if (!tracked.is_new()) return;
+  if (const auto gap = gap_of(tracked, origin)) tell_(*gap);
+  // Since it was restarted the tool has had no event; what stands in its registers is none.
+  const bool restarted = tracked.novelty == Novelty::restart;
+  const bool pushed = origin == EventOrigin::push;
+  if (restarted && number == 0 && (!pushed || EventTracker::is_blank(block))) return;
+  const Standing standing = restarted && !pushed ? Standing::remembered : Standing::result;
+  tell_(EventNews{origin, block, time, standing});
+}
+
+/// A tool that sends its events unasked, where it has to be told so again and again.
+class PushSource final : public CounterSource {
+ public:
+  PushSource(const catalogue::Profile& profile, Clock& clock, Tell tell)
+      : CounterSource(profile, clock, std::move(tell)), arming_(profile.events->arm) {}
+
+  [[nodiscard]] bool polls() const override { return false; }
+  [[nodiscard]] TimePoint next_due() const override { return arm_due_; }
+  Result<void> run_due(const Ask& ask) override;
+  void disarm() override;
+
+ protected:
+  Result<void> arm() override;
+
+ private:
+  void plan_next() {
+    arm_due_ = arming_ ? clock().now() + with_margin(arming_->every) : TimePoint::max();
+  }
+
+  std::optional<catalogue::Arming> arming_;
+  TimePoint arm_due_ = TimePoint::max();
+};
+
+Result<void> PushSource::arm() {
+  plan_next();
+  auto armed = device().switch_events(EventOutput::on);
+  // One lost answer is no reason to give up a connection.
+  const bool again = !armed && link::is_lost_answer(armed.error());
+  return again ? device().switch_events(EventOutput::on) : armed;
+}
+
+Result<void> PushSource::run_due(const Ask& ask) {
+  if (clock().now() < arm_due_) return {};
+  plan_next();
+  return ask([this] { return device().switch_events(EventOutput::on); });
+}
+
+void PushSource::disarm() {
+  if (arming_) {
+    link::Session& session = device().session();
+    session.shield();
+    session.set_answer_timeout(std::min(session.options().answer_timeout, farewell_timeout));
+    const auto ignored = device().switch_events(EventOutput::off);
+    static_cast<void>(ignored);
+  }
+  handle_waiting();
+}
+
+/// A tool that says by a flag that there is a result. Reading clears it, so whatever becomes of the
+/// answer, the block behind it is looked at.
+class FlagSource final : public EventSource {
+ public:
+  FlagSource(Clock& clock, Tell tell) : clock_(&clock), tell_(std::move(tell)) {}
+
+  [[nodiscard]] std::string_view caveat() const override {
+    return "it does not count its results, so gaps cannot be known";
+  }
+  Result<void> attach(Device& device, Duration unseen) override;
+  void forget() override;
+  [[nodiscard]] bool polls() const override { return true; }
+  Result<void> poll() override { return look(EventOrigin::poll); }
+
+ private:
+  Result<void> look(EventOrigin origin);
+  Result<void> look_behind(EventOrigin origin, const std::string& doubt);
+  void tell(EventOrigin origin, Registers block);
+
+  Clock* clock_;
+  Tell tell_;
+  Device* device_ = nullptr;
+  std::optional<Registers> seen_ = std::nullopt;  ///< the block as last read
+  std::optional<Registers> told_ = std::nullopt;  ///< the block of the last event told
+};
+
+/// The block is read first, so that a result whose flag is lost on the way can be told from it.
+Result<void> FlagSource::attach(Device& device, Duration /*unseen*/) {
+  device_ = &device;
+  if (!seen_) {
+    auto block = device_->event_block();
+    if (!block) return tl::unexpected(std::move(block.error()));
+    seen_ = std::move(*block);
+    return look(EventOrigin::catch_up);
+  }
+  tell_(GapNews{std::nullopt,
+                "the tool does not count its results: of those while the link was lost only the "
+                "last one can be known"});
+  return look(EventOrigin::catch_up).and_then([this] {
+    return look_behind(EventOrigin::catch_up, {});
+  });
+}
+
+void FlagSource::forget() {
+  seen_.reset();
+  told_.reset();
+}
+
+Result<void> FlagSource::look(EventOrigin origin) {
+  const auto flag = device_->take_event_flag();
+  if (!flag && link::is_lost_answer(flag.error())) {
+    return look_behind(origin, fmt::format("whether there was a result is not known: {}",
+                                           message_of(flag.error())));
+  }
+  if (!flag) return tl::unexpected(flag.error());
+  if (*flag == Shown::no) return {};
+  auto block = device_->event_block();
+  if (!block) {
+    tell_(GapNews{std::nullopt, fmt::format("there is a result, and it could not be read: {}",
+                                            message_of(block.error()))});
+    return tl::unexpected(std::move(block.error()));
+  }
+  if (told_ == *block) {
+    tell_(GapNews{1,
+                  "the result that was read is the one before: another came before it was read, "
+                  "or both are equal"});
+    return {};
+  }
+  tell(origin, std::move(*block));
+  return {};
+}
+
+/// Tells what stands in the block where it is not what stood there before, whatever the flag says.
+/// `doubt`: what is told where it is; may be empty.
+Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doubt) {
+  auto block = device_->event_block();
+  const bool is_new = block && seen_ != *block && !EventTracker::is_blank(*block);
+  if (is_new) {
+    tell(origin, std::move(*block));
+    return {};
+  }
+  if (!doubt.empty()) tell_(GapNews{std::nullopt, doubt});
+  if (!block) return tl::unexpected(std::move(block.error()));
+  return {};
+}
+
+void FlagSource::tell(EventOrigin origin, Registers block) {
+  seen_ = block;
+  told_ = block;
+  tell_(EventNews{origin, std::move(block), clock_->wall()});
+}
+
+}  // namespace
+
+std::unique_ptr<EventSource> EventSource::make(const catalogue::Profile& profile, EventMode mode,
+                                               Clock& clock, Tell tell) {
+  if (!profile.events || mode == EventMode::none) return nullptr;
+  const catalogue::EventModel model = profile.events->model;
+  if (model == catalogue::EventModel::flag) {
+    return std::make_unique<FlagSource>(clock, std::move(tell));
+  }
+  if (model == catalogue::EventModel::push && mode == EventMode::declared) {
+    return std::make_unique<PushSource>(profile, clock, std::move(tell));
+  }
+  return std::make_unique<CounterSource>(profile, clock, std::move(tell));
+}
+
+}  // namespace spindle::device
