@@ -317,6 +317,7 @@ class Completer {
     std::vector<Candidate> names;
     names.reserve(profile.parameters.size());
     for (const Parameter& parameter : profile.parameters) {
+      if (profile.consumes(parameter)) continue;  // who names it is refused
       names.push_back({parameter.name, parameter.title});
     }
     return names;

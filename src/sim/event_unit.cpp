@@ -71,6 +71,11 @@ std::vector<Push> EventUnit::take_pushes(ConnectionId connection) {
   return taken;
 }
 
+void EventUnit::connected(ConnectionId connection) {
+  disconnected(connection);
+  if (facts_ && !facts_->arm) armed_until_[connection] = TimePoint::max();
+}
+
 void EventUnit::disconnected(ConnectionId connection) {
   armed_until_.erase(connection);
   static_cast<void>(take_pushes(connection));

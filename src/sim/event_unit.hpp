@@ -47,7 +47,8 @@ class EventUnit {
 
   std::vector<Push> take_pushes() { return std::exchange(pushes_, {}); }
   std::vector<Push> take_pushes(ConnectionId connection);
-  void connected(ConnectionId connection) { disconnected(connection); }
+  /// A client is there. It gets frames from now on where nothing arms them.
+  void connected(ConnectionId connection);
   void disconnected(ConnectionId connection);
   /// Nothing is armed any more, and events count from 0 again.
   void reboot(RegisterBank& bank);

@@ -47,6 +47,9 @@ class Forgetful final : public sim::Server {
     return tool_->next_change();
   }
   std::vector<sim::Push> take_pushes() override { return tool_->take_pushes(); }
+  std::vector<sim::Push> take_pushes(sim::ConnectionId connection) override {
+    return tool_->take_pushes(connection);
+  }
   void connected(sim::ConnectionId connection) override { tool_->connected(connection); }
   void disconnected(sim::ConnectionId connection) override { tool_->disconnected(connection); }
 
@@ -62,12 +65,13 @@ class Forgetful final : public sim::Server {
 /// A tool by a profile of its own, and what its source of events tells.
 class Bench {
  public:
-  explicit Bench(const std::string& name, EventMode mode = EventMode::declared) {
+  explicit Bench(const std::string& name, void (*change)(catalogue::EventFacts&) = nullptr) {
     const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/third"});
     profile = store.load(name).value();
+    if (change != nullptr) change(*profile.events);
     tool = sim::make_plain_tool(profile, store.load_simulation(name).value(), {});
     server = std::make_unique<Forgetful>(*tool);
-    source = EventSource::make(profile, mode, clock, [this](const auto& news) {
+    source = EventSource::make(profile, EventMode::declared, clock, [this](const auto& news) {
       if (const auto* event = std::get_if<EventNews>(&news)) events.push_back(*event);
       if (const auto* gap = std::get_if<GapNews>(&news)) gaps.push_back(*gap);
     });
@@ -240,4 +244,25 @@ TEST_CASE("counter: a block that is longer than a request is read in pieces") {
   REQUIRE(bench.events.size() == 1);
   CHECK(bench.events.front().block.size() == 25);
   CHECK(bench.events.front().block.back() == 42);
+}
+
+TEST_CASE("push without arming: frames come by themselves, and nothing is switched on or off") {
+  Bench bench("countermatic",
+              [](catalogue::EventFacts& events) { events.model = catalogue::EventModel::push; });
+  CHECK(!bench.source->polls());
+  REQUIRE(bench.connect());
+  CHECK(bench.source->next_due() == TimePoint::max());
+  const std::size_t asked = bench.server->asked.size();
+  bench.happen();
+  bench.happen(EventKind::fastening_ng);
+  const auto frame = bench.device->session().next_spontaneous(bench.clock.now() + 10ms);
+  REQUIRE((frame && *frame));
+  bench.source->handle(**frame);
+  bench.source->handle_waiting();
+  REQUIRE(bench.events.size() == 2);
+  CHECK(bench.events.front().source == EventOrigin::push);
+  REQUIRE(bench.source->run_due([](const auto& request) { return request(); }));
+  bench.source->disarm();
+  CHECK(bench.server->asked.size() == asked);
+  CHECK(bench.gaps.empty());
 }
