@@ -27,7 +27,8 @@ constexpr std::array<std::string_view, 12> reserved_keys = {
     "schema", "type", "time",   "target",     "kind",        "source",
     "raw",    "text", "result", "remembered", "torque_unit", "error_text"};
 
-/// "event.screw-count" is "screw_count" in JSON; where that is not clear, "event_screw_count".
+/// The last word of a name, as screw_count of event.screw-count; the whole name where that is not
+/// clear.
 std::vector<std::string> keys_of(const catalogue::EventLayout& layout) {
   std::map<std::string, std::size_t> taken;
   const auto last_word = [](const std::string& name) { return name.substr(name.rfind('.') + 1); };

@@ -70,7 +70,7 @@ class StartActionRun final : public ToolRun {
   }
 
   [[nodiscard]] std::vector<report::Column> columns() const override {
-    return news_columns(Tools::one, {&*tool().profile});
+    return news_columns(Tools::one, {tool().profile.get()});
   }
   [[nodiscard]] work::LoggedChange start_change() const override {
     return {.name = plan_->start.name,

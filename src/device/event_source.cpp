@@ -19,6 +19,16 @@ constexpr Duration farewell_timeout = std::chrono::milliseconds(500);
 /// How many frames are taken at once: a tool that never falls silent must not keep us from others.
 constexpr std::size_t max_taken = 4096;
 
+bool is_interrupt(const Error& error) {
+  return error.code == Errc::interrupted || error.code == Errc::terminated;
+}
+
+/// What is still to be said is said although an interrupt came, but soon.
+void begin_farewell(link::Session& session) {
+  session.shield();
+  session.set_answer_timeout(std::min(session.options().answer_timeout, farewell_timeout));
+}
+
 /// A little earlier than asked for, so that the time between two is never longer than it.
 Duration with_margin(Duration period) { return period - period / 10; }
 
@@ -209,9 +219,7 @@ Result<void> PushSource::run_due(const Ask& ask) {
 
 void PushSource::disarm() {
   if (arming_) {
-    link::Session& session = device().session();
-    session.shield();
-    session.set_answer_timeout(std::min(session.options().answer_timeout, farewell_timeout));
+    begin_farewell(device().session());
     const auto ignored = device().switch_events(EventOutput::off);
     static_cast<void>(ignored);
   }
@@ -234,6 +242,7 @@ class FlagSource final : public EventSource {
 
  private:
   Result<void> look(EventOrigin origin);
+  Result<void> take_result(EventOrigin origin);
   Result<void> look_behind(EventOrigin origin, const std::string& doubt);
   void tell(EventOrigin origin, Registers block);
 
@@ -268,25 +277,40 @@ void FlagSource::forget() {
 
 Result<void> FlagSource::look(EventOrigin origin) {
   const auto flag = device_->take_event_flag();
+  if (!flag && is_interrupt(flag.error())) {
+    begin_farewell(device_->session());
+    const auto told = look_behind(origin, {});
+    static_cast<void>(told);  // it ends because of the interrupt
+  }
   if (!flag && link::is_lost_answer(flag.error())) {
     return look_behind(origin, fmt::format("whether there was a result is not known: {}",
                                            message_of(flag.error())));
   }
   if (!flag) return tl::unexpected(flag.error());
-  if (*flag == Shown::no) return {};
+  return *flag == Shown::yes ? take_result(origin) : Result<void>();
+}
+
+/// The flag is cleared, so now or never.
+Result<void> FlagSource::take_result(EventOrigin origin) {
   auto block = device_->event_block();
+  std::optional<Error> interrupt;
+  if (!block && is_interrupt(block.error())) {
+    interrupt = std::move(block.error());
+    begin_farewell(device_->session());
+    block = device_->event_block();
+  }
   if (!block) {
     tell_(GapNews{std::nullopt, fmt::format("there is a result, and it could not be read: {}",
                                             message_of(block.error()))});
-    return tl::unexpected(std::move(block.error()));
-  }
-  if (told_ == *block) {
+  } else if (told_ == *block) {
     tell_(GapNews{1,
                   "the result that was read is the one before: another came before it was read, "
                   "or both are equal"});
-    return {};
+  } else {
+    tell(origin, std::move(*block));
   }
-  tell(origin, std::move(*block));
+  if (interrupt) return tl::unexpected(std::move(*interrupt));
+  if (!block) return tl::unexpected(std::move(block.error()));
   return {};
 }
 

@@ -34,6 +34,13 @@ RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& 
       answer_timeout_(device.session().options().answer_timeout) {}
 
 Result<void> RunFollower::prepare() {
+  if (device_->profile().events->number.empty()) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "the tool does not count its results, so that of this run cannot be known",
+              .hint = "start it at the tool, and watch it with 'spindle watch'",
+              .name = start_->name});
+  }
   const auto number = device_->event_number();
   if (!number) return tl::unexpected(number.error());
   tracker_.set_baseline(*number);

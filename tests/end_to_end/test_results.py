@@ -10,7 +10,7 @@ import hostile_server
 import support
 from test_watch import Watching
 
-PROFILE = ("--profile", support.ROOT / "tests/profiles/third/kducer.yaml")
+PROFILE = ("--profile", support.ROOT / "tests/profiles/good/kducer.yaml")
 FLAG, BLOCK, BLOCK_SIZE = 294, 295, 67
 OK, PROGRAM, TORQUE, SECOND = 303, 304, 318, 351
 PARAMETERS = {7371: 1, 7372: 3}

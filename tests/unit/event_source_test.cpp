@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "spindle/files/profile_store.hpp"
@@ -36,6 +37,10 @@ class Forgetful final : public sim::Server {
     asked.push_back(first);
     auto answered = tool_->answer(connection, unit, request, now);
     if (behind_flag && first == flag_register) tool_->happen(*std::exchange(behind_flag, {}), now);
+    if (interrupt != nullptr && first == interrupted_at) {
+      std::exchange(interrupt, nullptr)->raise(2);
+      return std::nullopt;
+    }
     if (lost > 0 && first == lost_at) {
       --lost;
       return std::nullopt;
@@ -57,6 +62,8 @@ class Forgetful final : public sim::Server {
   std::uint16_t lost_at = 0;
   int lost = 0;
   std::optional<EventKind> behind_flag = std::nullopt;
+  std::uint16_t interrupted_at = 0;
+  Interrupt* interrupt = nullptr;  ///< comes instead of the answer, once
 
  private:
   sim::PlainTool* tool_;
@@ -66,7 +73,7 @@ class Forgetful final : public sim::Server {
 class Bench {
  public:
   explicit Bench(const std::string& name, void (*change)(catalogue::EventFacts&) = nullptr) {
-    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/third"});
+    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"});
     profile = store.load(name).value();
     if (change != nullptr) change(*profile.events);
     tool = sim::make_plain_tool(profile, store.load_simulation(name).value(), {});
@@ -264,5 +271,31 @@ TEST_CASE("push without arming: frames come by themselves, and nothing is switch
   REQUIRE(bench.source->run_due([](const auto& request) { return request(); }));
   bench.source->disarm();
   CHECK(bench.server->asked.size() == asked);
+  CHECK(bench.gaps.empty());
+}
+
+TEST_CASE("flag: an interrupt takes no result with it") {
+  for (const std::uint16_t asked : {flag_register, block_register}) {
+    CAPTURE(asked);
+    Bench bench("kducer");
+    REQUIRE(bench.connect());
+    bench.happen();
+    bench.server->interrupted_at = asked;
+    bench.server->interrupt = &bench.interrupt;
+    const auto polled = bench.source->poll();
+    REQUIRE(!polled.has_value());
+    CHECK(polled.error().code == Errc::interrupted);
+    CHECK(bench.events.size() == 1);
+    CHECK(bench.gaps.empty());
+  }
+}
+
+TEST_CASE("flag: an interrupt is no gap where nothing happened") {
+  Bench bench("kducer");
+  REQUIRE(bench.connect());
+  bench.server->interrupted_at = flag_register;
+  bench.server->interrupt = &bench.interrupt;
+  CHECK(!bench.source->poll().has_value());
+  CHECK(bench.events.empty());
   CHECK(bench.gaps.empty());
 }

@@ -422,6 +422,24 @@ TEST_CASE("every source file keeps the law of the house") {
   CHECK(layers_seen.contains("main"));
 }
 
+/// Names of one family that stand in its profile: its event block, its columns, its lists of
+/// alarms.
+const std::vector<std::string_view> names_of_a_family = {
+    "\"event.",  "\"a3\"",         "\"preset\"",     "\"PRESET\"",
+    "\"ANGLE\"", "\"last-event\"", "\"alarm-data\"", "\"alarm.*\""};
+
+TEST_CASE("what a product calls its results stands in its profile") {
+  for (const char* layer : {"catalogue", "link", "files", "device", "work", "report", "commands"}) {
+    for (const Source& source : sources_under(std::string("src/") + layer)) {
+      for (const std::string_view name : names_of_a_family) {
+        CAPTURE(source.path);
+        CAPTURE(name);
+        CHECK(source.text.find(name) == std::string::npos);
+      }
+    }
+  }
+}
+
 TEST_CASE("only the peer tests talk to libmodbus") {
   for (const Source& source : sources_under("tests")) {
     if (source.path.starts_with("tests/peer/")) continue;

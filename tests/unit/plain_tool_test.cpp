@@ -23,7 +23,7 @@ constexpr sim::ConnectionId client{1};
 class Plain {
  public:
   explicit Plain(const std::string& name, const sim::PlainOptions& options = {}) {
-    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/third"});
+    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"});
     tool = sim::make_plain_tool(store.load(name).value(), store.load_simulation(name).value(),
                                 options);
   }

@@ -74,6 +74,31 @@ TEST_CASE("the result of a run is its event") {
   CHECK(tool.stops() == 0);  // a follower starts and stops nothing
 }
 
+TEST_CASE("the result of a tool that sends nothing unasked is fetched when its run has ended") {
+  GuardedTool tool;
+  tool.profile.events->model = catalogue::EventModel::counter;
+  tool.profile.events->arm.reset();
+  Bench bench(tool);
+  bench.start();
+  const auto run = bench.follow();
+  REQUIRE(run);
+  CHECK(run->ending == RunEnding::result);
+  REQUIRE(run->event);
+  CHECK(run->event->source == EventOrigin::catch_up);
+  CHECK(run->event->block[number_at] == first_number + 1);
+}
+
+TEST_CASE("a run whose result could not be told from others is not begun") {
+  GuardedTool tool;
+  tool.profile.events->model = catalogue::EventModel::flag;
+  tool.profile.events->number = {};
+  Device device = tool.open();
+  const catalogue::Action start = tool.start_action();
+  const auto prepared = RunFollower(device, start, tool.clock).prepare();
+  REQUIRE(!prepared);
+  CHECK(prepared.error().code == Errc::usage);
+}
+
 TEST_CASE("every event of a run is heard when it comes, and once") {
   GuardedTool tool;
   slow_down(tool);

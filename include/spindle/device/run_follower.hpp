@@ -40,7 +40,8 @@ class RunFollower {
   /// `start` must outlive it. `hear` may be empty, and must not use the device.
   RunFollower(Device& device, const catalogue::Action& start, Clock& clock, HearEvent hear = {});
 
-  /// Remembers the last event and arms the output. Call before the start.
+  /// Remembers the last event and arms the output. Call before the start. Error `usage`, before the
+  /// tool is asked, where the profile names no counter of events.
   Result<void> prepare();
 
   /// Call after the start. Errors: interrupts and link trouble; what the run did is then unknown. A
