@@ -3,6 +3,7 @@
 #include "spindle/posix/serve.hpp"
 #include "spindle/posix/signals.hpp"
 #include "spindle/posix/world.hpp"
+#include "spindle/shipped/profiles.hpp"
 
 int main(int count, char** arguments) {
   using namespace spindle::posix;
@@ -20,6 +21,7 @@ int main(int count, char** arguments) {
       .end_waits = [&] { signals.end_waits(); },
       .environment = environment,
       .disk = local_disk(environment("SPINDLE_TRUST").value_or("")),
-      .installation = installation()};
+      .installation = installation(),
+      .shipped = spindle::shipped::profiles()};
   return spindle::cli::run({arguments + 1, arguments + count}, world);
 }

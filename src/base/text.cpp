@@ -146,6 +146,13 @@ const std::string* nearest_by(std::string_view word, const std::vector<std::stri
 }  // namespace
 
 bool glob_match(std::string_view pattern, std::string_view text) {
+  // Most names differ from a pattern already at an end of it.
+  constexpr std::string_view special = "*?[]";
+  while (!pattern.empty() && !text.empty() && special.find(pattern.back()) == std::string_view::npos) {
+    if (pattern.back() != text.back()) return false;
+    pattern.remove_suffix(1);
+    text.remove_suffix(1);
+  }
   // On a mismatch only the last star needs to take one character more: whatever an earlier one
   // took, the later one can make up for.
   std::optional<std::pair<std::string_view, std::string_view>> after_star;

@@ -17,9 +17,8 @@ EventLayout::EventLayout(const Profile& profile) : facts_(&*profile.events) {
 }
 
 std::optional<EventKind> EventLayout::kind_of(RegisterView block) const {
-  const auto known = facts_->kinds.find(block[kind_at_]);
-  if (known == facts_->kinds.end()) return std::nullopt;
-  return known->second;
+  const EventKind* known = facts_->kinds.find(block[kind_at_]);
+  return known == nullptr ? std::nullopt : std::optional(*known);
 }
 
 }  // namespace spindle::catalogue

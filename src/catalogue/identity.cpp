@@ -54,9 +54,8 @@ void read_long_serial(ByteView bytes, Identity& identity) {
 
 void read_product(const IdentityFacts& facts, ByteView answer, Identity& identity) {
   const unsigned code = answer[facts.product_byte];
-  const auto found = facts.products.find(code);
-  if (found != facts.products.end()) {
-    identity.product_profile = found->second;
+  if (const Text* id = facts.products.find(code)) {
+    identity.product_profile = *id;
   } else {
     identity.notes.push_back(fmt::format("product code {} is not known", code));
   }
@@ -79,9 +78,8 @@ void read_serial(const IdentityFacts& facts, ByteView answer, Identity& identity
 void read_model(const IdentityFacts& facts, ByteView answer, Identity& identity) {
   identity.tool_model_code = number_at(answer, facts.tool_model);
   if (!identity.tool_model_code) return;
-  const auto found = facts.models.find(*identity.tool_model_code);
-  if (found != facts.models.end()) {
-    identity.tool_model = found->second;
+  if (const Text* name = facts.models.find(*identity.tool_model_code)) {
+    identity.tool_model = *name;
   } else {
     identity.notes.push_back(
         fmt::format("tool model code {} is not known", *identity.tool_model_code));

@@ -47,11 +47,17 @@ std::optional<Kind> parse_kind(std::string_view text) {
   return std::nullopt;
 }
 
+std::vector<std::string> to_strings(const List<Text>& texts) {
+  return {texts.begin(), texts.end()};
+}
+
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) {
-  std::erase_if(parameter.bits,
-                [&](const BitName& name) { return name.when && name.when != value; });
-  for (BitName& name : parameter.bits) name.when.reset();
-  parameter.bits_by.clear();
+  std::vector<BitName> counting;
+  for (const BitName& name : parameter.bits) {
+    if (!name.when || name.when == value) counting.push_back({name.bit, name.text});
+  }
+  parameter.bits = std::move(counting);
+  parameter.bits_by = {};
   return parameter;
 }
 

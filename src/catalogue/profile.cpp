@@ -162,7 +162,7 @@ Result<std::vector<Parameter>> select_for(const Profile& profile,
                                           const std::vector<std::string>& names, Purpose purpose) {
   std::vector<Parameter> selected;
   if (names.empty()) {
-    selected = profile.parameters;
+    selected.assign(profile.parameters.begin(), profile.parameters.end());
     if (purpose == Purpose::reading) leave_out_consumed(profile, selected);
   }
   std::unordered_set<std::string> seen;
@@ -341,13 +341,13 @@ Judgement judge(const Profile& profile, const Identity& identity) {
       break;
   }
   const std::string& product = identity.product_profile;
-  const auto is = [&](const std::string& id) {
+  const auto is = [&](std::string_view id) {
     return profile.id == id ||
            std::find(profile.bases.begin(), profile.bases.end(), id) != profile.bases.end();
   };
   const auto& products = profile.identity->products;
   const bool is_another = std::any_of(products.begin(), products.end(),
-                                      [&](const auto& entry) { return is(entry.second); });
+                                      [&](const auto& entry) { return is(entry.value); });
   return product.empty() || is(product) || !is_another ? Judgement::fits : Judgement::other_product;
 }
 

@@ -90,9 +90,9 @@ bool RunFacts::is_command(std::string_view parameter) const {
          parameter == by_register->stop_register;
 }
 
-std::string numbered_name(const std::string& pattern, std::uint16_t number) {
+std::string numbered_name(std::string_view pattern, std::uint16_t number) {
   constexpr std::string_view counter = "{n}";
-  std::string name = pattern;
+  std::string name(pattern);
   const std::size_t at = name.find(counter);
   if (at != std::string::npos) name.replace(at, counter.size(), std::to_string(number));
   return name;

@@ -279,7 +279,7 @@ Snapshot snapshot_of_defaults(const Profile& profile) {
     if (!raw) continue;  // the loader of profiles refuses such a default
     auto value = decode(parameter, *raw);
     if (!value) continue;
-    std::string unit = parameter.unit == torque_unit ? std::string() : parameter.unit;
+    std::string unit = parameter.unit == torque_unit ? std::string() : parameter.unit.to_string();
     snapshot.entries.push_back({.parameter = std::move(parameter),
                                 .raw = std::move(*raw),
                                 .value = std::move(*value),

@@ -100,7 +100,7 @@ std::string bit_names(const Parameter& parameter, std::int64_t integer) {
         std::find_if(parameter.bits.begin(), parameter.bits.end(),
                      [bit](const BitName& known) { return known.bit == bit && !known.when; });
     if (!names.empty()) names += ' ';
-    names += name == parameter.bits.end() ? fmt::format("bit{}", bit) : name->text;
+    names += name == parameter.bits.end() ? fmt::format("bit{}", bit) : name->text.to_string();
   }
   return names;
 }

@@ -307,7 +307,7 @@ class Completer {
     }
   }
 
-  void offer_labels(const std::vector<catalogue::Label>& labels, const std::string& before) {
+  void offer_labels(const catalogue::List<catalogue::Label>& labels, const std::string& before) {
     for (const catalogue::Label& label : labels) {
       add(before + label.text, std::to_string(label.number));
     }

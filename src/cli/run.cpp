@@ -56,6 +56,10 @@ std::vector<std::string> profile_folders(const World& world) {
   return folders;
 }
 
+files::ProfileStore profile_store(const World& world) {
+  return files::ProfileStore(profile_folders(world), world.disk.read_trusted, world.shipped);
+}
+
 /// The tools file that counts; empty when there is none.
 std::string find_tools_file(const World& world, const Invocation& invocation) {
   if (!invocation.common.tools_file.empty()) return invocation.common.tools_file;
@@ -112,7 +116,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                                       report::Renderer& renderer) {
   const auto tools = find_tools(world, invocation);
   if (!tools) return tl::unexpected(tools.error());
-  const files::ProfileStore profiles(profile_folders(world), world.disk.read_trusted);
+  const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
   const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.verbosity);
   commands::Context context{
@@ -148,7 +152,7 @@ int run_completion(const std::vector<std::string>& words, World& world) {
   const auto typed = parse(words);
   const auto tools = find_tools(world, typed.value_or(Invocation()));
   const files::Tools none;
-  const files::ProfileStore profiles(profile_folders(world), world.disk.read_trusted);
+  const files::ProfileStore profiles = profile_store(world);
   const Completion completion =
       complete(words, describe_grammar(), {tools ? *tools : none, profiles});
   const auto written = world.io.out(to_text(completion));
@@ -162,7 +166,7 @@ Result<void> tell_version(const World& world, report::Format format, report::Ren
   if (format != report::Format::json) return world.io.out(plain + "\n");
   report::Texts profiles;
   for (const auto& entry :
-       files::ProfileStore(profile_folders(world), world.disk.read_trusted).list()) {
+       profile_store(world).list()) {
     profiles.push_back(entry.id);
   }
   return renderer.line({.type = "version",

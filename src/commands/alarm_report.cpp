@@ -28,7 +28,7 @@ report::Record alarm_record(const AlarmSource& source, std::size_t index,
                             const Target& target, const Clock& clock) {
   const std::int64_t code = value.number.mantissa();
   const bool is_free = code == 0 && source.table != catalogue::CodeTable::none;
-  const std::string meaning = text != nullptr ? text->text : is_free ? "none" : "";
+  const std::string meaning = text != nullptr ? text->text.to_string() : is_free ? "none" : "";
   return {.type = "alarm",
           .target = target.shown,
           .time = clock.wall(),
@@ -47,8 +47,7 @@ const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table
   if (table == catalogue::CodeTable::none) return nullptr;
   if (table == catalogue::CodeTable::warning) texts = &tables.warning;
   if (table == catalogue::CodeTable::refusal && refusals) texts = &refusals->codes;
-  const auto known = texts->find(code);
-  return known == texts->end() ? nullptr : &known->second;
+  return texts->find(code);
 }
 
 /// One code of a list, told and remembered.
@@ -82,7 +81,7 @@ void tell(const AlarmSource& source, std::size_t index, const device::Reading& r
 Result<std::vector<AlarmSource>> alarm_sources(const Profile& profile) {
   std::vector<AlarmSource> sources;
   for (const catalogue::AlarmList& list : profile.alarm_lists) {
-    auto parameters = profile.select(list.parameters);
+    auto parameters = profile.select(to_strings(list.parameters));
     if (!parameters) return tl::unexpected(std::move(parameters.error()));
     for (Parameter& parameter : *parameters) {
       sources.push_back({list.name, std::move(parameter), list.codes});

@@ -60,7 +60,7 @@ Result<void> WordSetup::read_settings() {
   const CommandWordFacts& run = facts();
   std::vector<std::string> names = {run.command, run.mode,
                                     catalogue::numbered_name(run.deceleration, plan_->operation)};
-  for (const std::string* name : {&run.analog, &run.watchdog}) {
+  for (const catalogue::Text* name : {&run.analog, &run.watchdog}) {
     if (!name->empty()) names.push_back(*name);
   }
   auto wanted = tool().profile->select(names);

@@ -135,8 +135,8 @@ EventKind NewsRecords::kind_of(const Registers& block) const {
 
 std::string NewsRecords::error_text(std::int64_t code) const {
   if (code == 0) return {};
-  const auto known = tables_.error.find(code);
-  return known == tables_.error.end() ? std::string() : known->second.text;
+  const catalogue::CodeText* known = tables_.error.find(code);
+  return known == nullptr ? std::string() : known->text.to_string();
 }
 
 Record NewsRecords::event(const device::EventNews& news) const {

@@ -16,9 +16,10 @@ struct Subject {
 /// A torque in the tool's own unit, where the tools file says which that is.
 catalogue::Profile with_units_of(const Target& target, catalogue::Profile profile) {
   if (target.torque_unit.empty()) return profile;
-  for (catalogue::Parameter& parameter : profile.parameters) {
-    parameter.unit = unit_of(parameter, target);
-  }
+  std::vector<catalogue::Parameter> parameters(profile.parameters.begin(),
+                                               profile.parameters.end());
+  for (catalogue::Parameter& parameter : parameters) parameter.unit = unit_of(parameter, target);
+  profile.parameters = std::move(parameters);
   return profile;
 }
 

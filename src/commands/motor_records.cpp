@@ -10,8 +10,8 @@ namespace {
 using device::MotorEvent;
 
 std::string meaning_of(std::int64_t code, const catalogue::CodeTexts& texts) {
-  const auto known = texts.find(code);
-  return code == 0 || known == texts.end() ? std::string() : known->second.text;
+  const catalogue::CodeText* known = texts.find(code);
+  return code == 0 || known == nullptr ? std::string() : known->text.to_string();
 }
 
 report::Cell number_or_null(const std::optional<Decimal>& number) {

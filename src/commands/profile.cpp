@@ -27,7 +27,9 @@ Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
                      {"title", profile.title},
                      {"parameters", count(profile.parameters.size())},
                      {"actions", count(profile.actions.size())},
-                     {"file", profile.path}}};
+                     {"file", files::names_profile_file(profile.path)
+                                  ? profile.path.to_string()
+                                  : std::string(files::built_in)}}};
 }
 
 }  // namespace

@@ -31,13 +31,16 @@ std::string bit_text(const catalogue::BitName& bit, const Parameter& parameter) 
 
 /// What it means, with the labels of an enumeration or the bits of a bit field behind it.
 std::string meaning_of(const Parameter& parameter) {
-  if (parameter.labels.empty() && parameter.bits.empty()) return parameter.title;
-  std::vector<std::string> texts;
-  for (const auto& bit : parameter.bits) texts.push_back(bit_text(bit, parameter));
-  for (const auto& label : parameter.labels) {
-    texts.push_back(fmt::format("{} {}", label.number, label.text));
-  }
-  return fmt::format("{} ({})", parameter.title, fmt::join(texts, ", "));
+  if (parameter.labels.empty() && parameter.bits.empty()) return {};
+  std::string text = parameter.title + " (";
+  std::string_view between;
+  const auto add = [&](const std::string& part) {
+    text.append(between).append(part);
+    between = ", ";
+  };
+  for (const auto& bit : parameter.bits) add(bit_text(bit, parameter));
+  for (const auto& label : parameter.labels) add(std::to_string(label.number) + " " + label.text);
+  return text + ")";
 }
 
 /// What only some products say of their parameters.
@@ -75,9 +78,8 @@ std::string values_of(const catalogue::Action& action) {
 
 /// The type as people read it: "u16", "u16 * 0.01".
 std::string type_of(const catalogue::Encoding& encoding) {
-  const std::string_view kind = catalogue::to_text(encoding.kind);
-  if (encoding.scale == Decimal(1)) return std::string(kind);
-  return fmt::format("{} * {}", kind, encoding.scale.to_string());
+  if (encoding.scale == Decimal(1)) return {};
+  return fmt::format("{} * {}", catalogue::to_text(encoding.kind), encoding.scale.to_string());
 }
 
 }  // namespace
@@ -122,25 +124,28 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
     labels.emplace_back(std::to_string(label.number), label.text);
   }
   report::Record record{
-      .type = "parameter",
-      .target = target,
-      .time = clock.wall(),
-      .fields = {{"name", parameter.name},
-                 {"title", parameter.title, meaning_of(parameter)},
-                 {"table", std::string(catalogue::to_text(parameter.table))},
-                 {"register", number(parameter.address.value)},
-                 {"encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
-                  type_of(parameter.encoding)},
-                 {"scale", parameter.encoding.scale},
-                 {"unit", text_or_null(parameter.unit)},
-                 {"minimum", number_or_null(parameter.range.minimum)},
-                 {"maximum", number_or_null(parameter.range.maximum)},
-                 {"default", number_or_null(parameter.default_value)},
-                 {"labels", labels},
-                 {"access", std::string(catalogue::to_text(parameter.access))},
-                 {"evidence", std::string(catalogue::to_text(parameter.evidence))},
-                 {"source", parameter.source},
-                 {"note", text_or_null(parameter.note)}}};
+      .type = "parameter", .target = target, .time = clock.wall(), .fields = {}};
+  constexpr std::size_t most_fields = 24;  // a list is long: each record is made in one piece
+  record.fields.reserve(most_fields);
+  const auto add = [&](const char* key, report::Cell&& cell, std::string&& shown = {}) {
+    record.fields.emplace_back(key, std::move(cell), std::move(shown));
+  };
+  add("name", parameter.name.to_string());
+  add("title", parameter.title.to_string(), meaning_of(parameter));
+  add("table", std::string(catalogue::to_text(parameter.table)));
+  add("register", number(parameter.address.value));
+  add("encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
+      type_of(parameter.encoding));
+  add("scale", parameter.encoding.scale);
+  add("unit", text_or_null(parameter.unit));
+  add("minimum", number_or_null(parameter.range.minimum));
+  add("maximum", number_or_null(parameter.range.maximum));
+  add("default", number_or_null(parameter.default_value));
+  add("labels", std::move(labels));
+  add("access", std::string(catalogue::to_text(parameter.access)));
+  add("evidence", std::string(catalogue::to_text(parameter.evidence)));
+  add("source", parameter.source.to_string());
+  add("note", text_or_null(parameter.note));
   add_drive_fields(parameter, record);
   if (parameter.hazard != catalogue::Hazard::none) {
     record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});
@@ -148,7 +153,7 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   return record;
 }
 
-std::vector<Column> parameter_columns(const std::vector<Parameter>& parameters) {
+std::vector<Column> parameter_columns(std::span<const Parameter> parameters) {
   std::vector<Column> columns = {{{"NAME", "name"},
                                   {"TABLE", "table"},
                                   {"REGISTER", "register", Align::right},

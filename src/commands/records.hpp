@@ -24,7 +24,7 @@ std::span<const report::Column> value_columns(device::Limits limits);
 report::Record parameter_record(const catalogue::Parameter& parameter, const std::string& target,
                                 const Clock& clock);
 /// When a value takes effect is a column only where a parameter says it.
-std::vector<report::Column> parameter_columns(const std::vector<catalogue::Parameter>& parameters);
+std::vector<report::Column> parameter_columns(std::span<const catalogue::Parameter> parameters);
 
 /// An action as a catalogue entry, for lists.
 report::Record action_record(const catalogue::Action& action, const std::string& target,

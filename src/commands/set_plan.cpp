@@ -19,7 +19,7 @@ using catalogue::Value;
 Error not_writable(const Parameter& parameter, const Profile& profile) {
   Error error{
       .code = Errc::read_only, .name = parameter.name, .register_address = parameter.address.value};
-  if (!parameter.name.starts_with('@') || parameter.table == modbus::RegisterTable::input) {
+  if (!parameter.name.starts_with("@") || parameter.table == modbus::RegisterTable::input) {
     return error;
   }
   error.message = "this register is no parameter that can be written";

@@ -320,7 +320,8 @@ Result<device::WatchPlan> plan_of(const WatchOptions& options, const catalogue::
   if (!profile.events) plan.events = device::EventMode::none;
   const auto model = device::RunModel::of(profile);
   if (model && (*model)->monitor() != nullptr) plan.motor = *(*model)->monitor();
-  const std::vector<std::string>& names = options.names.empty() ? profile.watched : options.names;
+  const std::vector<std::string> names =
+      options.names.empty() ? to_strings(profile.watched) : options.names;
   if (!names.empty()) {
     auto values = profile.select(names);
     if (!values) return tl::unexpected(std::move(values.error()));

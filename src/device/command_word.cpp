@@ -75,9 +75,9 @@ Result<void> CommandWord::broadcast_stop(Device& device, StopMode mode) const {
 }
 
 bool CommandWord::runs(std::uint16_t word, std::int64_t mode) const {
-  const auto words = facts_.modes.find(mode);
-  if (words == facts_.modes.end()) return false;
-  const auto& [forward, reverse, decelerate, instant] = words->second;
+  const catalogue::RunWords* words = facts_.modes.find(mode);
+  if (words == nullptr) return false;
+  const auto& [forward, reverse, decelerate, instant] = *words;
   const unsigned known = unsigned{forward} | reverse | decelerate | instant;
   return (word & known) == forward || (word & known) == reverse;
 }

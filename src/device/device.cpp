@@ -86,7 +86,7 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
   limits.neighbours =
       profile.id.empty() ? link::Neighbours::anywhere : link::Neighbours::contiguous;
   limits.max_read = profile.link.max_read;
-  std::vector<Area> absent = profile.link.absent;
+  std::vector<Area> absent(profile.link.absent.begin(), profile.link.absent.end());
   std::sort(absent.begin(), absent.end(),
             [](const Area& a, const Area& b) { return a.from < b.from; });
   for (const Area& area : profile.link.contiguous) {
@@ -334,11 +334,10 @@ Error Device::located(Error error) const {
 /// The maker's own words for an exception code are better than the standard's.
 Error Device::with_exception_text(Error error) const {
   if (!error.exception) return error;
-  const auto text = profile_->exceptions.find(*error.exception);
-  if (text != profile_->exceptions.end()) {
+  if (const catalogue::CodeText* known = profile_->exceptions.find(*error.exception)) {
     error.message = fmt::format("the tool refused '{}' with exception {:02X} ({})", error.tried,
-                                *error.exception, text->second.text);
-    if (error.hint.empty()) error.hint = text->second.remedy;
+                                *error.exception, known->text);
+    if (error.hint.empty()) error.hint = known->remedy;
   }
   return with_device_code(std::move(error));
 }
@@ -347,14 +346,13 @@ Error Device::with_exception_text(Error error) const {
 Error Device::with_device_code(Error error) const {
   if (!error.device_code || !profile_->refusals) return error;
   const auto& codes = profile_->refusals->codes;
-  const auto known = codes.find(*error.device_code);
-  if (known == codes.end()) {
+  const catalogue::CodeText* known = codes.find(*error.device_code);
+  if (known == nullptr) {
     error.message += fmt::format("; its own code {:02X}h is not known", *error.device_code);
     return error;
   }
-  error.message +=
-      fmt::format("; its own code {:02X}h: {}", *error.device_code, known->second.text);
-  error.hint = known->second.remedy;
+  error.message += fmt::format("; its own code {:02X}h: {}", *error.device_code, known->text);
+  error.hint = known->remedy;
   return error;
 }
 

@@ -12,12 +12,12 @@ bool has_bit(std::int64_t word, std::optional<std::uint8_t> bit) {
   return bit && ((static_cast<std::uint64_t>(word) >> *bit) & 1U) != 0;
 }
 
-bool holds(const std::vector<std::int64_t>& values, std::int64_t value) {
+bool holds(const catalogue::List<std::int64_t>& values, std::int64_t value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
 /// The speed that says that a motor runs whose status does not.
-const std::string& telling_speed(const MonitorFacts& facts) {
+const catalogue::Text& telling_speed(const MonitorFacts& facts) {
   return facts.feedback_speed.empty() ? facts.command_speed : facts.feedback_speed;
 }
 
@@ -39,7 +39,7 @@ Result<MotorMonitor> MotorMonitor::of(const MonitorFacts& facts,
                                       const catalogue::Profile& profile) {
   MotorMonitor monitor;
   monitor.facts_ = facts;
-  for (const std::string* name : {&facts.status, &facts.command_speed, &facts.feedback_speed,
+  for (const catalogue::Text* name : {&facts.status, &facts.command_speed, &facts.feedback_speed,
                                   &facts.alarm, &facts.warning, &facts.load}) {
     if (name->empty()) continue;
     auto parameter = profile.find(*name);
@@ -49,7 +49,7 @@ Result<MotorMonitor> MotorMonitor::of(const MonitorFacts& facts,
     }
     monitor.parameters_.push_back(catalogue::with_bits_for(std::move(*parameter), std::nullopt));
   }
-  const std::string& speed =
+  const catalogue::Text& speed =
       facts.command_speed.empty() ? facts.feedback_speed : facts.command_speed;
   for (const catalogue::Parameter& parameter : monitor.parameters_) {
     if (parameter.name == facts.status || parameter.name == speed) {

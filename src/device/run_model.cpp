@@ -43,7 +43,7 @@ bool has_motor(const catalogue::Profile& profile) {
 }
 
 std::string still_runs_words(const catalogue::Profile& profile) {
-  return profile.run ? profile.run->still_runs : std::string();
+  return profile.run ? profile.run->still_runs.to_string() : std::string();
 }
 
 }  // namespace spindle::device

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
+#include <vector>
 
 #include "files/profile_entries.hpp"
 #include "files/yaml_map.hpp"
@@ -68,7 +70,7 @@ class DriveRules {
     // A pattern may mean what could not be read.
     if (draft_.incomplete || !draft_.half_read.empty()) return;
     for (const catalogue::AlarmList& list : draft_.profile.alarm_lists) {
-      if (const auto found = draft_.profile.select(list.parameters); !found) {
+      if (const auto found = draft_.profile.select(to_strings(list.parameters)); !found) {
         findings_.add_once(
             draft_.alarm_lists.entry->at,
             fmt::format("{}: {}: {}", list.name, found.error().name, message_of(found.error())));
@@ -79,7 +81,7 @@ class DriveRules {
       }
     }
     if (draft_.profile.watched.empty()) return;
-    if (const auto found = draft_.profile.select(draft_.profile.watched); !found) {
+    if (const auto found = draft_.profile.select(to_strings(draft_.profile.watched)); !found) {
       findings_.add_once(draft_.watched.entry->at,
                          fmt::format("{}: {}", found.error().name, message_of(found.error())));
     }
@@ -103,7 +105,7 @@ class DriveRules {
         findings_.add_once(origin.of("bits"),
                            fmt::format("{}: bit {} is behind the last", parameter.name, bit.bit));
       }
-      if (bit.text.empty() || bit.text.find_first_of("+, ") != std::string::npos) {
+      if (bit.text.empty() || bit.text.view().find_first_of("+, ") != std::string_view::npos) {
         findings_.add_once(origin.of("bits"),
                            fmt::format("{}: '{}' is no name of a bit", parameter.name, bit.text));
       }
@@ -182,11 +184,12 @@ void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings
   }
   if (const YamlNode* busy = map.get("busy")) {
     expect(*busy, YamlNode::Kind::sequence, findings);
-    refusals.busy.clear();
+    std::vector<std::int64_t> codes;
     for (const YamlNode& item : busy->items) {
       const auto code = to_unsigned(item, last_register, findings);
-      if (code) refusals.busy.push_back(static_cast<std::int64_t>(*code));
+      if (code) codes.push_back(static_cast<std::int64_t>(*code));
     }
+    refusals.busy = std::move(codes);
   }
   assign(refusals.retry_every, map.duration("retry-every"));
   assign(refusals.give_up_after, map.duration("give-up-after"));
@@ -195,19 +198,20 @@ void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings
 
 void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
-  draft.profile.alarm_lists.clear();
+  std::vector<catalogue::AlarmList> lists;
   for (const YamlNode& item : node.items) {
     YamlMap map(item, findings);
     catalogue::AlarmList list;
     assign(list.name, map.text("list", Need::required));
     if (auto parameter = map.text("parameters", Need::required)) {
-      list.parameters.push_back(std::move(*parameter));
+      list.parameters = {std::move(*parameter)};
     }
     assign(list.codes,
            map.word<catalogue::CodeTable>("codes", "table", table_of_codes, Need::required));
     map.finish();
-    draft.profile.alarm_lists.push_back(std::move(list));
+    lists.push_back(std::move(list));
   }
+  draft.profile.alarm_lists = std::move(lists);
 }
 
 void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
@@ -216,10 +220,11 @@ void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Findings& findi
 
 void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
-  draft.profile.watched.clear();
+  std::vector<catalogue::Text> names;
   for (const YamlNode& item : node.items) {
-    if (auto name = to_text(item, findings)) draft.profile.watched.push_back(std::move(*name));
+    if (auto name = to_text(item, findings)) names.emplace_back(std::move(*name));
   }
+  draft.profile.watched = std::move(names);
 }
 
 void check_drive_rules(const ProfileDraft& draft, Findings& findings) {

@@ -131,27 +131,32 @@ void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
   }
 }
 
-/// bits: {0: M0}, and those that depend on another parameter: bits-by: {parameter: NAME, names:
-/// {0: {3: FWD}, 1: {3: START/STOP}}}.
-void read_bits(YamlMap& map, Parameter& parameter) {
-  if (const YamlNode* bits = map.get("bits")) {
-    read_bit_names(*bits, std::nullopt, parameter.bits, map.findings());
-  }
-  const YamlNode* by = map.get("bits-by");
-  if (by == nullptr) return;
-  YamlMap choice(*by, map.findings());
+void read_bits_by(const YamlNode& by, Parameter& parameter, std::vector<catalogue::BitName>& bits,
+                  Findings& findings) {
+  YamlMap choice(by, findings);
   assign(parameter.bits_by, choice.text("parameter", Need::required));
   const YamlNode* names = choice.get("names", Need::required);
   choice.finish();
-  if (names == nullptr || !expect(*names, YamlNode::Kind::map, map.findings())) return;
+  if (names == nullptr || !expect(*names, YamlNode::Kind::map, findings)) return;
   for (const YamlEntry& entry : names->entries) {
     const auto value = parse_integer(entry.key);
     if (!value) {
-      map.findings().add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
+      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
       continue;
     }
-    read_bit_names(entry.value, *value, parameter.bits, map.findings());
+    read_bit_names(entry.value, *value, bits, findings);
   }
+}
+
+/// bits: {0: M0}, and those that depend on another parameter: bits-by: {parameter: NAME, names:
+/// {0: {3: FWD}, 1: {3: START/STOP}}}.
+void read_bits(YamlMap& map, Parameter& parameter) {
+  std::vector<catalogue::BitName> bits;
+  if (const YamlNode* node = map.get("bits")) {
+    read_bit_names(*node, std::nullopt, bits, map.findings());
+  }
+  if (const YamlNode* by = map.get("bits-by")) read_bits_by(*by, parameter, bits, map.findings());
+  parameter.bits = std::move(bits);
 }
 
 void read_scale(YamlMap& map, Parameter& parameter) {
@@ -195,7 +200,7 @@ void read_repetition(YamlMap& map, Template& entry) {
   const auto numbers = map.range("n", last_register);
   const auto stride = map.number<std::uint16_t>("stride");
   entry.repeats = map.word<Evidence>("repeats", "evidence", evidence_words);
-  const bool has_counter = entry.parameter.name.find(counter) != std::string::npos;
+  const bool has_counter = entry.parameter.name.view().find(counter) != std::string_view::npos;
   const bool has_range = map.get("n") != nullptr;
   if (has_counter != has_range) {
     map.findings().add(map.node().at, has_counter ? "the name has {n}, but key 'n' is missing"
@@ -259,7 +264,7 @@ std::string substitute(std::string text, std::uint64_t number) {
 
 void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draft,
                    Findings& findings) {
-  std::vector<Parameter>& parameters = draft.profile.parameters;
+  std::vector<Parameter>& parameters = draft.read_parameters;
   const auto [known, is_new] = draft.parameter_index.try_emplace(parameter.name, parameters.size());
   if (is_new) {
     parameters.push_back(std::move(parameter));
@@ -279,7 +284,7 @@ bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& dra
   const std::uint64_t n = entry.numbers.from + step;
   if (n > entry.numbers.to) return false;
   const std::uint64_t address = entry.parameter.address.value + step * entry.stride;
-  if (address > last_register || draft.profile.parameters.size() >= most_parameters) {
+  if (address > last_register || draft.read_parameters.size() >= most_parameters) {
     draft.incomplete = true;
     findings.add_once(
         entry.origin.of("n"),
@@ -289,8 +294,8 @@ bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& dra
     return false;
   }
   Parameter parameter = entry.parameter;
-  parameter.name = substitute(std::move(parameter.name), n);
-  parameter.title = substitute(std::move(parameter.title), n);
+  parameter.name = substitute(parameter.name, n);
+  parameter.title = substitute(parameter.title, n);
   parameter.address = {static_cast<std::uint16_t>(address)};
   if (step != 0) assign(parameter.evidence, std::optional(entry.repeats));
   add_parameter(std::move(parameter), entry.origin, draft, findings);
@@ -321,7 +326,7 @@ void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft
   map.finish();
   origin.sound = findings.told() == before;
   entry.origin = origin;
-  const std::string& name = entry.parameter.name;
+  const std::string_view name = entry.parameter.name;
   const bool repeats = name.find(counter) != std::string::npos;
   if (!origin.sound && (name.empty() || repeats)) draft.incomplete = true;
   if (!name.empty()) entries.push_back(std::move(entry));
@@ -347,8 +352,8 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
 
 void read_given_value(YamlMap& map, Action& action) {
   if (const YamlNode* labels = map.get("labels")) {
-    action.labels = read_labels(*labels, map.findings());
-    std::erase_if(action.labels, [&](const Label& label) {
+    std::vector<Label> fitting = read_labels(*labels, map.findings());
+    std::erase_if(fitting, [&](const Label& label) {
       const bool wrong = label.number < catalogue::lowest(action.kind) ||
                          label.number > catalogue::highest(action.kind);
       if (wrong) {
@@ -357,6 +362,7 @@ void read_given_value(YamlMap& map, Action& action) {
       }
       return wrong;
     });
+    action.labels = std::move(fitting);
   }
   if (const auto range = map.range("range", last_register)) {
     action.has_range = true;
@@ -419,7 +425,7 @@ Action read_action(YamlMap& map) {
 }
 
 void add_action(Action action, const Origin& origin, ProfileDraft& draft, Findings& findings) {
-  std::vector<Action>& actions = draft.profile.actions;
+  std::vector<Action>& actions = draft.read_actions;
   const auto known = std::find_if(actions.begin(), actions.end(),
                                   [&](const Action& other) { return other.name == action.name; });
   if (known == actions.end()) {

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <set>
+#include <utility>
 
 #include "files/profile_drive.hpp"
 #include "files/profile_entries.hpp"
@@ -127,8 +130,10 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
 // ---- identity ----
 
 template <typename Number>
-void read_names(const YamlNode* node, std::map<Number, std::string>& names, Findings& findings) {
+void read_names(const YamlNode* node, catalogue::Table<Number, catalogue::Text>& table,
+                Findings& findings) {
   if (node == nullptr) return;
+  std::map<Number, catalogue::Text> names = table.to_map();
   expect(*node, YamlNode::Kind::map, findings);
   for (const YamlEntry& entry : node->entries) {
     const auto number = parse_unsigned(entry.key, last_register);
@@ -139,6 +144,7 @@ void read_names(const YamlNode* node, std::map<Number, std::string>& names, Find
     auto text = to_text(entry.value, findings);
     if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
   }
+  table = std::move(names);
 }
 
 std::optional<catalogue::Slice> read_slice(YamlMap& map, std::string_view key,
@@ -213,17 +219,19 @@ std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at
 }
 
 void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& findings) {
-  std::map<std::int64_t, std::string> names;
+  catalogue::Table<std::int64_t, catalogue::Text> names;
   read_names(node, names, findings);
+  std::map<std::int64_t, catalogue::EventKind> kinds = events.kinds.to_map();
   for (const auto& [number, name] : names) {
     const auto kind = to_kind(name, node->at, findings);
-    if (kind) events.kinds.insert_or_assign(number, *kind);
+    if (kind) kinds.insert_or_assign(number, *kind);
   }
+  events.kinds = std::move(kinds);
 }
 
 void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
-  events.columns.clear();
+  std::vector<catalogue::EventColumn> columns;
   for (const YamlNode& item : node.items) {
     YamlMap map(item, findings);
     catalogue::EventColumn column;
@@ -231,8 +239,9 @@ void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings&
     assign(column.parameter, map.text("parameter", Need::required));
     assign(column.width, map.number<std::uint8_t>("width"));
     map.finish();
-    events.columns.push_back(std::move(column));
+    columns.push_back(std::move(column));
   }
+  events.columns = std::move(columns);
 }
 
 void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
@@ -305,8 +314,9 @@ std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& f
   return code;
 }
 
-void read_code_map(const YamlNode& node, const Provenance& from, catalogue::CodeTexts& codes,
-                   Findings& findings) {
+using Codes = std::map<std::int64_t, CodeText>;
+
+void read_code_map(const YamlNode& node, const Provenance& from, Codes& codes, Findings& findings) {
   expect(node, YamlNode::Kind::map, findings);
   std::vector<std::int64_t> seen;
   for (const YamlEntry& entry : node.entries) {
@@ -326,9 +336,7 @@ void read_code_map(const YamlNode& node, const Provenance& from, catalogue::Code
   }
 }
 
-}  // namespace
-
-void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& findings) {
+void read_code_maps(const YamlNode& node, Codes& codes, Findings& findings) {
   if (node.kind != YamlNode::Kind::sequence) {
     read_code_map(node, {}, codes, findings);
     return;
@@ -343,6 +351,14 @@ void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& fin
     map.finish();
     if (list != nullptr) read_code_map(*list, from, codes, findings);
   }
+}
+
+}  // namespace
+
+void read_codes(const YamlNode& node, catalogue::CodeTexts& table, Findings& findings) {
+  Codes codes = table.to_map();
+  read_code_maps(node, codes, findings);
+  table = std::move(codes);
 }
 
 namespace {
@@ -382,13 +398,14 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
                              Findings& findings) {
   YamlMap map(node, findings);
   if (const YamlNode* bytes = map.get("bytes", Need::required)) {
-    facts.identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
-  }
-  // Behind function code and byte count.
-  constexpr std::size_t most = modbus::max_pdu_size - 2;
-  if (facts.identity.size() > most) {
-    findings.add(node.at, fmt::format("an answer holds at most {} bytes", most));
-    facts.identity.resize(most);
+    Bytes identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
+    // Behind function code and byte count.
+    constexpr std::size_t most = modbus::max_pdu_size - 2;
+    if (identity.size() > most) {
+      findings.add(node.at, fmt::format("an answer holds at most {} bytes", most));
+      identity.resize(most);
+    }
+    facts.identity = std::move(identity);
   }
   facts.identity_bytes =
       map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));
@@ -399,9 +416,10 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
   map.finish();
 }
 
-void read_raw_values(const YamlNode& node, std::vector<catalogue::SimulationFacts::Value>& values,
-                     Findings& findings) {
+std::vector<catalogue::SimulationFacts::Value> read_raw_values(const YamlNode& node,
+                                                               Findings& findings) {
   expect(node, YamlNode::Kind::map, findings);
+  std::vector<catalogue::SimulationFacts::Value> values;
   for (const YamlEntry& entry : node.entries) {
     const auto raw = parse_integer(entry.value.text);
     if (raw) {
@@ -410,31 +428,35 @@ void read_raw_values(const YamlNode& node, std::vector<catalogue::SimulationFact
       findings.add_once(entry.value.at, "a whole number is expected here");
     }
   }
+  return values;
 }
 
 void read_simulated_limits(const YamlNode& node, catalogue::SimulationFacts& facts,
                            Findings& findings) {
   expect(node, YamlNode::Kind::map, findings);
+  std::vector<catalogue::SimulationFacts::Limits> limits;
   for (const YamlEntry& entry : node.entries) {
     const auto range = to_range(entry.value, last_register, findings);
     if (!range) continue;
-    facts.limits.push_back(
+    limits.push_back(
         {entry.key, static_cast<std::int64_t>(range->from), static_cast<std::int64_t>(range->to)});
   }
+  facts.limits = std::move(limits);
 }
 
 void read_simulated_events(const YamlNode& node, catalogue::SimulationFacts& facts,
                            Findings& findings) {
   expect(node, YamlNode::Kind::map, findings);
+  std::vector<catalogue::SimulationFacts::Event> events;
   for (const YamlEntry& entry : node.entries) {
     const auto kind = to_kind(entry.key, entry.key_at, findings);
     expect(entry.value, YamlNode::Kind::sequence, findings);
     for (const YamlNode& item : entry.value.items) {
-      std::vector<catalogue::SimulationFacts::Value> values;
-      read_raw_values(item, values, findings);
-      if (kind) facts.events.push_back({*kind, std::move(values)});
+      auto values = read_raw_values(item, findings);
+      if (kind) events.push_back({*kind, std::move(values)});
     }
   }
+  facts.events = std::move(events);
 }
 
 void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry, std::int64_t raw,
@@ -462,12 +484,59 @@ Position Origin::of(std::string_view key) const {
   return entry->at;
 }
 
-void ProfileDraft::leave_out_half_read() {
+namespace {
+
+/// Those that share a register with another one. That of a whole profile is meant.
+std::set<std::size_t> sharing(const std::vector<catalogue::Parameter>& parameters) {
+  std::map<std::pair<modbus::RegisterTable, unsigned>, std::size_t> owners;
+  std::set<std::size_t> found;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    if (!parameters[i].sound) half_read.insert(profile.parameters[i].name);
+    const catalogue::Parameter& parameter = parameters[i];
+    for (unsigned part = 0; part < catalogue::register_count(parameter.encoding.kind); ++part) {
+      const auto [owner, is_first] =
+          owners.try_emplace({parameter.table, parameter.address.value + part}, i);
+      if (!is_first) found.insert({owner->second, i});
+    }
   }
-  erase_half_read(profile.parameters, parameters);
-  erase_half_read(profile.actions, actions);
+  return found;
+}
+
+}  // namespace
+
+void ProfileDraft::begin_with(const catalogue::Profile& base, const YamlNode& node) {
+  const Origin origin{.entry = &node, .layer = layers++};
+  profile = base;
+  read_parameters.assign(base.parameters.begin(), base.parameters.end());
+  read_actions.assign(base.actions.begin(), base.actions.end());
+  parameters.assign(read_parameters.size(), origin);
+  actions.assign(read_actions.size(), origin);
+  for (std::size_t i = 0; i < read_parameters.size(); ++i) {
+    parameter_index.emplace(read_parameters[i].name, i);
+  }
+  for (const std::size_t index : sharing(read_parameters)) parameters[index].overlaps = true;
+  const std::pair<bool, Origin*> sections[] = {{true, &link},
+                                               {base.identity.has_value(), &identity},
+                                               {base.events.has_value(), &events},
+                                               {base.limits.has_value(), &limits},
+                                               {base.numbered.has_value(), &numbered},
+                                               {base.run.has_value(), &run},
+                                               {base.refusals.has_value(), &refusals},
+                                               {!base.alarm_lists.empty(), &alarm_lists},
+                                               {!base.watched.empty(), &watched},
+                                               {!base.alarm_reset.empty(), &alarm_reset}};
+  for (const auto& [is_there, section] : sections) {
+    if (is_there) *section = origin;
+  }
+}
+
+void ProfileDraft::finish() {
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (!parameters[i].sound) half_read.insert(read_parameters[i].name);
+  }
+  erase_half_read(read_parameters, parameters);
+  erase_half_read(read_actions, actions);
+  profile.parameters = std::exchange(read_parameters, {});
+  profile.actions = std::exchange(read_actions, {});
   parameter_index.clear();
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     parameter_index.emplace(profile.parameters[i].name, i);
@@ -478,9 +547,9 @@ void ProfileDraft::leave_out_half_read() {
   if (!numbered.sound) profile.numbered.reset();
   if (!run.sound) profile.run.reset();
   if (!refusals.sound) profile.refusals.reset();
-  if (!alarm_lists.sound) profile.alarm_lists.clear();
-  if (!watched.sound) profile.watched.clear();
-  if (!alarm_reset.sound) profile.alarm_reset.clear();
+  if (!alarm_lists.sound) profile.alarm_lists = {};
+  if (!watched.sound) profile.watched = {};
+  if (!alarm_reset.sound) profile.alarm_reset = {};
 }
 
 ProfileHead read_head(const YamlNode& document, Findings& findings) {
@@ -564,17 +633,19 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
   if (const YamlNode* node = map.get("identity")) {
     read_simulated_identity(*node, facts, findings);
   }
-  if (const YamlNode* node = map.get("values")) read_raw_values(*node, facts.values, findings);
+  if (const YamlNode* node = map.get("values")) facts.values = read_raw_values(*node, findings);
   if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
   if (const YamlNode* node = map.get("events")) read_simulated_events(*node, facts, findings);
   assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
   assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
   if (const YamlNode* alarms = map.get("permanent-alarms")) {
     expect(*alarms, YamlNode::Kind::sequence, findings);
+    std::vector<std::int64_t> codes;
     for (const YamlNode& item : alarms->items) {
       const auto code = to_unsigned(item, last_register, findings);
-      if (code) facts.permanent_alarms.push_back(static_cast<std::int64_t>(*code));
+      if (code) codes.push_back(static_cast<std::int64_t>(*code));
     }
+    facts.permanent_alarms = std::move(codes);
   }
   assign(facts.absent, read_areas(map.get("absent"), findings));
   map.finish();

@@ -24,10 +24,13 @@ struct Origin {
 
 /// A profile while its files are read, base first: what each layer says overrides key by key.
 struct ProfileDraft {
+  /// Its lists of parameters and actions are filled by finish().
   catalogue::Profile profile;
+  std::vector<catalogue::Parameter> read_parameters;
+  std::vector<catalogue::Action> read_actions;
   std::size_t layers = 0;
-  std::vector<Origin> parameters;  ///< side by side with profile.parameters
-  std::vector<Origin> actions;     ///< side by side with profile.actions
+  std::vector<Origin> parameters;  ///< side by side with read_parameters
+  std::vector<Origin> actions;     ///< side by side with read_actions
   Origin top = {};
   Origin link = {};  ///< these: the last layer that says something of the section, or none
   Origin identity = {};
@@ -45,9 +48,12 @@ struct ProfileDraft {
   /// There may be parameters whose names are not known: a base or a name could not be read.
   bool incomplete = false;
 
-  /// Leaves out every entry and section in which something was wrong, so that rules speak of what
-  /// could be read. Positions of the others stay valid.
-  void leave_out_half_read();
+  /// Begins with a profile that is whole; `node` stands for all that it says.
+  void begin_with(const catalogue::Profile& base, const YamlNode& node);
+
+  /// Completes the profile. Leaves out every entry and section in which something was wrong, so
+  /// that rules speak of what could be read. Positions of the others stay valid.
+  void finish();
 
   /// Whether a name is that of no parameter, as far as can be known.
   [[nodiscard]] bool lacks(const std::string& name) const {

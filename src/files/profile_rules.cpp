@@ -72,7 +72,7 @@ std::string no_such_parameter(const ProfileDraft& draft, const std::string& name
 
 void id_is_the_file_name(const ProfileDraft& draft, Findings& findings) {
   const catalogue::Profile& profile = draft.profile;
-  const std::string stem = std::filesystem::path(profile.path).stem().string();
+  const std::string stem = std::filesystem::path(profile.path.view()).stem().string();
   if (!is_catalogue_name(profile.id)) {
     findings.add_once(draft.top.of("id"),
                       fmt::format("id '{}' is not made of lower-case words and numbers joined by "
@@ -101,7 +101,7 @@ void names_have_the_pattern(const ProfileDraft& draft, Findings& findings) {
 
 void names_are_no_numbers(const ProfileDraft& draft, Findings& findings) {
   if (!draft.profile.numbered) return;
-  const std::string& prefix = draft.profile.numbered->prefix;
+  const std::string_view prefix = draft.profile.numbered->prefix;
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const std::string_view name = parameter.name;
     if (!name.starts_with(prefix) || name.size() == prefix.size()) return;
@@ -248,25 +248,26 @@ void secrets_are_stored(const ProfileDraft& draft, Findings& findings) {
 }
 
 /// The first thing wrong with a list of labels; empty when it is good.
-std::string fault_of(const std::vector<Label>& labels, const Parameter& parameter) {
+std::string fault_of(const catalogue::List<Label>& labels, const Parameter& parameter) {
   Parameter earlier = parameter;
-  earlier.labels.clear();
+  std::vector<Label> known;
   for (const Label& label : labels) {
     const catalogue::Kind kind = parameter.encoding.kind;
     if (label.number < catalogue::lowest(kind) || label.number > catalogue::highest(kind)) {
       return fmt::format("label {} does not fit {}", label.number, catalogue::to_text(kind));
     }
     if (label.text.empty()) return fmt::format("the label of {} is empty", label.number);
-    for (const Label& other : earlier.labels) {
+    for (const Label& other : known) {
       if (other.number == label.number) {
         return fmt::format("number {} has two labels", label.number);
       }
     }
     // A label is what a user types, so two that parse_value() cannot tell apart are one.
-    if (!earlier.labels.empty() && catalogue::parse_value(earlier, label.text)) {
+    earlier.labels = known;
+    if (!known.empty() && catalogue::parse_value(earlier, label.text)) {
       return fmt::format("label '{}' can be read in two ways", label.text);
     }
-    earlier.labels.push_back(label);
+    known.push_back(label);
   }
   return {};
 }
@@ -582,7 +583,7 @@ void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
 void numbered_are_usable(const ProfileDraft& draft, Findings& findings) {
   if (!draft.profile.numbered) return;
   const catalogue::NumberedFacts& numbered = *draft.profile.numbered;
-  const std::string& prefix = numbered.prefix;
+  const std::string_view prefix = numbered.prefix;
   if (prefix.empty() ||
       prefix.find_first_not_of("abcdefghijklmnopqrstuvwxyz") != std::string::npos) {
     findings.add_once(draft.numbered.of("prefix"), "a prefix is made of lower-case letters");

@@ -42,19 +42,21 @@ RunWords read_words(const YamlNode& node, Findings& findings) {
 
 void read_modes(const YamlNode& node, CommandWordFacts& run, Findings& findings) {
   if (!expect(node, YamlNode::Kind::map, findings)) return;
+  std::map<std::int64_t, RunWords> modes = run.modes.to_map();
   for (const YamlEntry& entry : node.entries) {
     const auto value = parse_integer(entry.key);
     if (value) {
-      run.modes.insert_or_assign(*value, read_words(entry.value, findings));
+      modes.insert_or_assign(*value, read_words(entry.value, findings));
     } else {
       findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
     }
   }
+  run.modes = std::move(modes);
 }
 
 void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
-  inputs.functions.clear();
+  std::vector<catalogue::InputFunction> functions;
   for (const YamlNode& item : node.items) {
     YamlMap map(item, findings);
     catalogue::InputFunction function;
@@ -64,8 +66,9 @@ void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Finding
            map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, Need::required));
     assign(function.source, map.text("source", Need::required));
     map.finish();
-    inputs.functions.push_back(std::move(function));
+    functions.push_back(std::move(function));
   }
+  inputs.functions = std::move(functions);
 }
 
 void read_inputs(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
@@ -98,15 +101,16 @@ void read_command(const YamlNode& node, CommandWordFacts& run, Need need, Findin
   map.finish();
 }
 
-void read_codes_of_status(YamlMap& map, std::string_view key, std::vector<std::int64_t>& values) {
+void read_codes_of_status(YamlMap& map, std::string_view key, catalogue::List<std::int64_t>& codes) {
   const YamlNode* node = map.get(key);
   if (node == nullptr) return;
   expect(*node, YamlNode::Kind::sequence, map.findings());
-  values.clear();
+  std::vector<std::int64_t> values;
   for (const YamlNode& item : node->items) {
     const auto value = to_unsigned(item, std::numeric_limits<std::uint32_t>::max(), map.findings());
     if (value) values.push_back(static_cast<std::int64_t>(*value));
   }
+  codes = std::move(values);
 }
 
 /// Of a command word all is needed but load and warning; of a command register nothing is.
@@ -167,12 +171,13 @@ void read_command_word(YamlMap& map, CommandWordFacts& word, Need need) {
 
 void read_selections(const YamlNode& node, StartActionFacts& facts, Findings& findings) {
   YamlMap map(node, findings);
-  facts.selections.clear();
+  std::vector<catalogue::StartOption> selections;
   for (const std::string_view option : selectable) {
     if (auto action = map.text(option)) {
-      facts.selections.push_back({std::string(option), std::move(*action)});
+      selections.push_back({option, std::move(*action)});
     }
   }
+  facts.selections = std::move(selections);
   map.finish();
 }
 

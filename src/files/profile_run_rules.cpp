@@ -91,7 +91,7 @@ class RunRules {
     check_operations(run, draft_.run.of("operation"));
     const MonitorFacts& monitor = run.monitor;
     const Position status = draft_.run.of("status");
-    for (const std::string* name :
+    for (const catalogue::Text* name :
          {&monitor.status, &monitor.command_speed, &monitor.feedback_speed, &monitor.alarm}) {
       require(*name, status);
     }
@@ -182,7 +182,7 @@ class RunRules {
       return;
     }
     for (std::uint16_t n = run.first; n <= run.last; ++n) {
-      for (const std::string* pattern : {&run.speed, &run.acceleration, &run.deceleration}) {
+      for (const catalogue::Text* pattern : {&run.speed, &run.acceleration, &run.deceleration}) {
         require_writable(catalogue::numbered_name(*pattern, n), at);
       }
     }
@@ -266,7 +266,7 @@ class RunRules {
   // ---- what a motor says ----
 
   void check_monitor(const MonitorFacts& monitor, const Position& at) {
-    for (const std::string* name : {&monitor.command_speed, &monitor.feedback_speed, &monitor.load,
+    for (const catalogue::Text* name : {&monitor.command_speed, &monitor.feedback_speed, &monitor.load,
                                     &monitor.alarm, &monitor.warning}) {
       require_optional(*name, at);
     }

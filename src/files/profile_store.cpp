@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <mutex>
 
 #include "files/profile_file.hpp"
 #include "files/profile_rules.hpp"
@@ -43,13 +44,30 @@ struct Layer {
 using Library = std::map<std::string, Layer>;
 
 /// A profile file and those it extends, the file itself first. Points into a library.
-using Chain = std::vector<const Layer*>;
+struct Chain {
+  std::vector<const Layer*> layers = {};
+  /// What the last of the files extends, where that is part of the program.
+  const ShippedProfile* root = nullptr;
+  /// Stands for all that the root says: findings about it are told where it is extended.
+  YamlNode root_node = {};
 
-/// The base of a layer: beside it, else in the store's folders.
-std::optional<std::string> locate_base(const Layer& layer,
+  [[nodiscard]] const Layer& front() const { return *layers.front(); }
+};
+
+/// Where profiles are looked for.
+struct Places {
+  std::vector<std::string> folders;
+  ReadText read;
+  ShippedProfiles shipped;
+};
+
+/// Whether profiles of the program are used where their files would say the same.
+enum class Tables : std::uint8_t { used, not_used };
+
+/// The base of a file: beside it, else in the store's folders.
+std::optional<std::string> locate_base(const std::string& file, std::string_view id,
                                        const std::vector<std::string>& folders) {
-  const std::string& id = layer.head.extends;
-  std::string folder = std::filesystem::path(layer.path).parent_path().string();
+  std::string folder = std::filesystem::path(file).parent_path().string();
   if (folder.empty()) folder = ".";
   std::string beside = in_folder(folder, id);
   if (may_be_file(beside)) return beside;
@@ -58,6 +76,19 @@ std::optional<std::string> locate_base(const Layer& layer,
     if (may_be_file(path)) return path;
   }
   return std::nullopt;
+}
+
+/// The profile of the program that was made from this file and from those that it extends; null
+/// when there is none. A file that can not be read is none of them: who needs it is told why.
+const ShippedProfile* shipped_as(const std::string& path, const Places& places) {
+  const ShippedProfile* shipped =
+      find(places.shipped, std::filesystem::path(path).stem().string());
+  if (shipped == nullptr) return nullptr;
+  const auto text = places.read(path);
+  if (!text || *text != shipped->yaml) return nullptr;
+  if (shipped->extends.empty()) return shipped;
+  const auto base = locate_base(path, shipped->extends, places.folders);
+  return !base || shipped_as(*base, places) != nullptr ? shipped : nullptr;
 }
 
 bool same_file(const std::string& a, const std::string& b) {
@@ -85,41 +116,66 @@ Result<const Layer*> read_layer(const std::string& path, Documents documents, co
   return &library.emplace(path, std::move(layer)).first->second;
 }
 
-/// The next file of the chain; empty at its end, or after a finding.
-std::optional<std::string> next_of(const Chain& chain, const std::vector<std::string>& folders,
-                                   Findings& findings) {
-  const ProfileHead& head = chain.back()->head;
+/// What a file extends.
+struct Base {
+  std::string path = {};                    ///< of a file
+  const ShippedProfile* shipped = nullptr;  ///< or of the program
+};
+
+std::optional<Base> find_base(const Layer& layer, const Places& places, Tables tables) {
+  const std::string& id = layer.head.extends;
+  auto path = locate_base(layer.path, id, places.folders);
+  if (!path) {
+    const ShippedProfile* shipped = find(places.shipped, id);
+    return shipped == nullptr ? std::nullopt : std::optional(Base{.shipped = shipped});
+  }
+  Base base{.path = std::move(*path)};
+  if (tables == Tables::used) base.shipped = shipped_as(base.path, places);
+  return base;
+}
+
+/// The next one of the chain; empty at its end, or after a finding.
+std::optional<Base> next_of(const Chain& chain, const Places& places, Tables tables,
+                            Findings& findings) {
+  const Layer& last = *chain.layers.back();
+  const ProfileHead& head = last.head;
   if (head.extends.empty()) return std::nullopt;
   if (!is_catalogue_name(head.extends)) {
     findings.add(head.extends_at, fmt::format("'{}' is no profile id", head.extends));
     return std::nullopt;
   }
-  auto path = locate_base(*chain.back(), folders);
-  if (!path) {
+  auto base = find_base(last, places, tables);
+  if (!base) {
     findings.add(head.extends_at, fmt::format("base profile '{}' is not found", head.extends));
     return std::nullopt;
   }
-  const bool cycle = std::any_of(chain.begin(), chain.end(),
-                                 [&](const Layer* layer) { return same_file(layer->path, *path); });
-  if (cycle || chain.size() == deepest_chain) {
+  const bool cycle =
+      !base->path.empty() &&
+      std::any_of(chain.layers.begin(), chain.layers.end(),
+                  [&](const Layer* layer) { return same_file(layer->path, base->path); });
+  if (cycle || chain.layers.size() == deepest_chain) {
     findings.add(head.extends_at,
                  cycle ? fmt::format("'{}' extends itself in the end", head.extends)
                        : fmt::format("more than {} profiles extend each other", deepest_chain));
     return std::nullopt;
   }
-  return path;
+  return base;
 }
 
-Result<Chain> read_chain(const std::string& path, Documents documents,
-                         const std::vector<std::string>& folders, const ReadText& read,
-                         Library& library, Findings& findings) {
+Result<Chain> read_chain(const std::string& path, Documents documents, const Places& places,
+                         Tables tables, Library& library, Findings& findings) {
   Chain chain;
-  std::optional<std::string> next = path;
+  std::optional<Base> next = Base{.path = path};
   while (next) {
-    auto layer = read_layer(*next, documents, read, library, findings);
+    if (next->shipped != nullptr) {
+      chain.root = next->shipped;
+      chain.root_node.at = chain.layers.back()->head.extends_at;
+      break;
+    }
+    auto layer = read_layer(next->path, documents, places.read, library, findings);
     if (!layer) return tl::unexpected(std::move(layer.error()));
-    chain.push_back(*layer);
-    next = next_of(chain, folders, findings);
+    chain.layers.push_back(*layer);
+    next = next_of(chain, places, tables, findings);
   }
   return chain;
 }
@@ -129,23 +185,29 @@ enum class Strictness : std::uint8_t { load, check };
 
 ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings) {
   ProfileDraft draft;
-  const std::string& missing_base = chain.back()->head.extends;
-  draft.incomplete = !missing_base.empty();
-  draft.profile.path = chain.front()->path;
-  for (const Layer* layer : chain) {
-    if (!layer->head.extends.empty()) draft.profile.bases.push_back(layer->head.extends);
+  std::vector<catalogue::Text> bases;
+  for (const Layer* layer : chain.layers) {
+    if (!layer->head.extends.empty()) bases.emplace_back(layer->head.extends);
   }
-  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+  if (chain.root != nullptr) {
+    draft.begin_with(*chain.root->profile, chain.root_node);
+    bases.insert(bases.end(), draft.profile.bases.begin(), draft.profile.bases.end());
+  } else {
+    draft.incomplete = !chain.layers.back()->head.extends.empty();
+  }
+  draft.profile.path = chain.front().path;
+  draft.profile.bases = std::move(bases);
+  for (auto layer = chain.layers.rbegin(); layer != chain.layers.rend(); ++layer) {
     if ((*layer)->documents.empty()) continue;
     read_profile((*layer)->documents.front(), draft, findings);
   }
   if (draft.top.entry == nullptr) return draft;  // not a document could be read
-  const bool whole = !draft.incomplete && !chain.front()->head.abstract;
+  const bool whole = !draft.incomplete && !chain.front().head.abstract;
   if (whole && draft.link.entry == nullptr) {
     findings.add(draft.top.entry->at, "key 'link' is missing");
   }
   // On what is half read, rules would find faults that are none.
-  draft.leave_out_half_read();
+  draft.finish();
   check_rules(draft, findings);
   if (strictness == Strictness::check) check_guards(draft, findings);
   return draft;
@@ -153,7 +215,8 @@ ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings
 
 catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
   catalogue::CodeTables codes;
-  for (auto layer = chain.rbegin(); layer != chain.rend(); ++layer) {
+  if (chain.root != nullptr) codes = *chain.root->codes;
+  for (auto layer = chain.layers.rbegin(); layer != chain.layers.rend(); ++layer) {
     if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
       read_texts(*part, codes, findings);
     }
@@ -162,7 +225,7 @@ catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
 }
 
 const YamlNode* nearest_simulation(const Chain& chain, Findings& findings) {
-  for (const Layer* layer : chain) {
+  for (const Layer* layer : chain.layers) {
     if (const YamlNode* part = find_part(layer->documents, "simulation", findings)) return part;
   }
   return nullptr;
@@ -185,33 +248,51 @@ std::map<std::string, std::string> profile_files(const std::vector<std::string>&
   return found;
 }
 
-bool is_abstract(const std::string& path, const ReadText& read) {
+bool is_abstract(const std::string& path, const Places& places) {
+  if (const ShippedProfile* shipped = shipped_as(path, places)) return shipped->is_abstract;
   Library library;
   Findings findings;
-  const auto layer = read_layer(path, Documents::first, read, library, findings);
+  const auto layer = read_layer(path, Documents::first, places.read, library, findings);
   return layer && (*layer)->head.abstract;
 }
 
-std::vector<ProfileEntry> list_profiles(const std::vector<std::string>& folders,
-                                        const ReadText& read) {
+std::vector<ProfileEntry> list_profiles(const Places& places) {
+  std::map<std::string, std::string> files = profile_files(places.folders);
+  for (const ShippedProfile& shipped : places.shipped) {
+    files.try_emplace(std::string(shipped.id), built_in);
+  }
   std::vector<ProfileEntry> entries;
-  for (auto& [id, path] : profile_files(folders)) {
-    if (!is_abstract(path, read)) entries.push_back({id, path});
+  for (auto& [id, path] : files) {
+    const bool abstract = path == built_in ? find(places.shipped, id)->is_abstract
+                                           : is_abstract(path, places);
+    if (!abstract) entries.push_back({id, path});
   }
   return entries;
 }
 
-Result<std::string> locate(std::string_view name_or_file, const std::vector<std::string>& folders,
-                           const ReadText& read) {
-  if (names_profile_file(name_or_file)) return std::string(name_or_file);
+/// A profile's file, or the profile of the program.
+struct Located {
+  std::string path = {};                    ///< empty: only in the program
+  const ShippedProfile* shipped = nullptr;  ///< null: the file says something else
+};
+
+Result<Located> locate(std::string_view name_or_file, const Places& places) {
+  const auto file = [&](std::string path) {
+    const ShippedProfile* shipped = shipped_as(path, places);
+    return Located{std::move(path), shipped};
+  };
+  if (names_profile_file(name_or_file)) return file(std::string(name_or_file));
   if (is_catalogue_name(name_or_file)) {
-    for (const std::string& folder : folders) {
+    for (const std::string& folder : places.folders) {
       std::string path = in_folder(folder, name_or_file);
-      if (may_be_file(path)) return path;
+      if (may_be_file(path)) return file(std::move(path));
+    }
+    if (const ShippedProfile* shipped = find(places.shipped, name_or_file)) {
+      return Located{{}, shipped};
     }
   }
   std::vector<std::string> ids;
-  for (const ProfileEntry& entry : list_profiles(folders, read)) ids.push_back(entry.id);
+  for (const ProfileEntry& entry : list_profiles(places)) ids.push_back(entry.id);
   std::string hint = suggestion(name_or_file, ids);
   if (hint.empty()) hint = "'spindle profile list' shows those that exist";
   return tl::unexpected(Error{.code = Errc::unknown_name,
@@ -245,16 +326,55 @@ struct OpenChain {
   }
 };
 
-Result<OpenChain> open_chain(std::string_view name_or_file, Documents documents,
-                             const std::vector<std::string>& folders, const ReadText& read) {
-  auto path = locate(name_or_file, folders, read);
-  if (!path) return tl::unexpected(std::move(path.error()));
-  OpenChain open(std::move(*path));
-  auto chain = read_chain(open.path, documents, folders, read, open.library, open.findings);
+Result<OpenChain> open_chain(std::string path, Documents documents, const Places& places,
+                             Tables tables) {
+  OpenChain open(std::move(path));
+  auto chain = read_chain(open.path, documents, places, tables, open.library, open.findings);
   if (!chain) return tl::unexpected(std::move(chain.error()));
   open.chain = std::move(*chain);
   return open;
 }
+
+Error only_a_base(std::string_view name) {
+  return {.code = Errc::bad_file,
+          .message = "is only a base for other profiles",
+          .hint = "'spindle profile list' shows those of products",
+          .name = std::string(name)};
+}
+
+Result<AnyProfile> load_file(const std::string& path, const Places& places) {
+  auto open = open_chain(path, Documents::first, places, Tables::used);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  Profile profile = build(open->chain, Strictness::load, open->findings).profile;
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  return AnyProfile{std::move(profile), open->chain.front().head.abstract};
+}
+
+Result<catalogue::SimulationFacts> load_simulation_of(const std::string& path,
+                                                      const Places& places) {
+  auto open = open_chain(path, Documents::all, places, Tables::used);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  const YamlNode* part = nearest_simulation(open->chain, open->findings);
+  catalogue::SimulationFacts facts;
+  if (part != nullptr) {
+    facts = read_simulation(*part, open->findings);
+  } else if (open->chain.root != nullptr) {
+    facts = *open->chain.root->simulation;
+  }
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  return facts;
+}
+
+Result<catalogue::CodeTables> load_codes_of(const std::string& path, const Places& places) {
+  auto open = open_chain(path, Documents::all, places, Tables::used);
+  if (!open) return tl::unexpected(std::move(open.error()));
+  catalogue::CodeTables codes = collect_texts(open->chain, open->findings);
+  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  return codes;
+}
+
+template <typename Made>
+using Kept = std::map<std::string, Made, std::less<>>;
 
 }  // namespace
 
@@ -262,29 +382,64 @@ bool names_profile_file(std::string_view text) {
   return text.find('/') != std::string_view::npos || text.ends_with(extension);
 }
 
-Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::first, folders_, read_);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  Profile profile = build(open->chain, Strictness::load, open->findings).profile;
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
-  if (open->chain.front()->head.abstract) {
-    return tl::unexpected(Error{.code = Errc::bad_file,
-                                .message = "is only a base for other profiles",
-                                .hint = "'spindle profile list' shows those of products",
-                                .name = std::string(name_or_file)});
+const ShippedProfile* find(ShippedProfiles shipped, std::string_view id) {
+  const auto found =
+      std::lower_bound(shipped.begin(), shipped.end(), id,
+                       [](const ShippedProfile& one, std::string_view name) { return one.id < name; });
+  return found == shipped.end() || found->id != id ? nullptr : &*found;
+}
+
+struct ProfileStore::Memory {
+  explicit Memory(Places looked_in) : places(std::move(looked_in)) {}
+
+  Places places;
+  std::mutex mutex = {};
+  // By the name that was asked for.
+  Kept<AnyProfile> profiles = {};
+  Kept<catalogue::SimulationFacts> simulations = {};
+  Kept<catalogue::CodeTables> codes = {};
+
+  /// What is kept under this name, else what `make(located)` makes, which is kept.
+  template <typename Made, typename Make>
+  Result<Made> take(Kept<Made>& kept, std::string_view name, Make make) {
+    const std::lock_guard lock(mutex);
+    if (const auto known = kept.find(name); known != kept.end()) return known->second;
+    auto located = locate(name, places);
+    if (!located) return tl::unexpected(std::move(located.error()));
+    Result<Made> made = make(*located);
+    if (made) kept.emplace(name, *made);
+    return made;
   }
-  return profile;
+};
+
+ProfileStore::ProfileStore(std::vector<std::string> folders, ReadText read, ShippedProfiles shipped)
+    : memory_(std::make_unique<Memory>(Places{std::move(folders), std::move(read), shipped})) {}
+ProfileStore::ProfileStore(ProfileStore&&) noexcept = default;
+ProfileStore& ProfileStore::operator=(ProfileStore&&) noexcept = default;
+ProfileStore::~ProfileStore() = default;
+
+Result<AnyProfile> ProfileStore::load_any(std::string_view name_or_file) const {
+  return memory_->take(memory_->profiles, name_or_file, [&](const Located& located) {
+    if (located.shipped == nullptr) return load_file(located.path, memory_->places);
+    Profile profile = *located.shipped->profile;
+    profile.path = located.path.empty() ? std::string(located.shipped->id) : located.path;
+    return Result<AnyProfile>(AnyProfile{std::move(profile), located.shipped->is_abstract});
+  });
+}
+
+Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
+  return load_any(name_or_file).and_then([&](AnyProfile loaded) -> Result<Profile> {
+    if (loaded.is_abstract) return tl::unexpected(only_a_base(name_or_file));
+    return std::move(loaded.profile);
+  });
 }
 
 Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  const YamlNode* part = nearest_simulation(open->chain, open->findings);
-  catalogue::SimulationFacts facts;
-  if (part != nullptr) facts = read_simulation(*part, open->findings);
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
-  return facts;
+  return memory_->take(memory_->simulations, name_or_file, [&](const Located& located) {
+    return located.shipped == nullptr ? load_simulation_of(located.path, memory_->places)
+                                      : *located.shipped->simulation;
+  });
 }
 
 Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {
@@ -294,15 +449,17 @@ Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view nam
 }
 
 Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  catalogue::CodeTables codes = collect_texts(open->chain, open->findings);
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
-  return codes;
+  return memory_->take(memory_->codes, name_or_file, [&](const Located& located) {
+    return located.shipped == nullptr ? load_codes_of(located.path, memory_->places)
+                                      : *located.shipped->codes;
+  });
 }
 
 Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
-  auto open = open_chain(name_or_file, Documents::all, folders_, read_);
+  auto located = locate(name_or_file, memory_->places);
+  if (!located) return tl::unexpected(std::move(located.error()));
+  if (located->path.empty()) return std::vector<Finding>();  // it was checked when it was built in
+  auto open = open_chain(located->path, Documents::all, memory_->places, Tables::not_used);
   if (!open) return tl::unexpected(std::move(open.error()));
   const ProfileDraft draft = build(open->chain, Strictness::check, open->findings);
   collect_texts(open->chain, open->findings);
@@ -315,17 +472,12 @@ Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) 
   return open->findings.list();
 }
 
-std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(folders_, read_); }
+std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(memory_->places); }
 
 std::vector<Profile> ProfileStore::load_all() const {
   std::vector<Profile> profiles;
-  Library library;
-  for (const auto& [id, path] : profile_files(folders_)) {
-    Findings findings;
-    const auto chain = read_chain(path, Documents::first, folders_, read_, library, findings);
-    if (!chain || chain->front()->head.abstract) continue;
-    Profile profile = build(*chain, Strictness::load, findings).profile;
-    if (findings.empty()) profiles.push_back(std::move(profile));
+  for (const ProfileEntry& entry : list()) {
+    if (auto profile = load(entry.id)) profiles.push_back(std::move(*profile));
   }
   return profiles;
 }

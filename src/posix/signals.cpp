@@ -98,7 +98,17 @@ extern "C" void on_fault(int number, siginfo_t* info, void* /*context*/) {
   ::signal(number, SIG_DFL);
 }
 
-struct sigaction action_for(int number) {
+/// Those that no handler is interrupted by.
+sigset_t held_back() {
+  sigset_t held;
+  ::sigemptyset(&held);
+  for (int number = 1; number <= SIGRTMAX; ++number) {
+    if (is_watched(number) && !is_in(faults, number)) ::sigaddset(&held, number);
+  }
+  return held;
+}
+
+struct sigaction action_for(int number, const sigset_t& held) {
   struct sigaction action = {};
   // No SA_RESTART: a question at the terminal must end too, and that is a plain read().
   const bool is_told = is_in(told_otherwise, number) || number == SIGTTIN || number == SIGTTOU;
@@ -108,9 +118,7 @@ struct sigaction action_for(int number) {
     action.sa_flags = SA_SIGINFO;
     return action;
   }
-  for (int other = 1; other <= SIGRTMAX; ++other) {
-    if (is_watched(other) && !is_in(faults, other)) ::sigaddset(&action.sa_mask, other);
-  }
+  action.sa_mask = held;
   return action;
 }
 
@@ -136,6 +144,7 @@ SignalWatch::SignalWatch()
     : interrupt_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       previous_(std::make_unique<Previous>()) {
   watched.store(&interrupt_);
+  const sigset_t held = held_back();
   for (int number = 1; number <= SIGRTMAX; ++number) {
     if (!is_watched(number)) continue;
     struct sigaction before = {};
@@ -143,7 +152,7 @@ SignalWatch::SignalWatch()
     previous_->actions[number] = before;
     if (is_in(suspending, number)) continue;
     if (stays_ignored(number, before) || (is_in(faults, number) && has_handler(before))) continue;
-    const struct sigaction action = action_for(number);
+    const struct sigaction action = action_for(number, held);
     ::sigaction(number, &action, nullptr);
   }
 }
@@ -156,8 +165,9 @@ SignalWatch::~SignalWatch() {
 }
 
 void SignalWatch::stay_awake() {
+  const sigset_t held = held_back();
   for (const int number : suspending) {
-    const struct sigaction action = action_for(number);
+    const struct sigaction action = action_for(number, held);
     ::sigaction(number, &action, nullptr);
   }
 }

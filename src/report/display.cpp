@@ -4,12 +4,18 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "characters.hpp"
 #include "utf8.hpp"
 
 namespace spindle::report {
 namespace {
+
+/// Whether every byte is a printable character of ASCII, one cell wide.
+bool is_plain(std::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+}
 
 constexpr std::string_view breaks_and_tabs = "\r\n\t";
 
@@ -29,9 +35,18 @@ std::size_t append_printable(std::string& out, std::string_view text) {
   return character.length;
 }
 
+/// The cell, or what the record says of itself.
+std::string own_text(const Record& record, std::string_view key, const Field* field) {
+  if (key == "target") return record.target;
+  if (key == "time") return to_text(record.time);
+  if (key == "type") return record.type;
+  return field == nullptr ? std::string() : to_text(field->cell);
+}
+
 }  // namespace
 
 std::size_t display_width(std::string_view text) {
+  if (is_plain(text)) return text.size();
   std::size_t width = 0;
   while (!text.empty()) {
     const CodePoint character = first_code_point(text);
@@ -65,6 +80,10 @@ std::string fitted(std::string_view text, std::size_t cells, Keep keep) {
   return std::string(text.substr(0, kept)).append(mark);
 }
 
+std::string printable(std::string&& text, LineBreaks breaks) {
+  return is_plain(text) ? std::move(text) : printable(std::string_view(text), breaks);
+}
+
 std::string printable(std::string_view text, LineBreaks breaks) {
   std::string out;
   out.reserve(text.size());
@@ -81,17 +100,16 @@ std::string printable(std::string_view text, LineBreaks breaks) {
 }
 
 std::string shown_text(const Record& record, std::string_view key) {
-  const Field* const field = record.find(key);
-  const bool has_own = field != nullptr && !field->shown.empty();
-  return has_own ? field->shown : cell_text(record, key);
+  return shown_text(record, key, record.find(key));
+}
+
+std::string shown_text(const Record& record, std::string_view key, const Field* field) {
+  if (field != nullptr && !field->shown.empty()) return field->shown;
+  return own_text(record, key, field);
 }
 
 std::string cell_text(const Record& record, std::string_view key) {
-  if (key == "target") return record.target;
-  if (key == "time") return to_text(record.time);
-  if (key == "type") return record.type;
-  const Field* const field = record.find(key);
-  return field == nullptr ? std::string() : to_text(field->cell);
+  return own_text(record, key, record.find(key));
 }
 
 }  // namespace spindle::report

@@ -25,10 +25,13 @@ enum class LineBreaks : std::uint8_t { fold, keep };
 /// Text that cannot steer a terminal or hide anything: every other control character and every
 /// invisible one is shown as `\x1b` or `\u202e` is, and ill-formed UTF-8 as U+FFFD.
 std::string printable(std::string_view text, LineBreaks breaks);
+std::string printable(std::string&& text, LineBreaks breaks);
 
 /// What people see of a record under a column's key: the field's `shown`, else its cell; "target",
 /// "time" and "type" are the record's own. Empty when the record has no such field.
 std::string shown_text(const Record& record, std::string_view key);
+/// The same where the field of this key is known; null: there is none.
+std::string shown_text(const Record& record, std::string_view key, const Field* field);
 
 /// The same as programs see it: always the cell, never the field's `shown`.
 std::string cell_text(const Record& record, std::string_view key);

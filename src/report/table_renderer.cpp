@@ -7,8 +7,12 @@ namespace spindle::report {
 namespace {
 
 struct Drawn {
+  explicit Drawn(std::string shown, Tone its_tone = Tone::plain)
+      : text(std::move(shown)), width(display_width(text)), tone(its_tone) {}
+
   std::string text;
-  Tone tone = Tone::plain;
+  std::size_t width;
+  Tone tone;
 };
 using Row = std::vector<Drawn>;
 
@@ -18,23 +22,29 @@ constexpr std::string_view green = "\x1b[32m";
 constexpr std::string_view red = "\x1b[31m";
 constexpr std::string_view plain = "\x1b[0m";
 
-std::string colored(const Drawn& cell, Color color) {
-  if (color == Color::off || cell.tone == Tone::plain) return cell.text;
-  return std::string(cell.tone == Tone::good ? green : red).append(cell.text).append(plain);
+void append_colored(std::string& line, const Drawn& cell, Color color) {
+  const bool is_colored = color != Color::off && cell.tone != Tone::plain;
+  if (is_colored) line += cell.tone == Tone::good ? green : red;
+  line += cell.text;
+  if (is_colored) line += plain;
 }
 
-std::string draw(const Row& row, std::span<const Column> columns,
-                 std::span<const std::size_t> widths, Color color) {
-  std::string line;
-  for (std::size_t index = 0; index < row.size(); ++index) {
-    if (index != 0) line += gap;
-    const std::size_t width = display_width(row[index].text);
-    const std::string padding(widths[index] > width ? widths[index] - width : 0, ' ');
-    const std::string text = colored(row[index], color);
-    line += columns[index].align == Align::right ? padding + text : text + padding;
+/// Appends a line without spaces at its end.
+void draw(const Row& row, std::span<const Column> columns, std::span<const std::size_t> widths,
+          Color color, std::string& out) {
+  std::size_t used = row.size();
+  while (used > 0 && row[used - 1].text.empty()) --used;
+  for (std::size_t index = 0; index < used; ++index) {
+    if (index != 0) out += gap;
+    const std::size_t width = row[index].width;
+    const std::size_t padding = widths[index] > width ? widths[index] - width : 0;
+    const bool is_right = columns[index].align == Align::right;
+    if (is_right) out.append(padding, ' ');
+    append_colored(out, row[index], color);
+    if (!is_right && index + 1 < used) out.append(padding, ' ');
   }
-  line.erase(line.find_last_not_of(' ') + 1);
-  return line;
+  out.erase(out.find_last_not_of(' ') + 1);
+  out += '\n';
 }
 
 class TableRenderer final : public PlainRenderer {
@@ -57,8 +67,8 @@ class TableRenderer final : public PlainRenderer {
     row.reserve(columns_.size());
     for (const Column& column : columns_) {
       const Field* const field = record.find(column.key);
-      row.push_back({printable(shown_text(record, column.key), LineBreaks::fold),
-                     field == nullptr ? Tone::plain : field->tone});
+      row.emplace_back(printable(shown_text(record, column.key, field), LineBreaks::fold),
+                       field == nullptr ? Tone::plain : field->tone);
     }
     rows_.push_back(std::move(row));
     return is_live() ? flush() : Result<void>{};
@@ -82,24 +92,25 @@ class TableRenderer final : public PlainRenderer {
 
   void widen(const Row& row) {
     for (std::size_t index = 0; index < row.size(); ++index) {
-      widths_[index] = std::max(widths_[index], display_width(row[index].text));
+      widths_[index] = std::max(widths_[index], row[index].width);
     }
   }
 
-  [[nodiscard]] std::string header() {
+  void add_header(std::string& text) {
     Row titles;
-    for (const Column& column : columns_) titles.push_back({column.title});
-    std::string line = draw(titles, columns_, widths_, Color::off);
-    if (streams().color == Color::off) return line;
-    return std::string(bold).append(line).append(plain);
+    for (const Column& column : columns_) titles.emplace_back(column.title);
+    const bool is_bold = streams().color != Color::off;
+    if (is_bold) text += bold;
+    draw(titles, columns_, widths_, Color::off, text);
+    if (is_bold) text.insert(text.size() - 1, plain);
   }
 
   Result<void> flush() {
     if (rows_.empty() || columns_.empty()) return {};
     std::string text;
     if (heading_ == Heading::another) text += '\n';
-    if (heading_ != Heading::drawn) text += header() + '\n';
-    for (const Row& row : rows_) text += draw(row, columns_, widths_, streams().color) + '\n';
+    if (heading_ != Heading::drawn) add_header(text);
+    for (const Row& row : rows_) draw(row, columns_, widths_, streams().color, text);
     rows_.clear();
     heading_ = Heading::drawn;
     return streams().out(text);

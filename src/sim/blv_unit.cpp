@@ -49,7 +49,7 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationF
     : address_(address),
       run_(word_facts(profile)),
       refusals_(profile.refusals.value_or(catalogue::RefusalFacts{})),
-      permanent_alarms_(start.permanent_alarms),
+      permanent_alarms_(start.permanent_alarms.begin(), start.permanent_alarms.end()),
       max_read_(profile.link.max_read),
       max_write_(profile.link.max_write),
       registers_(profile, start),
@@ -74,7 +74,7 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationF
     if (known == handlers.end() || !action.value || !action.rest || !cell) continue;
     deeds_.push_back({cell->first, *action.value, known->second});
   }
-  for (const std::string* name : {&run_.command, &run_.monitor.status}) {
+  for (const catalogue::Text* name : {&run_.command, &run_.monitor.status}) {
     if (auto parameter = profile.find(*name)) words_.push_back(std::move(*parameter));
   }
   make_effective();

@@ -71,7 +71,7 @@ void put_serial(const IdentityFacts& facts, Bytes& bytes, std::uint64_t serial) 
 Bytes make_identity(const std::optional<IdentityFacts>& facts,
                     const catalogue::SimulationFacts& start, const BmOptions& options) {
   const std::size_t usual = start.identity_bytes > 0 ? start.identity_bytes : start.identity.size();
-  Bytes identity = start.identity;
+  Bytes identity(start.identity.begin(), start.identity.end());
   constexpr std::size_t most = modbus::max_pdu_size - 2;
   identity.resize(std::min(options.identity_bytes.value_or(usual), most));
   if (!facts) return identity;

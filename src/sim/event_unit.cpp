@@ -9,7 +9,7 @@ namespace spindle::sim {
 
 bool EventUnit::knows(catalogue::EventKind kind) const {
   return facts_ && std::any_of(facts_->kinds.begin(), facts_->kinds.end(),
-                               [kind](const auto& entry) { return entry.second == kind; });
+                               [kind](const auto& entry) { return entry.value == kind; });
 }
 
 std::uint16_t EventUnit::number(const RegisterBank& bank) const {
@@ -20,8 +20,8 @@ void EventUnit::emit(catalogue::EventKind kind, const Values& values, RegisterBa
                      TimePoint now) {
   if (!facts_) return;
   const auto row = std::find_if(facts_->kinds.begin(), facts_->kinds.end(),
-                                [kind](const auto& entry) { return entry.second == kind; });
-  const std::int64_t value = row == facts_->kinds.end() ? 0 : row->first;
+                                [kind](const auto& entry) { return entry.value == kind; });
+  const std::int64_t value = row == facts_->kinds.end() ? 0 : row->key;
   for (const auto& [name, word] : values) bank.set(name, word);
   bank.set(facts_->number, static_cast<std::uint16_t>(number(bank) + 1U));
   bank.set(facts_->kind, static_cast<std::uint16_t>(value));

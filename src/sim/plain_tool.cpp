@@ -63,9 +63,9 @@ class SimulatedPlain final : public PlainTool {
   RegisterBank registers_;
   EventUnit events_;
   FaultyStore store_;
-  std::vector<catalogue::Action> actions_;
+  catalogue::List<catalogue::Action> actions_;
   catalogue::LinkFacts link_;
-  std::vector<catalogue::SimulationFacts::Event> told_;  ///< what events say, in turn
+  catalogue::List<catalogue::SimulationFacts::Event> told_;  ///< what events say, in turn
   std::map<EventKind, std::size_t> turns_ = {};
   std::uint8_t limit_exception_;
   Bytes identity_;

@@ -40,7 +40,7 @@ ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::Sim
   if (auto reset = profile.find_action(profile.run->alarm_reset)) alarm_reset_ = std::move(*reset);
   if (!run_) return;
   begin_stopped();
-  for (const std::string* name :
+  for (const catalogue::Text* name :
        {&run_->command, &run_->stop_register, &run_->enable.parameter, &run_->set_point,
         &run_->monitor.command_speed, &run_->monitor.feedback_speed}) {
     if (auto parameter = profile.find(*name)) parameters_.push_back(std::move(*parameter));

@@ -54,7 +54,7 @@ class ProfileUnit final : public BusUnit {
   std::vector<catalogue::Parameter> parameters_;  ///< those that `run` names
   std::optional<catalogue::CommandRegisterFacts> run_ = std::nullopt;
   std::optional<catalogue::Action> alarm_reset_ = std::nullopt;
-  std::vector<std::int64_t> permanent_alarms_;
+  catalogue::List<std::int64_t> permanent_alarms_;
   std::uint8_t limit_exception_;
   std::uint16_t max_read_;
   std::uint16_t max_write_;

@@ -1,6 +1,8 @@
 #include "register_bank.hpp"
 
-#include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <iterator>
 
 #include "spindle/base/text.hpp"
 
@@ -24,7 +26,10 @@ std::int64_t number_in(std::uint16_t word, Kind kind) {
 
 RegisterBank::RegisterBank(const catalogue::Profile& profile,
                            const catalogue::SimulationFacts& start) {
+  named_.reserve(profile.parameters.size());
   for (const catalogue::Parameter& parameter : profile.parameters) add_parameter(parameter);
+  std::sort(named_.begin(), named_.end(),
+            [](const Named& a, const Named& b) { return a.name < b.name; });
   if (profile.numbered) add_numbered(*profile.numbered);
   if (profile.events) add_event_block(*profile.events);
   for (const auto& value : start.values) {
@@ -44,9 +49,10 @@ std::optional<Registers> RegisterBank::read(RegisterTable table, std::uint16_t f
   const Words& all = words(table);
   Registers registers;
   std::uint32_t address = first;
-  for (auto word = all.find(first); registers.size() < count; ++word, ++address) {
-    if (word == all.end() || word->first != address) return std::nullopt;
-    registers.push_back(word->second);
+  for (; registers.size() < count; ++address) {
+    const auto narrow = static_cast<std::uint16_t>(address);
+    if (narrow != address || !all.has(narrow)) return std::nullopt;
+    registers.push_back(all.at(narrow));
   }
   return registers;
 }
@@ -61,36 +67,54 @@ WriteVerdict RegisterBank::check_write(std::uint16_t address, std::uint16_t valu
 }
 
 void RegisterBank::store(std::uint16_t address, std::uint16_t value) {
-  const auto word = holding_.find(address);
-  if (word != holding_.end()) word->second = value;
+  holding_.put_if_there(address, value);
 }
 
 std::uint16_t RegisterBank::get(std::string_view name) const {
-  const auto place = places_.find(name);
-  if (place == places_.end()) return 0;
-  const Words& all = words(place->second.table);
-  const auto word = all.find(place->second.address);
-  return word == all.end() ? std::uint16_t{0} : word->second;
+  const auto place = find(name);
+  if (!place) return 0;
+  const Words& all = words(place->table);
+  return all.has(place->address) ? all.at(place->address) : std::uint16_t{0};
 }
 
 void RegisterBank::set(std::string_view name, std::uint16_t value) {
-  const auto place = places_.find(name);
-  if (place == places_.end()) return;
-  Words& all = words(place->second.table);
-  const auto word = all.find(place->second.address);
-  if (word != all.end()) word->second = value;
+  if (const auto place = find(name)) words(place->table).put_if_there(place->address, value);
 }
 
 void RegisterBank::set_raw(std::string_view name, std::int64_t raw) {
-  const auto place = places_.find(name);
-  if (place != places_.end()) start_value(place->second, raw);
+  if (const auto place = find(name)) start_value(*place, raw);
 }
 
 std::optional<std::pair<RegisterTable, std::uint16_t>> RegisterBank::place_of(
     std::string_view name) const {
-  const auto place = places_.find(name);
-  if (place == places_.end()) return std::nullopt;
-  return std::pair(place->second.table, place->second.address);
+  const auto place = find(name);
+  if (!place) return std::nullopt;
+  return std::pair(place->table, place->address);
+}
+
+std::optional<RegisterBank::Place> RegisterBank::find(std::string_view name) const {
+  const auto named =
+      std::lower_bound(named_.begin(), named_.end(), name,
+                       [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
+  if (named != named_.end() && named->name == name) return named->place;
+  if (!numbered_ || !name.starts_with(numbered_->prefix)) return std::nullopt;
+  const std::string_view digits = name.substr(numbered_->prefix.size());
+  const auto number = parse_unsigned(digits, numbered_->to);
+  const bool is_one = number && *number >= numbered_->from && (digits.size() == 1 || digits[0] != '0');
+  if (!is_one) return std::nullopt;
+  return Place{numbered_->table, static_cast<std::uint16_t>(*number), Kind::u16};
+}
+
+void RegisterBank::Words::put(std::uint16_t address, std::uint16_t word) {
+  if (address >= words_.size()) {
+    // In steps, as profiles name registers in rising order.
+    constexpr std::size_t step = 1024;
+    const std::size_t size = (std::size_t{address} / step + 1) * step;
+    words_.resize(size);
+    there_.resize(size);
+  }
+  words_[address] = word;
+  there_[address] = true;
 }
 
 const RegisterBank::Words& RegisterBank::words(RegisterTable table) const {
@@ -103,11 +127,11 @@ RegisterBank::Words& RegisterBank::words(RegisterTable table) {
 
 void RegisterBank::add_parameter(const catalogue::Parameter& parameter) {
   const Place place{parameter.table, parameter.address.value, parameter.encoding.kind};
-  places_[parameter.name] = place;
+  named_.push_back({parameter.name, place});
   const Kind kind = word_kind(place.kind);
   for (std::uint16_t i = 0; i < catalogue::register_count(place.kind); ++i) {
     const auto address = static_cast<std::uint16_t>(place.address + i);
-    words(place.table)[address] = 0;
+    words(place.table).put(address, 0);
     if (parameter.table == RegisterTable::holding && parameter.access == Access::read_write) {
       writable_[address] = {catalogue::lowest(kind), catalogue::highest(kind), kind};
     }
@@ -116,10 +140,10 @@ void RegisterBank::add_parameter(const catalogue::Parameter& parameter) {
 
 // A register that has a name already keeps what its name says of it.
 void RegisterBank::add_numbered(const catalogue::NumberedFacts& facts) {
+  numbered_ = facts;
   for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
     const auto address = static_cast<std::uint16_t>(number);
-    places_[fmt::format("{}{}", facts.prefix, number)] = {facts.table, address, Kind::u16};
-    words(facts.table).try_emplace(address, std::uint16_t{0});
+    words(facts.table).put_if_absent(address, 0);
     if (facts.table == RegisterTable::holding && facts.access == Access::read_write) {
       writable_.try_emplace(
           address, Limits{catalogue::lowest(Kind::u16), catalogue::highest(Kind::u16), Kind::u16});
@@ -130,16 +154,42 @@ void RegisterBank::add_numbered(const catalogue::NumberedFacts& facts) {
 void RegisterBank::add_event_block(const catalogue::EventFacts& facts) {
   for (std::uint16_t i = 0; i < facts.count; ++i) {
     const auto address = static_cast<std::uint16_t>(facts.first + i);
-    words(catalogue::table_of(facts)).try_emplace(address, std::uint16_t{0});
+    words(catalogue::table_of(facts)).put_if_absent(address, 0);
   }
 }
 
 std::vector<RegisterBank::Place> RegisterBank::matching(std::string_view pattern) const {
+  const std::string_view head = pattern.substr(0, pattern.find_first_of("*?["));
   std::vector<Place> found;
-  for (const auto& [name, place] : places_) {
-    if (glob_match(pattern, name)) found.push_back(place);
+  if (head == pattern) {
+    if (const auto place = find(pattern)) found.push_back(*place);
+    return found;
   }
+  auto named =
+      std::lower_bound(named_.begin(), named_.end(), head,
+                       [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
+  for (; named != named_.end() && named->name.starts_with(head); ++named) {
+    if (glob_match(pattern, named->name)) found.push_back(named->place);
+  }
+  add_numbered_matching(pattern, found);
   return found;
+}
+
+void RegisterBank::add_numbered_matching(std::string_view pattern,
+                                         std::vector<Place>& found) const {
+  if (!numbered_) return;
+  const std::string_view head = pattern.substr(0, pattern.find_first_of("*?["));
+  const std::string_view prefix = numbered_->prefix;
+  const std::size_t common = std::min(head.size(), prefix.size());
+  const bool may_match = head.substr(0, common) == prefix.substr(0, common) &&
+                         head.find_first_not_of("0123456789", common) == std::string_view::npos;
+  if (!may_match) return;
+  std::string name(prefix);
+  for (std::uint32_t number = numbered_->from; number <= numbered_->to; ++number) {
+    const auto place = Place{numbered_->table, static_cast<std::uint16_t>(number), Kind::u16};
+    name.resize(prefix.size());
+    if (glob_match(pattern, name += std::to_string(number))) found.push_back(place);
+  }
 }
 
 void RegisterBank::start_value(const Place& place, std::int64_t raw) {
@@ -147,7 +197,7 @@ void RegisterBank::start_value(const Place& place, std::int64_t raw) {
   const std::uint16_t count = catalogue::register_count(place.kind);
   for (std::uint16_t i = 0; i < count; ++i) {
     const unsigned shift = 16U * (count - 1U - i);
-    all[static_cast<std::uint16_t>(place.address + i)] = low_word(raw >> shift);
+    all.put(static_cast<std::uint16_t>(place.address + i), low_word(raw >> shift));
   }
 }
 
@@ -164,8 +214,10 @@ void RegisterBank::add_mirrors(const catalogue::LimitFacts& facts) {
     const auto found = writable_.find(static_cast<std::uint16_t>(number));
     if (found == writable_.end()) continue;
     const Limits& limits = found->second;
-    holding_[static_cast<std::uint16_t>(number + facts.minimum_offset)] = low_word(limits.minimum);
-    holding_[static_cast<std::uint16_t>(number + facts.maximum_offset)] = low_word(limits.maximum);
+    holding_.put(static_cast<std::uint16_t>(number + facts.minimum_offset),
+                 low_word(limits.minimum));
+    holding_.put(static_cast<std::uint16_t>(number + facts.maximum_offset),
+                 low_word(limits.maximum));
   }
 }
 

@@ -56,20 +56,49 @@ class RegisterBank {
     std::int64_t maximum = 0;
     catalogue::Kind kind = catalogue::Kind::u16;
   };
-  using Words = std::map<std::uint16_t, std::uint16_t>;
+  /// Words by their address: as quick to fill as memory.
+  class Words {
+   public:
+    [[nodiscard]] bool has(std::uint16_t address) const {
+      return address < there_.size() && there_[address];
+    }
+    /// Requires that it is there.
+    [[nodiscard]] std::uint16_t at(std::uint16_t address) const { return words_[address]; }
+    void put(std::uint16_t address, std::uint16_t word);
+    void put_if_absent(std::uint16_t address, std::uint16_t word) {
+      if (!has(address)) put(address, word);
+    }
+    void put_if_there(std::uint16_t address, std::uint16_t word) {
+      if (has(address)) words_[address] = word;
+    }
+    void erase(std::uint16_t address) {
+      if (has(address)) there_[address] = false;
+    }
+
+   private:
+    std::vector<std::uint16_t> words_ = {};
+    std::vector<bool> there_ = {};
+  };
+  struct Named {
+    catalogue::Text name;
+    Place place;
+  };
 
   [[nodiscard]] const Words& words(modbus::RegisterTable table) const;
   [[nodiscard]] Words& words(modbus::RegisterTable table);
   void add_parameter(const catalogue::Parameter& parameter);
   void add_numbered(const catalogue::NumberedFacts& facts);
   void add_event_block(const catalogue::EventFacts& facts);
+  [[nodiscard]] std::optional<Place> find(std::string_view name) const;
   [[nodiscard]] std::vector<Place> matching(std::string_view pattern) const;
+  void add_numbered_matching(std::string_view pattern, std::vector<Place>& found) const;
   void start_value(const Place& place, std::int64_t raw);
   void start_limits(const Place& place, std::int64_t minimum, std::int64_t maximum);
   void add_mirrors(const catalogue::LimitFacts& facts);
   void remove(const catalogue::Area& area, const std::optional<catalogue::LimitFacts>& limits);
 
-  std::map<std::string, Place, std::less<>> places_ = {};
+  std::vector<Named> named_ = {};  ///< by name
+  std::optional<catalogue::NumberedFacts> numbered_ = std::nullopt;
   Words holding_ = {};
   Words input_ = {};
   std::map<std::uint16_t, Limits> writable_ = {};

@@ -57,7 +57,7 @@ void add(const device::Reading& reading, const Target& target, Secrets secrets,
 }  // namespace
 
 std::string unit_of(const catalogue::Parameter& parameter, const Target& target) {
-  return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit;
+  return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit.to_string();
 }
 
 Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Environment& environment,

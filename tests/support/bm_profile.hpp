@@ -1,6 +1,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "spindle/catalogue/profile.hpp"
 
@@ -50,14 +52,15 @@ inline catalogue::Profile bm_profile() {
                                    .access = Access::read_write,
                                    .source = "60427 section 3.1"};
 
-  const auto add = [&profile](RegisterTable table, std::uint16_t address, std::string name,
-                              Access access) {
+  std::vector<Parameter> parameters;
+  const auto add = [&parameters](RegisterTable table, std::uint16_t address, std::string name,
+                                 Access access) {
     Parameter parameter;
     parameter.name = std::move(name);
     parameter.table = table;
     parameter.address = {address};
     parameter.access = access;
-    profile.parameters.push_back(std::move(parameter));
+    parameters.push_back(std::move(parameter));
   };
   const auto add_input = [&add](std::uint16_t first, const std::string& group,
                                 std::initializer_list<const char*> fields) {
@@ -84,21 +87,27 @@ inline catalogue::Profile bm_profile() {
       {"torque", "speed", "current", "preset", "torque-up", "fastening-ok", "ready", "running",
        "alarm", "direction", "screws-remaining", "inputs", "outputs", "temperature"});
 
-  const auto action = [&profile](const char* name, std::uint16_t address) -> Action& {
-    Action& added = profile.actions.emplace_back();
-    added.name = name;
-    added.address = {address};
-    return added;
+  profile.parameters = std::move(parameters);
+
+  const auto action = [](Text name, std::uint16_t address) {
+    Action made;
+    made.name = std::move(name);
+    made.address = {address};
+    return made;
   };
-  action("alarm-reset", 4000).value = 1;
-  action("lock", 4001).maximum = 1;
-  Action& start = action("start", 4003);
+  Action reset = action("alarm-reset", 4000);
+  reset.value = 1;
+  Action lock = action("lock", 4001);
+  lock.maximum = 1;
+  Action start = action("start", 4003);
   start.value = 1;
   start.stop_value = 0;
-  Action& preset = action("select-preset", 4004);
+  Action preset = action("select-preset", 4004);
   preset.minimum = 1;
   preset.maximum = 3;
-  action("direction", 4005).maximum = 1;
+  Action direction = action("direction", 4005);
+  direction.maximum = 1;
+  profile.actions = {reset, lock, start, preset, direction};
   return profile;
 }
 

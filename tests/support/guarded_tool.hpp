@@ -11,6 +11,7 @@
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "support/bm_profile.hpp"
+#include "support/edit_list.hpp"
 #include "support/fake_clock.hpp"
 
 namespace spindle::test {
@@ -83,8 +84,10 @@ struct GuardedTool {
 
   static catalogue::Profile confirming_profile() {
     catalogue::Profile made = bm_profile();
-    for (catalogue::Action& action : made.actions) {
-      if (action.name == "start") action.confirm = "status.running";
+    for (std::size_t at = 0; at < made.actions.size(); ++at) {
+      edit(made.actions, at, [](catalogue::Action& action) {
+        if (action.name == "start") action.confirm = "status.running";
+      });
     }
     return made;
   }

@@ -54,6 +54,7 @@
 #include "spindle/link/serial_settings.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/world.hpp"
+#include "spindle/shipped/profiles.hpp"
 #include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
@@ -291,7 +292,8 @@ class Stage {
           return std::nullopt;
         },
         .disk = disk_.functions(),
-        .installation = {SPINDLE_SOURCE_DIR, "3.1.6"}};
+        .installation = {SPINDLE_SOURCE_DIR, "3.1.6"},
+        .shipped = shipped::profiles()};
     status_ = cli::run(arguments, world);
     Lines lines;
     std::istringstream stream(without_source_folder(std::move(shown)));

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "support/edit_list.hpp"
+
 using namespace spindle;
 
 namespace {
@@ -26,7 +28,7 @@ catalogue::Profile secretive() {
   pin.address = {300};
   pin.encoding.kind = catalogue::Kind::u32;
   pin.secrecy = catalogue::Secrecy::secret;
-  profile.parameters.push_back(pin);
+  test::append(profile.parameters, pin);
   profile.actions = {action_on("enter-pin", 301), action_on("select", 302)};
   return profile;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "spindle/files/profile_store.hpp"
+#include "support/edit_list.hpp"
 
 using namespace spindle;
 using catalogue::Missing;
@@ -36,7 +37,7 @@ Profile odd_profile() {
     made.address = {address};
     made.encoding.kind = kind;
     made.access = catalogue::Access::read_write;
-    profile.parameters.push_back(made);
+    test::append(profile.parameters, made);
   };
   add("speed", 1, catalogue::Kind::u32);
   add("offset", 3, catalogue::Kind::i16);
@@ -185,8 +186,11 @@ TEST_CASE("whatever is in its texts, a backup is read back equal") {
                                   ? (round % 2 == 0 ? characters[at] : "x" + characters[at] + "y")
                                   : hostile_text(random) + "z";
     Profile profile = odd_profile();
-    profile.parameters.at(1).labels = {{-2, label}, {-3, "other"}};
-    profile.parameters.at(2).unit = label;
+    test::edit(profile.parameters, 1, [&](catalogue::Parameter& parameter) {
+      parameter.labels = {{-2, label}, {-3, "other"}};
+    });
+    test::edit(profile.parameters, 2,
+               [&](catalogue::Parameter& parameter) { parameter.unit = label; });
     profile.id = label;
     Snapshot snapshot{.time = "t" + hostile_text(random),
                       .version = "v" + hostile_text(random),
@@ -344,7 +348,7 @@ TEST_CASE("a name of another version of the profile is found by its register") {
   catalogue::Parameter screws = named.find("p300").value();
   screws.name = "count.screws";
   screws.encoding.scale = Decimal(1, -1);
-  named.parameters.push_back(screws);
+  test::append(named.parameters, screws);
   const auto loaded = load(render_backup(small_snapshot()), named);
   REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
   const auto* entry = loaded->find("count.screws");
@@ -354,7 +358,8 @@ TEST_CASE("a name of another version of the profile is found by its register") {
 
   screws.name = "pair";
   screws.encoding.kind = catalogue::Kind::u32;
-  named.parameters.back() = screws;
+  test::edit(named.parameters, named.parameters.size() - 1,
+             [&](catalogue::Parameter& last) { last = screws; });
   const auto part = load(render_backup(small_snapshot()), named);
   REQUIRE_FALSE(part.has_value());
   CHECK(part.error().message.starts_with("b.yaml:13:5: 'p300' is part of another parameter"));

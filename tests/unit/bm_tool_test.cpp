@@ -10,6 +10,7 @@
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "support/bm_profile.hpp"
+#include "support/edit_list.hpp"
 
 using namespace spindle;
 using namespace spindle::sim;
@@ -383,7 +384,7 @@ TEST_CASE("preset and direction") {
 
 TEST_CASE("event numbers wrap") {
   catalogue::SimulationFacts facts = test::bm_start();
-  facts.values.push_back({"event.number", 65534});
+  test::append(facts.values, {"event.number", 65534});
   Bench bench({}, facts);
   std::vector<std::uint16_t> numbers;
   for (int i = 0; i < 3; ++i) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "spindle/modbus/pdu.hpp"
+#include "support/edit_list.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
 #include "support/scripted_transport.hpp"
@@ -46,12 +47,12 @@ struct Bank {
     Parameter a;
     a.name = "a";
     a.access = catalogue::Access::read_write;
-    profile.parameters.push_back(a);
+    test::append(profile.parameters, a);
     Parameter wide = a;
     wide.name = "wide";
     wide.address = {10};
     wide.encoding.kind = catalogue::Kind::u32;
-    profile.parameters.push_back(wide);
+    test::append(profile.parameters, wide);
     script.otherwise = [this](ByteView request) { return answer(request); };
   }
 
@@ -324,7 +325,8 @@ TEST_CASE("a value that reads right is not waited for, and one that acts late is
     CAPTURE(row.acts.count());
     Bench bench;
     if (row.link) bench.bank.profile.link.settle = *row.link;
-    bench.bank.profile.parameters[0].settle = row.own;
+    test::edit(bench.bank.profile.parameters, 0,
+               [&](Parameter& parameter) { parameter.settle = row.own; });
     bench.bank.replies = {{.acts = row.acts}};
     const TimePoint began = bench.bank.clock.now();
     CHECK(bench.set(55).result == row.result);

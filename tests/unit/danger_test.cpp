@@ -7,6 +7,7 @@
 
 #include "spindle/catalogue/snapshot.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "support/edit_list.hpp"
 
 using namespace spindle;
 using namespace spindle::catalogue;
@@ -39,11 +40,11 @@ Profile machine() {
       .prefix = "p", .from = 1, .to = 40, .access = Access::read_write, .source = "manual"};
   profile.parameters = {parameter("word", 10), parameter("brake", 20), parameter("speed", 12),
                         parameter("lock", 50), parameter("pair", 49, Kind::u32)};
-  profile.parameters[1].hazard = Hazard::moves;
+  test::edit(profile.parameters, 1, [](auto& entry) { entry.hazard = Hazard::moves; });
   profile.actions = {action("start", 10, Hazard::moves), action("reset", 30, Hazard::none),
                      action("lock", 50, Hazard::locks), action("look", 12, Hazard::none)};
-  profile.actions[0].stop_value = 0;
-  profile.actions[1].rest = 0;
+  test::edit(profile.actions, 0, [](auto& entry) { entry.stop_value = 0; });
+  test::edit(profile.actions, 1, [](auto& entry) { entry.rest = 0; });
   profile.run.emplace().model = StartActionFacts{.start = "start"};
   return profile;
 }
@@ -133,8 +134,8 @@ TEST_CASE("every register that commands a motor is no setting") {
 
 TEST_CASE("the gravest hazard of a register counts") {
   Profile profile = machine();
-  profile.actions.push_back(action("erase", 10, Hazard::erases));
-  profile.actions.push_back(action("go", 50, Hazard::moves));
+  test::append(profile.actions, action("erase", 10, Hazard::erases));
+  test::append(profile.actions, action("go", 50, Hazard::moves));
   CHECK(danger_of(profile.parameters[0], profile)->action == "start");
   CHECK(danger_of(profile.parameters[3], profile)->action == "go");
 }

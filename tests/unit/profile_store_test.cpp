@@ -13,6 +13,7 @@
 
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/identity.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace spindle;
 using catalogue::Access;
@@ -42,29 +43,7 @@ Parameter parameter(const Profile& profile, std::string_view name) {
   return *found;
 }
 
-/// A folder of its own for profiles that a test writes; removed at the end.
-class Folder {
- public:
-  Folder() {
-    static int count = 0;
-    path_ = std::filesystem::temp_directory_path() /
-            ("spindle-profiles-" + std::to_string(::getpid()) + "-" + std::to_string(++count));
-    std::filesystem::create_directories(path_);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() { std::filesystem::remove_all(path_); }
-
-  std::string write(const std::string& name, const std::string& text) const {
-    const std::string path = (path_ / name).string();
-    std::ofstream(path) << text;
-    return path;
-  }
-  [[nodiscard]] std::string path() const { return path_.string(); }
-
- private:
-  std::filesystem::path path_;
-};
+using Folder = test::TemporaryFolder;
 
 /// The lines "# expect: LINE:COLUMN: text" at the top of a rejected file.
 std::vector<std::string> expectations(const std::string& path) {
@@ -650,7 +629,7 @@ TEST_CASE("simulation: every start value of a preset lies within the simulated t
       }
       CHECK(raw >= minimum);
       CHECK(raw <= maximum);
-      if (preset.name.ends_with("target-torque")) torques.insert(raw);
+      if (preset.name.view().ends_with("target-torque")) torques.insert(raw);
     }
     CHECK(torques.size() == 15);  // presets can be told apart
   }

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "support/edit_list.hpp"
+
 using namespace spindle;
 using namespace spindle::catalogue;
 using modbus::RegisterAddress;
@@ -238,9 +240,9 @@ TEST_CASE("a secret is one by whatever name or number its registers are asked fo
   Profile profile = example();
   Parameter pin = named("pin", RegisterTable::holding, 300, Kind::u32, Access::read_write);
   pin.secrecy = Secrecy::secret;
-  profile.parameters.push_back(pin);
-  profile.parameters.push_back(
-      named("half", RegisterTable::holding, 301, Kind::u16, Access::read_write));
+  test::append(profile.parameters, pin);
+  test::append(profile.parameters,
+               named("half", RegisterTable::holding, 301, Kind::u16, Access::read_write));
   for (const std::string name : {"pin", "half", "p300", "p301", "@holding:300", "@holding:301/i16",
                                  "@holding:299/u32", "@holding:301/u32"}) {
     CAPTURE(name);

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "support/edit_list.hpp"
+
 using namespace spindle;
 
 TEST_CASE("operation data are selected by adjoining bits of the word") {
@@ -25,10 +27,10 @@ namespace {
 
 catalogue::InputFacts some_inputs() {
   catalogue::InputFacts inputs{.parameter = "in.{n}", .first = 0, .last = 15, .functions = {}};
-  inputs.functions.push_back({.number = 0, .bit = std::nullopt});
-  inputs.functions.push_back({.number = 1, .bit = 3});
-  inputs.functions.push_back({.number = 2, .bit = 4});
-  inputs.functions.push_back({.number = 19, .bit = 5});
+  test::append(inputs.functions, {.number = 0, .bit = std::nullopt});
+  test::append(inputs.functions, {.number = 1, .bit = 3});
+  test::append(inputs.functions, {.number = 2, .bit = 4});
+  test::append(inputs.functions, {.number = 19, .bit = 5});
   return inputs;
 }
 

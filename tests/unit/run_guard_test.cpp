@@ -317,7 +317,7 @@ TEST_CASE("stop_and_confirm without a guard: once, and proven") {
   }
   SUBCASE("a product whose running state can not be read") {
     catalogue::Action blind = start;
-    blind.confirm.clear();
+    blind.confirm = {};
     CHECK(device::stop_and_confirm(device, blind, tool.clock) == StopResult::sent);
   }
   SUBCASE("a tool that runs on") {

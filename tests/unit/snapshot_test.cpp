@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support/bm_profile.hpp"
+#include "support/edit_list.hpp"
 
 using namespace spindle;
 using namespace spindle::catalogue;
@@ -115,10 +116,10 @@ TEST_CASE("a pair of registers takes both numbers, and what overlaps is stored o
   Profile profile = small_profile();
   Parameter pair = parameter("pair", 3);
   pair.encoding.kind = Kind::u32;
-  profile.parameters.push_back(pair);
-  profile.parameters.push_back(parameter("torque.raw", 2));
-  profile.parameters.push_back(parameter("elsewhere", 900));
-  profile.parameters.push_back(parameter("shown.elsewhere", 901, Access::read_only));
+  test::append(profile.parameters, pair);
+  test::append(profile.parameters, parameter("torque.raw", 2));
+  test::append(profile.parameters, parameter("elsewhere", 900));
+  test::append(profile.parameters, parameter("shown.elsewhere", 901, Access::read_only));
   CHECK(names_of(stored_parameters(profile)) == Lines{"p1", "torque", "pair", "elsewhere"});
 }
 
@@ -129,7 +130,7 @@ TEST_CASE("without numbers what can be set is stored in the order of the catalog
   profile.run = catalogue::RunFacts{.model = catalogue::CommandWordFacts{.command = "command"}};
   Parameter input = parameter("input", 5, Access::read_only);
   input.table = modbus::RegisterTable::input;
-  profile.parameters.push_back(input);
+  test::append(profile.parameters, input);
   CHECK(names_of(stored_parameters(profile)) == Lines{"b", "c"});
 }
 
@@ -140,7 +141,8 @@ TEST_CASE("the fingerprint depends on what is stored and not on where the file i
   profile.path = "/somewhere/else.yaml";
   profile.title = "another title";
   CHECK(fingerprint(stored_parameters(profile)) == first);
-  profile.parameters[0].encoding.scale = Decimal(1, -1);
+  test::edit(profile.parameters, 0,
+             [](Parameter& changed) { changed.encoding.scale = Decimal(1, -1); });
   CHECK(fingerprint(stored_parameters(profile)) != first);
 }
 
@@ -209,8 +211,8 @@ TEST_CASE("what is read-only or belongs to one tool is skipped") {
   Parameter shown_only = parameter("shown", 3, Access::read_only);
   Parameter address = parameter("address", 4);
   address.cloning = Cloning::never;
-  profile.parameters.push_back(shown_only);
-  profile.parameters.push_back(address);
+  test::append(profile.parameters, shown_only);
+  test::append(profile.parameters, address);
   const Snapshot backup = snapshot(profile, {{"shown", 1}, {"address", 1}});
   const Snapshot present = snapshot(profile, {{"shown", 2}, {"address", 2}});
   const auto to_other = plan_restore(backup, present, profile, {}, Destination::other_tool);
@@ -333,7 +335,7 @@ TEST_CASE("a pair that cannot be written is told before anything is") {
   profile.limits.reset();
   Parameter wide = parameter("wide", 10);
   wide.encoding.kind = Kind::u32;
-  profile.parameters.push_back(wide);
+  test::append(profile.parameters, wide);
   profile.link.max_write = 1;
   Snapshot backup;
   backup.entries.push_back(

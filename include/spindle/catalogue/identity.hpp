@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/error.hpp"
+#include "spindle/catalogue/list.hpp"
+#include "spindle/catalogue/text.hpp"
 
 namespace spindle::catalogue {
 
@@ -29,12 +30,12 @@ struct IdentityFacts {
   /// pairs of its bytes, last byte first.
   std::uint8_t long_serial_bytes = 0;  ///< 0: there is none
   Slice long_serial = {};
-  std::uint8_t product_byte = 0;             ///< offset of the product code in the whole answer
-  std::map<unsigned, std::string> products;  ///< product code to profile id
-  std::uint8_t total_bytes = 0;              ///< from this many bytes on `total` is there; 0: never
-  Slice total = {};                          ///< count of fastenings in the tool's life
-  std::map<unsigned, std::string> models;    ///< tool model code to name; only known codes match
-  unsigned firmware_below = 0;  ///< the profile's register map ends here; 0: no such limit
+  std::uint8_t product_byte = 0;   ///< offset of the product code in the whole answer
+  Table<unsigned, Text> products;  ///< product code to profile id
+  std::uint8_t total_bytes = 0;    ///< from this many bytes on `total` is there; 0: never
+  Slice total = {};                ///< count of fastenings in the tool's life
+  Table<unsigned, Text> models;    ///< tool model code to name; only known codes match
+  unsigned firmware_below = 0;     ///< the profile's register map ends here; 0: no such limit
 };
 
 /// What one tool says of itself.

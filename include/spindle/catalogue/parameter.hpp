@@ -8,6 +8,8 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
+#include "spindle/catalogue/list.hpp"
+#include "spindle/catalogue/text.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::catalogue {
@@ -54,7 +56,7 @@ enum class Hazard : std::uint8_t {
 /// Meaning of one number of an enumeration.
 struct Label {
   std::int64_t number = 0;
-  std::string text;
+  Text text;
 };
 
 /// Allowed values in units of the parameter (already scaled), inclusive. Either side may be
@@ -84,39 +86,42 @@ enum class Notation : std::uint8_t {
 /// Name of one bit of a bit field.
 struct BitName {
   std::uint8_t bit = 0;  ///< 0: the lowest
-  std::string text;
+  Text text;
   /// The name counts only while `Parameter::bits_by` has this value; empty: always.
   std::optional<std::int64_t> when = std::nullopt;
 };
 
 /// One entry of the catalogue.
 struct Parameter {
-  std::string name;   ///< "preset.1.target-torque", "p242", "@holding:2"
-  std::string title;  ///< what it is, for people
+  Text name;   ///< "preset.1.target-torque", "p242", "@holding:2"
+  Text title;  ///< what it is, for people
   modbus::RegisterTable table = modbus::RegisterTable::holding;
   modbus::RegisterAddress address = {};
   Encoding encoding = {};
-  std::string unit;  ///< "%", "rpm", "deg"; "torque" stands for the tool's own torque unit
+  Text unit;  ///< "%", "rpm", "deg"; "torque" stands for the tool's own torque unit
   Range range = {};
   std::optional<Range> except = std::nullopt;  ///< a hole in the range, both sides known
   std::optional<Decimal> default_value = std::nullopt;
-  std::vector<Label> labels = {};
-  std::vector<BitName> bits = {};  ///< of a bit field
-  std::string bits_by = {};        ///< parameter whose value decides between names; may be empty
+  List<Label> labels = {};
+  List<BitName> bits = {};  ///< of a bit field
+  Text bits_by = {};        ///< parameter whose value decides between names; may be empty
   Notation notation = Notation::decimal;
   Access access = Access::read_only;
   Cloning cloning = Cloning::allowed;
   Secrecy secrecy = Secrecy::open;
   Reading reading = Reading::harmless;
   Evidence evidence = Evidence::inferred;
-  std::string source;  ///< document and section
-  std::string note;  ///< what a user should know, such as when a change takes effect; may be empty
+  Text source;  ///< document and section
+  Text note;    ///< what a user should know, such as when a change takes effect; may be empty
   std::optional<Effect> effect = std::nullopt;  ///< empty: the profile does not speak of it
-  std::string risk = {};  ///< what a change may cost, told before it is written; may be empty
+  Text risk = {};  ///< what a change may cost, told before it is written; may be empty
   /// How long a written value may take until it reads back; empty: as `LinkFacts::settle` says.
   std::optional<Duration> settle = std::nullopt;
   Hazard hazard = Hazard::none;  ///< declared; danger_of() says what counts
 };
+
+/// The same texts, where strings are asked for.
+std::vector<std::string> to_strings(const List<Text>& texts);
 
 /// The bit field with only the names that count while `bits_by` has this value; empty: not known,
 /// so only names that always count.

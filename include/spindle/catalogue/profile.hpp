@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,7 +21,7 @@ struct Area {
   modbus::RegisterTable table = modbus::RegisterTable::holding;
   std::uint16_t from = 0;
   std::uint16_t to = 0;
-  std::string note = {};
+  Text note = {};
 };
 
 /// Silence that a serial server needs before a frame at rates up to `up_to_baud` (0: any rate above
@@ -36,7 +35,7 @@ struct SerialFacts {
   unsigned baud = 9600;
   char parity = 'E';  ///< 'N', 'E' or 'O'
   unsigned stop_bits = 1;
-  std::vector<GapRule> gaps = {};
+  List<GapRule> gaps = {};
   Duration broadcast_pause = {};  ///< on top of the gap
 };
 
@@ -68,8 +67,8 @@ struct LinkFacts {
   bool any_unit = false;    ///< TCP: answers may carry another unit identifier than was asked
   bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
   SerialFacts serial = {};
-  std::vector<Area> contiguous = {};  ///< registers may be read along here
-  std::vector<Area> absent = {};      ///< registers said not to exist
+  List<Area> contiguous = {};  ///< registers may be read along here
+  List<Area> absent = {};      ///< registers said not to exist
 };
 
 /// Whether a value of this kind can be written. Error `usage`: values of 32 bits are never split
@@ -114,8 +113,8 @@ struct Arming {
 
 /// A column of a table or of CSV: what one parameter of the event block says.
 struct EventColumn {
-  std::string heading;
-  std::string parameter;
+  Text heading;
+  Text parameter;
   std::uint16_t width = 0;  ///< cells that a table keeps free for it
 };
 
@@ -127,12 +126,12 @@ struct EventFacts {
   std::uint16_t first = 0;                   ///< first register of the block
   std::uint16_t count = 0;  ///< registers in the block; a frame has 2 × count data bytes
   /// Parameter that counts events up. Stands in the block; may be empty for a `flag`.
-  std::string number;
-  std::string flag = {};  ///< of `flag`: parameter that is not 0 when there is a new result
-  std::string kind;       ///< parameter whose value names the kind
-  std::map<std::int64_t, EventKind> kinds = {};
-  std::string error = {};  ///< parameter of the block that the error codes explain; may be empty
-  std::vector<EventColumn> columns = {};
+  Text number;
+  Text flag = {};  ///< of `flag`: parameter that is not 0 when there is a new result
+  Text kind;       ///< parameter whose value names the kind
+  Table<std::int64_t, EventKind> kinds = {};
+  Text error = {};  ///< parameter of the block that the error codes explain; may be empty
+  List<EventColumn> columns = {};
   std::optional<Duration> interval = std::nullopt;  ///< between two polls; empty: as usual
 };
 
@@ -149,13 +148,13 @@ struct LimitFacts {
 
 /// Parameters that exist by number only.
 struct NumberedFacts {
-  std::string prefix;
+  Text prefix;
   modbus::RegisterTable table = modbus::RegisterTable::holding;
   std::uint16_t from = 0;
   std::uint16_t to = 0;
   Access access = Access::read_only;
   Evidence evidence = Evidence::inferred;
-  std::string source;
+  Text source;
 };
 
 /// What an action does to a product that is run by a command word.
@@ -170,8 +169,8 @@ struct Preparation {
 
 /// A deed, as opposed to a stored value: a write that makes the tool do something.
 struct Action {
-  std::string name;
-  std::string title;
+  Text name;
+  Text title;
   modbus::RegisterAddress address = {};
   Kind kind = Kind::u16;                              ///< of the value; a pair is sent whole
   std::optional<std::uint16_t> value = std::nullopt;  ///< fixed value; empty: the user gives one
@@ -179,7 +178,7 @@ struct Action {
   std::uint16_t minimum = 0;                               ///< of a given value
   std::uint16_t maximum = 0;
   bool has_range = false;  ///< numbers from minimum to maximum may be given beside the labels
-  std::vector<Label> labels = {};
+  List<Label> labels = {};
   Motion motion = Motion::none;  ///< the words are those of RunFacts
   /// The register acts when its value changes to `value`: this is written before it and behind it.
   std::optional<std::uint16_t> rest = std::nullopt;
@@ -187,13 +186,13 @@ struct Action {
   Duration busy = {};  ///< how long the tool may be busy with it; zero: not at all
   Hazard hazard = Hazard::none;
   Evidence evidence = Evidence::inferred;
-  std::string source;
-  std::string note = {};  ///< what a user should know before sending it; may be empty
+  Text source;
+  Text note = {};  ///< what a user should know before sending it; may be empty
   /// Parameter that says what a value stands for, with {n} in place of the value; may be empty.
-  std::string tells = {};
-  std::vector<Label> effects = {};  ///< what a value does to whoever works with the tool, in words
-  std::string check;                ///< how to verify the assignment on the tool; one sentence
-  std::string confirm;  ///< parameter whose reading proves the effect; empty: nothing can
+  Text tells = {};
+  List<Label> effects = {};  ///< what a value does to whoever works with the tool, in words
+  Text check;                ///< how to verify the assignment on the tool; one sentence
+  Text confirm;              ///< parameter whose reading proves the effect; empty: nothing can
   /// Reading that proves it; empty: the value written.
   std::optional<std::int64_t> confirm_value = std::nullopt;
 };
@@ -203,14 +202,14 @@ enum class Resettable : std::uint8_t { unknown, yes, no };
 
 /// Meaning of one code: alarm, error, exception.
 struct CodeText {
-  std::string text;
-  std::string remedy;
+  Text text;
+  Text remedy;
   Evidence evidence = Evidence::inferred;
-  std::string source;
+  Text source;
   Resettable resettable = Resettable::unknown;
 };
 
-using CodeTexts = std::map<std::int64_t, CodeText>;
+using CodeTexts = Table<std::int64_t, CodeText>;
 
 /// Which table explains the codes of a list.
 enum class CodeTable : std::uint8_t {
@@ -228,9 +227,9 @@ struct CodeTables {
 
 /// What a product says, in a register of its own, of the exception response that it sent last.
 struct RefusalFacts {
-  std::string parameter = {};
+  Text parameter = {};
   CodeTexts codes = {};
-  std::vector<std::int64_t> busy = {};  ///< codes of a tool that only has to be waited for
+  List<std::int64_t> busy = {};  ///< codes of a tool that only has to be waited for
   Duration retry_every = {};
   Duration give_up_after = {};
 
@@ -239,63 +238,64 @@ struct RefusalFacts {
 
 /// One list of codes that `alarms` shows.
 struct AlarmList {
-  std::string name;                     ///< "present", "alarm-history"
-  std::vector<std::string> parameters;  ///< names or patterns, the newest first
+  Text name;              ///< "present", "alarm-history"
+  List<Text> parameters;  ///< names or patterns, the newest first
   CodeTable codes = CodeTable::error;
 };
 
 /// A start state for the simulated tool. Patterns are globs over the names of named and numbered
 /// parameters; later entries win.
 struct SimulationFacts {
-  Bytes identity = {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
+  List<std::uint8_t> identity =
+      {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
   std::size_t identity_bytes = 0;  ///< how many of them the tool sends unless told otherwise
   /// Exception code that answers a write outside the limits.
   std::uint8_t limit_exception =
       static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_value);
   std::uint16_t stopped_error = 0;  ///< error code of a run that was stopped before its target
-  std::vector<std::int64_t> permanent_alarms = {};  ///< that only switching off and on ends
+  List<std::int64_t> permanent_alarms = {};  ///< that only switching off and on ends
   struct Value {
-    std::string pattern;
+    Text pattern;
     std::int64_t raw = 0;
   };
   struct Limits {
-    std::string pattern;
+    Text pattern;
     std::int64_t minimum = 0;  ///< raw
     std::int64_t maximum = 0;  ///< raw
   };
   /// What the event block says of an event of one kind, beside its number and kind.
   struct Event {
     EventKind kind = EventKind::other;
-    std::vector<Value> values = {};  ///< by name
+    List<Value> values = {};  ///< by name
   };
-  std::vector<Value> values = {};
-  std::vector<Limits> limits = {};
-  std::vector<Event> events = {};
-  std::vector<Area> absent = {};  ///< registers that answer exception 02
+  List<Value> values = {};
+  List<Limits> limits = {};
+  List<Event> events = {};
+  List<Area> absent = {};  ///< registers that answer exception 02
 };
 
 /// The catalogue of one product: how to talk to it and what its registers mean.
 class Profile {
  public:
-  std::string id;
-  std::string title;
-  std::string maker;
-  std::string series;
-  std::string path;                     ///< file it came from
-  std::vector<std::string> bases = {};  ///< ids of the profiles that it extends, the nearest first
+  Text id;
+  Text title;
+  Text maker;
+  Text series;
+  Text path;              ///< file it came from
+  List<Text> bases = {};  ///< ids of the profiles that it extends, the nearest first
   LinkFacts link;
   std::optional<IdentityFacts> identity;
   std::optional<EventFacts> events;
   std::optional<LimitFacts> limits;
   std::optional<NumberedFacts> numbered;
-  std::vector<Parameter> parameters;
-  std::vector<Action> actions;
+  List<Parameter> parameters;
+  List<Action> actions;
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
   std::optional<RunFacts> run = std::nullopt;  ///< how it is started and stopped; may be missing
   std::optional<RefusalFacts> refusals = std::nullopt;
-  std::vector<AlarmList> alarm_lists = {};
-  std::string alarm_reset = {};           ///< action that resets an alarm; empty: none does
-  std::vector<std::string> watched = {};  ///< values that `watch` polls unless others are named
+  List<AlarmList> alarm_lists = {};
+  Text alarm_reset = {};           ///< action that resets an alarm; empty: none does
+  List<Text> watched = {};  ///< values that `watch` polls unless others are named
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; `usage` for one

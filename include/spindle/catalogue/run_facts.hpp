@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,15 +31,15 @@ struct InputFunction {
   /// The bit that has this function in the words of the profile; empty: it does nothing.
   std::optional<std::uint8_t> bit = std::nullopt;
   Evidence evidence = Evidence::inferred;
-  std::string source = {};
+  Text source = {};
 };
 
 /// Where a driver keeps what each bit of its command word does.
 struct InputFacts {
-  std::string parameter = {};  ///< with {n}, the number of the bit; empty: the bits are fixed
-  std::uint16_t first = 0;     ///< bits from
-  std::uint16_t last = 0;      ///< to
-  std::vector<InputFunction> functions = {};
+  Text parameter = {};      ///< with {n}, the number of the bit; empty: the bits are fixed
+  std::uint16_t first = 0;  ///< bits from
+  std::uint16_t last = 0;   ///< to
+  List<InputFunction> functions = {};
 
   [[nodiscard]] const InputFunction* find(std::int64_t number) const;
 };
@@ -77,38 +76,38 @@ class CommandBits {
 
 /// What a motor says of itself. Names are those of parameters; an empty one: it does not say it.
 struct MonitorFacts {
-  std::string status = {};
+  Text status = {};
   std::optional<std::uint8_t> running = std::nullopt;   ///< bit of the status; empty: its values
-  std::vector<std::int64_t> running_values = {};        ///< values of a status that says "runs"
-  std::vector<std::int64_t> stopped_values = {};        ///< and of one that says "stands still"
+  List<std::int64_t> running_values = {};        ///< values of a status that says "runs"
+  List<std::int64_t> stopped_values = {};        ///< and of one that says "stands still"
   std::optional<std::uint8_t> at_speed = std::nullopt;  ///< bit: the speed asked for is reached
   std::optional<std::uint8_t> busy = std::nullopt;      ///< bit: internal processing
-  std::string command_speed = {};   ///< signed; 0 when the motor is told to stand still
-  std::string feedback_speed = {};  ///< signed where the motor tells its direction
-  std::string load = {};
-  std::string alarm = {};    ///< present alarm; 0: none
-  std::string warning = {};  ///< present warning; 0: none
+  Text command_speed = {};   ///< signed; 0 when the motor is told to stand still
+  Text feedback_speed = {};  ///< signed where the motor tells its direction
+  Text load = {};
+  Text alarm = {};    ///< present alarm; 0: none
+  Text warning = {};  ///< present warning; 0: none
 };
 
 /// An option of a start, and the action that it gives a value to before.
 struct StartOption {
-  std::string option = {};  ///< "preset", as typed behind two hyphens
-  std::string action = {};
+  Text option = {};  ///< "preset", as typed behind two hyphens
+  Text action = {};
 };
 
 /// How a product is run that starts by an action with a `stop`, and ends by itself.
 struct StartActionFacts {
-  std::string start = {};                    ///< the action; its `confirm` says whether it runs
-  std::vector<StartOption> selections = {};  ///< what may be selected before, in this order
-  std::string alarm = {};                    ///< present alarm; 0: none
+  Text start = {};                    ///< the action; its `confirm` says whether it runs
+  List<StartOption> selections = {};  ///< what may be selected before, in this order
+  Text alarm = {};                    ///< present alarm; 0: none
 };
 
 /// How a product is run whose motor follows a command word: a level, which holds until it is told
 /// otherwise. Names are those of parameters; of a 32-bit one the word is the low half.
 struct CommandWordFacts {
-  std::string command = {};  ///< the command word
-  std::string mode = {};     ///< parameter whose value decides what the bits of the word mean
-  std::map<std::int64_t, RunWords> modes = {};
+  Text command = {};  ///< the command word
+  Text mode = {};     ///< parameter whose value decides what the bits of the word mean
+  Table<std::int64_t, RunWords> modes = {};
   /// Bits of which every motion needs at least one, whatever the mode: a word without them never
   /// moves a motor.
   std::uint16_t starting = 0;
@@ -120,23 +119,23 @@ struct CommandWordFacts {
 
   MonitorFacts monitor = {};  ///< with all bits of the status, both speeds and the alarm
 
-  std::string speed = {};         ///< of operation data {n}; its range is that of the parameter
-  std::string acceleration = {};  ///< time, seconds
-  std::string deceleration = {};  ///< time, seconds
-  std::uint16_t first = 0;        ///< operation data from
-  std::uint16_t last = 0;         ///< to
-  std::uint16_t preferred = 0;    ///< used unless the user names another
+  Text speed = {};              ///< of operation data {n}; its range is that of the parameter
+  Text acceleration = {};       ///< time, seconds
+  Text deceleration = {};       ///< time, seconds
+  std::uint16_t first = 0;      ///< operation data from
+  std::uint16_t last = 0;       ///< to
+  std::uint16_t preferred = 0;  ///< used unless the user names another
 
   /// While this parameter is not `digital`, operation data up to `analog_to` have their speed from
   /// outside.
-  std::string analog = {};
+  Text analog = {};
   std::int64_t digital = 0;
   std::uint16_t analog_to = 0;
 
-  std::string watchdog = {};  ///< time without a query after which the driver stops; 0: never
+  Text watchdog = {};  ///< time without a query after which the driver stops; 0: never
   /// Parameter with the address of the driver whose group this one belongs to; may be empty. Writes
   /// of several registers to that driver reach this one too, and writes of one do not.
-  std::string group = {};
+  Text group = {};
 
   /// The word that selects operation data.
   [[nodiscard]] std::uint16_t selecting(std::uint16_t number) const;
@@ -144,22 +143,22 @@ struct CommandWordFacts {
 
 /// What lets a motor follow its command register: a value, or one bit.
 struct EnableFacts {
-  std::string parameter = {};                      ///< empty: nothing has to be enabled
+  Text parameter = {};                      ///< empty: nothing has to be enabled
   std::optional<std::uint8_t> bit = std::nullopt;  ///< set beside the other bits
   std::uint32_t value = 0;                         ///< written where there is no bit
 };
 
 /// How a product is run by values of one register of 16 or 32 bits. Names are those of parameters.
 struct CommandRegisterFacts {
-  std::string command = {};
+  Text command = {};
   std::uint32_t forward = 0;
   std::optional<std::uint32_t> reverse = std::nullopt;  ///< empty: it turns one way only
   std::optional<std::uint32_t> stop = std::nullopt;     ///< empty: only `stop_register` stops it
   std::optional<std::uint32_t> instant = std::nullopt;  ///< stops harder than `stop`
-  std::string stop_register = {};  ///< another register that stops it; may be empty
+  Text stop_register = {};  ///< another register that stops it; may be empty
   std::uint32_t stop_value = 0;
   EnableFacts enable = {};
-  std::string set_point = {};  ///< how fast, in its own unit; may be empty
+  Text set_point = {};  ///< how fast, in its own unit; may be empty
   MonitorFacts monitor = {};   ///< without a status and a speed nothing proves a standstill
   Duration stopping = std::chrono::seconds(10);  ///< how long a stop may take at most
 };
@@ -174,10 +173,10 @@ std::string_view to_text(RunKind kind);
 struct RunFacts {
   std::variant<StartActionFacts, CommandWordFacts, CommandRegisterFacts> model = CommandWordFacts{};
   /// What to look at when a stop is not confirmed, as one sentence; may be empty.
-  std::string still_runs = {};
-  std::string alarm_reset = {};  ///< action that ends an alarm; may be empty
+  Text still_runs = {};
+  Text alarm_reset = {};  ///< action that ends an alarm; may be empty
   Evidence evidence = Evidence::inferred;
-  std::string source = {};
+  Text source = {};
 
   [[nodiscard]] RunKind kind() const { return static_cast<RunKind>(model.index()); }
   [[nodiscard]] const CommandWordFacts* word() const {
@@ -195,6 +194,6 @@ struct RunFacts {
 };
 
 /// "operation.{n}.speed" with the number in its place.
-std::string numbered_name(const std::string& pattern, std::uint16_t number);
+std::string numbered_name(std::string_view pattern, std::uint16_t number);
 
 }  // namespace spindle::catalogue

@@ -24,6 +24,7 @@ struct World {
   std::function<std::optional<std::string>(std::string_view name)> environment;
   Disk disk;
   Installation installation;
+  files::ShippedProfiles shipped = {};  ///< the profiles of the program
 };
 
 /// The whole program: parses the arguments (without the program's name), runs one command, and
