@@ -148,7 +148,8 @@ const std::string* nearest_by(std::string_view word, const std::vector<std::stri
 bool glob_match(std::string_view pattern, std::string_view text) {
   // Most names differ from a pattern already at an end of it.
   constexpr std::string_view special = "*?[]";
-  while (!pattern.empty() && !text.empty() && special.find(pattern.back()) == std::string_view::npos) {
+  while (!pattern.empty() && !text.empty() &&
+         special.find(pattern.back()) == std::string_view::npos) {
     if (pattern.back() != text.back()) return false;
     pattern.remove_suffix(1);
     text.remove_suffix(1);

@@ -123,8 +123,7 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   for (const auto& label : parameter.labels) {
     labels.emplace_back(std::to_string(label.number), label.text);
   }
-  report::Record record{
-      .type = "parameter", .target = target, .time = clock.wall(), .fields = {}};
+  report::Record record{.type = "parameter", .target = target, .time = clock.wall(), .fields = {}};
   constexpr std::size_t most_fields = 24;  // a list is long: each record is made in one piece
   record.fields.reserve(most_fields);
   const auto add = [&](const char* key, report::Cell&& cell, std::string&& shown = {}) {

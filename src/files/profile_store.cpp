@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 
 #include "files/profile_file.hpp"
 #include "files/profile_rules.hpp"
@@ -54,11 +55,15 @@ struct Chain {
   [[nodiscard]] const Layer& front() const { return *layers.front(); }
 };
 
-/// Where profiles are looked for.
+/// Where profiles are looked for, and what was found there: files are compared with the profiles of
+/// the program once.
 struct Places {
   std::vector<std::string> folders;
   ReadText read;
   ShippedProfiles shipped;
+  mutable std::mutex mutex = {};  ///< of what was found
+  mutable std::map<std::string, const ShippedProfile*> compared = {};
+  mutable std::optional<std::vector<ProfileEntry>> listed = std::nullopt;
 };
 
 /// Whether profiles of the program are used where their files would say the same.
@@ -80,15 +85,28 @@ std::optional<std::string> locate_base(const std::string& file, std::string_view
 
 /// The profile of the program that was made from this file and from those that it extends; null
 /// when there is none. A file that can not be read is none of them: who needs it is told why.
-const ShippedProfile* shipped_as(const std::string& path, const Places& places) {
-  const ShippedProfile* shipped =
-      find(places.shipped, std::filesystem::path(path).stem().string());
+const ShippedProfile* shipped_as(const std::string& path, const Places& places);
+
+const ShippedProfile* compare(const std::string& path, const Places& places) {
+  const ShippedProfile* shipped = find(places.shipped, std::filesystem::path(path).stem().string());
   if (shipped == nullptr) return nullptr;
   const auto text = places.read(path);
   if (!text || *text != shipped->yaml) return nullptr;
   if (shipped->extends.empty()) return shipped;
   const auto base = locate_base(path, shipped->extends, places.folders);
   return !base || shipped_as(*base, places) != nullptr ? shipped : nullptr;
+}
+
+const ShippedProfile* shipped_as(const std::string& path, const Places& places) {
+  {
+    const std::lock_guard lock(places.mutex);
+    if (const auto known = places.compared.find(path); known != places.compared.end()) {
+      return known->second;
+    }
+  }
+  const ShippedProfile* shipped = compare(path, places);
+  const std::lock_guard lock(places.mutex);
+  return places.compared.emplace(path, shipped).first->second;
 }
 
 bool same_file(const std::string& a, const std::string& b) {
@@ -149,10 +167,10 @@ std::optional<Base> next_of(const Chain& chain, const Places& places, Tables tab
     findings.add(head.extends_at, fmt::format("base profile '{}' is not found", head.extends));
     return std::nullopt;
   }
-  const bool cycle =
-      !base->path.empty() &&
-      std::any_of(chain.layers.begin(), chain.layers.end(),
-                  [&](const Layer* layer) { return same_file(layer->path, base->path); });
+  const bool cycle = !base->path.empty() &&
+                     std::any_of(chain.layers.begin(), chain.layers.end(), [&](const Layer* layer) {
+                       return same_file(layer->path, base->path);
+                     });
   if (cycle || chain.layers.size() == deepest_chain) {
     findings.add(head.extends_at,
                  cycle ? fmt::format("'{}' extends itself in the end", head.extends)
@@ -256,17 +274,28 @@ bool is_abstract(const std::string& path, const Places& places) {
   return layer && (*layer)->head.abstract;
 }
 
-std::vector<ProfileEntry> list_profiles(const Places& places) {
+std::vector<ProfileEntry> look_for_profiles(const Places& places) {
   std::map<std::string, std::string> files = profile_files(places.folders);
   for (const ShippedProfile& shipped : places.shipped) {
     files.try_emplace(std::string(shipped.id), built_in);
   }
   std::vector<ProfileEntry> entries;
   for (auto& [id, path] : files) {
-    const bool abstract = path == built_in ? find(places.shipped, id)->is_abstract
-                                           : is_abstract(path, places);
+    const bool abstract =
+        path == built_in ? find(places.shipped, id)->is_abstract : is_abstract(path, places);
     if (!abstract) entries.push_back({id, path});
   }
+  return entries;
+}
+
+std::vector<ProfileEntry> list_profiles(const Places& places) {
+  {
+    const std::lock_guard lock(places.mutex);
+    if (places.listed) return *places.listed;
+  }
+  std::vector<ProfileEntry> entries = look_for_profiles(places);
+  const std::lock_guard lock(places.mutex);
+  places.listed = entries;
   return entries;
 }
 
@@ -383,14 +412,15 @@ bool names_profile_file(std::string_view text) {
 }
 
 const ShippedProfile* find(ShippedProfiles shipped, std::string_view id) {
-  const auto found =
-      std::lower_bound(shipped.begin(), shipped.end(), id,
-                       [](const ShippedProfile& one, std::string_view name) { return one.id < name; });
+  const auto found = std::lower_bound(
+      shipped.begin(), shipped.end(), id,
+      [](const ShippedProfile& one, std::string_view name) { return one.id < name; });
   return found == shipped.end() || found->id != id ? nullptr : &*found;
 }
 
 struct ProfileStore::Memory {
-  explicit Memory(Places looked_in) : places(std::move(looked_in)) {}
+  Memory(std::vector<std::string> folders, ReadText read, ShippedProfiles shipped)
+      : places{std::move(folders), std::move(read), shipped} {}
 
   Places places;
   std::mutex mutex = {};
@@ -413,7 +443,7 @@ struct ProfileStore::Memory {
 };
 
 ProfileStore::ProfileStore(std::vector<std::string> folders, ReadText read, ShippedProfiles shipped)
-    : memory_(std::make_unique<Memory>(Places{std::move(folders), std::move(read), shipped})) {}
+    : memory_(std::make_unique<Memory>(std::move(folders), std::move(read), shipped)) {}
 ProfileStore::ProfileStore(ProfileStore&&) noexcept = default;
 ProfileStore& ProfileStore::operator=(ProfileStore&&) noexcept = default;
 ProfileStore::~ProfileStore() = default;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <iterator>
 #include <utility>
 
@@ -12,8 +14,18 @@
 namespace spindle::report {
 namespace {
 
-/// Whether every byte is a printable character of ASCII, one cell wide.
+/// Whether every byte is a printable character of ASCII, one cell wide. Nearly all that is shown
+/// is, so eight bytes are looked at at once: the highest bit of a byte is set in one of these three
+/// when it is above 7Fh, below 20h, or 7Fh.
 bool is_plain(std::string_view text) {
+  constexpr std::uint64_t ones = 0x0101010101010101;
+  std::uint64_t found = 0;
+  for (; text.size() >= sizeof found; text.remove_prefix(sizeof found)) {
+    std::uint64_t bytes = 0;
+    std::memcpy(&bytes, text.data(), sizeof bytes);
+    found |= bytes | (bytes - ones * ' ') | (bytes + ones);
+  }
+  if ((found & (ones * 0x80)) != 0) return false;
   return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
 }
 
@@ -80,8 +92,10 @@ std::string fitted(std::string_view text, std::size_t cells, Keep keep) {
   return std::string(text.substr(0, kept)).append(mark);
 }
 
-std::string printable(std::string&& text, LineBreaks breaks) {
-  return is_plain(text) ? std::move(text) : printable(std::string_view(text), breaks);
+Cells to_cells(std::string text) {
+  if (is_plain(text)) return {.width = text.size(), .text = std::move(text)};
+  std::string shown = printable(text, LineBreaks::fold);
+  return {.width = display_width(shown), .text = std::move(shown)};
 }
 
 std::string printable(std::string_view text, LineBreaks breaks) {

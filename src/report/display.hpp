@@ -25,7 +25,14 @@ enum class LineBreaks : std::uint8_t { fold, keep };
 /// Text that cannot steer a terminal or hide anything: every other control character and every
 /// invisible one is shown as `\x1b` or `\u202e` is, and ill-formed UTF-8 as U+FFFD.
 std::string printable(std::string_view text, LineBreaks breaks);
-std::string printable(std::string&& text, LineBreaks breaks);
+
+/// What stands in a cell of a table, and how many cells of a terminal it takes.
+struct Cells {
+  std::size_t width = 0;
+  std::string text;
+};
+/// Text that is harmless, on one line.
+Cells to_cells(std::string text);
 
 /// What people see of a record under a column's key: the field's `shown`, else its cell; "target",
 /// "time" and "type" are the record's own. Empty when the record has no such field.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numeric>
 
 #include "display.hpp"
 #include "renderers.hpp"
@@ -7,12 +8,8 @@ namespace spindle::report {
 namespace {
 
 struct Drawn {
-  explicit Drawn(std::string shown, Tone its_tone = Tone::plain)
-      : text(std::move(shown)), width(display_width(text)), tone(its_tone) {}
-
-  std::string text;
-  std::size_t width;
-  Tone tone;
+  Cells cells;
+  Tone tone = Tone::plain;
 };
 using Row = std::vector<Drawn>;
 
@@ -25,7 +22,7 @@ constexpr std::string_view plain = "\x1b[0m";
 void append_colored(std::string& line, const Drawn& cell, Color color) {
   const bool is_colored = color != Color::off && cell.tone != Tone::plain;
   if (is_colored) line += cell.tone == Tone::good ? green : red;
-  line += cell.text;
+  line += cell.cells.text;
   if (is_colored) line += plain;
 }
 
@@ -33,10 +30,10 @@ void append_colored(std::string& line, const Drawn& cell, Color color) {
 void draw(const Row& row, std::span<const Column> columns, std::span<const std::size_t> widths,
           Color color, std::string& out) {
   std::size_t used = row.size();
-  while (used > 0 && row[used - 1].text.empty()) --used;
+  while (used > 0 && row[used - 1].cells.text.empty()) --used;
   for (std::size_t index = 0; index < used; ++index) {
     if (index != 0) out += gap;
-    const std::size_t width = row[index].width;
+    const std::size_t width = row[index].cells.width;
     const std::size_t padding = widths[index] > width ? widths[index] - width : 0;
     const bool is_right = columns[index].align == Align::right;
     if (is_right) out.append(padding, ' ');
@@ -67,8 +64,8 @@ class TableRenderer final : public PlainRenderer {
     row.reserve(columns_.size());
     for (const Column& column : columns_) {
       const Field* const field = record.find(column.key);
-      row.emplace_back(printable(shown_text(record, column.key, field), LineBreaks::fold),
-                       field == nullptr ? Tone::plain : field->tone);
+      row.push_back({to_cells(shown_text(record, column.key, field)),
+                     field == nullptr ? Tone::plain : field->tone});
     }
     rows_.push_back(std::move(row));
     return is_live() ? flush() : Result<void>{};
@@ -92,13 +89,13 @@ class TableRenderer final : public PlainRenderer {
 
   void widen(const Row& row) {
     for (std::size_t index = 0; index < row.size(); ++index) {
-      widths_[index] = std::max(widths_[index], row[index].width);
+      widths_[index] = std::max(widths_[index], row[index].cells.width);
     }
   }
 
   void add_header(std::string& text) {
     Row titles;
-    for (const Column& column : columns_) titles.emplace_back(column.title);
+    for (const Column& column : columns_) titles.push_back({to_cells(column.title)});
     const bool is_bold = streams().color != Color::off;
     if (is_bold) text += bold;
     draw(titles, columns_, widths_, Color::off, text);
@@ -108,6 +105,8 @@ class TableRenderer final : public PlainRenderer {
   Result<void> flush() {
     if (rows_.empty() || columns_.empty()) return {};
     std::string text;
+    text.reserve((rows_.size() + 1) *
+                 std::accumulate(widths_.begin(), widths_.end(), std::size_t{}));
     if (heading_ == Heading::another) text += '\n';
     if (heading_ != Heading::drawn) add_header(text);
     for (const Row& row : rows_) draw(row, columns_, widths_, streams().color, text);

@@ -1,5 +1,5 @@
-// Makes the profiles of a folder part of the program: `spindle_tables FOLDER OUTPUT.cpp`. A fault of
-// a profile ends it with file:line:column, as a compiler does.
+// Makes the profiles of a folder part of the program: `spindle_tables FOLDER OUTPUT.cpp`. A fault
+// of a profile ends it with file:line:column, as a compiler does.
 
 #include <fmt/format.h>
 
@@ -87,8 +87,10 @@ int write_tables(const std::string& folder, const std::string& output) {
           "#include \"spindle/shipped/profiles.hpp\"\n\n"
           "namespace spindle::shipped {\nnamespace {\n\nusing catalogue::Text;\n\n"
        << writer.source() << "\nconstexpr files::ShippedProfile table[] = {\n"
-       << rows << "};\n\n}  // namespace\n\n"
-          "files::ShippedProfiles profiles() { return table; }\n\n}  // namespace spindle::shipped\n";
+       << rows
+       << "};\n\n}  // namespace\n\n"
+          "files::ShippedProfiles profiles() { return table; }\n\n}  // namespace "
+          "spindle::shipped\n";
   file.close();
   if (!file) fmt::print(stderr, "{}: cannot be written\n", output);
   return file ? 0 : 1;

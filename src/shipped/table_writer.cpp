@@ -81,9 +81,9 @@ std::string TableWriter::expression(const T& value) {
         [&](const auto& one) { return fmt::format("{}({})", type_name<T>(), expression(one)); },
         value);
   } else if constexpr (IsList<T>::value) {
-    return value.empty() ? fmt::format("{}()", type_name<T>())
-                         : fmt::format("{}({})", type_name<T>(),
-                                       array_of(value.begin(), value.size()));
+    return value.empty()
+               ? fmt::format("{}()", type_name<T>())
+               : fmt::format("{}({})", type_name<T>(), array_of(value.begin(), value.size()));
   } else {
     std::string members;
     std::apply([&](const auto&... member) { ((members += expression(member) + ", "), ...); },

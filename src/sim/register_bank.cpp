@@ -93,14 +93,15 @@ std::optional<std::pair<RegisterTable, std::uint16_t>> RegisterBank::place_of(
 }
 
 std::optional<RegisterBank::Place> RegisterBank::find(std::string_view name) const {
-  const auto named =
-      std::lower_bound(named_.begin(), named_.end(), name,
-                       [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
+  const auto named = std::lower_bound(
+      named_.begin(), named_.end(), name,
+      [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
   if (named != named_.end() && named->name == name) return named->place;
   if (!numbered_ || !name.starts_with(numbered_->prefix)) return std::nullopt;
   const std::string_view digits = name.substr(numbered_->prefix.size());
   const auto number = parse_unsigned(digits, numbered_->to);
-  const bool is_one = number && *number >= numbered_->from && (digits.size() == 1 || digits[0] != '0');
+  const bool is_one =
+      number && *number >= numbered_->from && (digits.size() == 1 || digits[0] != '0');
   if (!is_one) return std::nullopt;
   return Place{numbered_->table, static_cast<std::uint16_t>(*number), Kind::u16};
 }
@@ -165,9 +166,9 @@ std::vector<RegisterBank::Place> RegisterBank::matching(std::string_view pattern
     if (const auto place = find(pattern)) found.push_back(*place);
     return found;
   }
-  auto named =
-      std::lower_bound(named_.begin(), named_.end(), head,
-                       [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
+  auto named = std::lower_bound(
+      named_.begin(), named_.end(), head,
+      [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
   for (; named != named_.end() && named->name.starts_with(head); ++named) {
     if (glob_match(pattern, named->name)) found.push_back(named->place);
   }

@@ -1,5 +1,3 @@
-#include "spindle/shipped/profiles.hpp"
-
 #include <doctest/doctest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 
 #include "spindle/catalogue/fields.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/shipped/profiles.hpp"
 #include "support/temporary_folder.hpp"
 
 using namespace spindle;
@@ -51,7 +50,9 @@ class Comparison {
   template <typename... T>
   void compare(const std::variant<T...>& a, const std::variant<T...>& b, const std::string& where) {
     if (a.index() != b.index()) return differences.push_back(where);
-    std::visit([&](const auto& left) { compare(left, std::get<std::decay_t<decltype(left)>>(b), where); }, a);
+    std::visit(
+        [&](const auto& left) { compare(left, std::get<std::decay_t<decltype(left)>>(b), where); },
+        a);
   }
   template <typename T>
   void compare(const List<T>& a, const List<T>& b, const std::string& where) {
@@ -124,7 +125,8 @@ TEST_CASE("the tables of the program say what the YAML files say, entry by entry
     const auto simulation =
         comparison(store.load_simulation(file.path().string()).value(), *table->simulation);
     CHECK(simulation.differences == std::vector<std::string>());
-    const auto codes = comparison(store.load_code_tables(file.path().string()).value(), *table->codes);
+    const auto codes =
+        comparison(store.load_code_tables(file.path().string()).value(), *table->codes);
     CHECK(codes.differences == std::vector<std::string>());
   }
   CHECK(files == shipped.size());
@@ -194,7 +196,8 @@ TEST_CASE("a user's profile extends one of the program as it extends its file") 
   const std::vector<std::string> bodies = {
       "format: 1\nextends: doga-bm\nid: mine\ntitle: Mine\nlink:\n  port: 4711\n",
       "format: 1\nextends: orientalmotor-blv\nid: mine\ntitle: Mine\nparameters:\n"
-      "  - {name: extra, title: Extra, register: 8192, encoding: u16, access: rw, evidence: manual, source: me}\n"
+      "  - {name: extra, title: Extra, register: 8192, encoding: u16, access: rw, evidence: "
+      "manual, source: me}\n"
       "  - {name: operation.0.speed, title: Other, register: 1152, encoding: u32, access: rw, "
       "evidence: manual, source: me}\n"};
   for (const std::string& body : bodies) {
@@ -211,9 +214,9 @@ TEST_CASE("a user's profile extends one of the program as it extends its file") 
           std::vector<std::string>());
     CHECK(comparison(parsed.load_simulation("mine").value(), tabled.load_simulation("mine").value())
               .differences == std::vector<std::string>());
-    CHECK(comparison(parsed.load_code_tables("mine").value(),
-                     tabled.load_code_tables("mine").value())
-              .differences == std::vector<std::string>());
+    CHECK(
+        comparison(parsed.load_code_tables("mine").value(), tabled.load_code_tables("mine").value())
+            .differences == std::vector<std::string>());
   }
 }
 
@@ -221,7 +224,8 @@ TEST_CASE("what does not fit a base of the program is told where it is extended"
   test::TemporaryFolder own;
   own.write("mine.yaml",
             "format: 1\nextends: orientalmotor-blv\nid: mine\ntitle: Mine\nparameters:\n"
-            "  - {name: extra, title: Extra, register: 1152, encoding: u16, access: rw, evidence: manual, "
+            "  - {name: extra, title: Extra, register: 1152, encoding: u16, access: rw, evidence: "
+            "manual, "
             "source: me}\n");
   const ProfileStore store({own.path()}, files::read_text_file, shipped::profiles());
   const auto loaded = store.load("mine");

@@ -236,6 +236,8 @@ inline auto fields(const Profile& v) {
 }
 
 template <typename T>
-concept Structure = requires(const T& value) { fields(value); };
+concept Structure = requires(const T& value) {
+  fields(value);
+};
 
 }  // namespace spindle::catalogue

@@ -294,7 +294,7 @@ class Profile {
   std::optional<RunFacts> run = std::nullopt;  ///< how it is started and stopped; may be missing
   std::optional<RefusalFacts> refusals = std::nullopt;
   List<AlarmList> alarm_lists = {};
-  Text alarm_reset = {};           ///< action that resets an alarm; empty: none does
+  Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register

@@ -78,8 +78,8 @@ class CommandBits {
 struct MonitorFacts {
   Text status = {};
   std::optional<std::uint8_t> running = std::nullopt;   ///< bit of the status; empty: its values
-  List<std::int64_t> running_values = {};        ///< values of a status that says "runs"
-  List<std::int64_t> stopped_values = {};        ///< and of one that says "stands still"
+  List<std::int64_t> running_values = {};               ///< values of a status that says "runs"
+  List<std::int64_t> stopped_values = {};               ///< and of one that says "stands still"
   std::optional<std::uint8_t> at_speed = std::nullopt;  ///< bit: the speed asked for is reached
   std::optional<std::uint8_t> busy = std::nullopt;      ///< bit: internal processing
   Text command_speed = {};   ///< signed; 0 when the motor is told to stand still
@@ -143,7 +143,7 @@ struct CommandWordFacts {
 
 /// What lets a motor follow its command register: a value, or one bit.
 struct EnableFacts {
-  Text parameter = {};                      ///< empty: nothing has to be enabled
+  Text parameter = {};                             ///< empty: nothing has to be enabled
   std::optional<std::uint8_t> bit = std::nullopt;  ///< set beside the other bits
   std::uint32_t value = 0;                         ///< written where there is no bit
 };
@@ -158,8 +158,8 @@ struct CommandRegisterFacts {
   Text stop_register = {};  ///< another register that stops it; may be empty
   std::uint32_t stop_value = 0;
   EnableFacts enable = {};
-  Text set_point = {};  ///< how fast, in its own unit; may be empty
-  MonitorFacts monitor = {};   ///< without a status and a speed nothing proves a standstill
+  Text set_point = {};        ///< how fast, in its own unit; may be empty
+  MonitorFacts monitor = {};  ///< without a status and a speed nothing proves a standstill
   Duration stopping = std::chrono::seconds(10);  ///< how long a stop may take at most
 };
 
