@@ -30,17 +30,27 @@ struct Slot {
   std::string name;  ///< "TARGET", "NAME=VALUE"
   bool is_optional = false;
   bool repeats = false;
+  std::string option = {};  ///< stands instead of it; empty: none does
 };
 
-/// Where the first word ends: at a blank outside of brackets.
+/// Where the first word ends: at a blank outside of brackets and braces.
 std::size_t word_end(std::string_view synopsis) {
   std::size_t depth = 0;
   for (std::size_t at = 0; at < synopsis.size(); ++at) {
-    if (synopsis[at] == '[') ++depth;
-    if (synopsis[at] == ']') --depth;
-    if (synopsis[at] == ' ' && depth == 0) return at;
+    const char c = synopsis[at];
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (c == ' ' && depth == 0) return at;
   }
   return synopsis.size();
+}
+
+/// What stands in braces: an argument, or an option instead, as in "FILE|--dir FOLDER".
+Slot choice_of(std::string_view choice) {
+  const std::size_t bar = choice.find("|--");
+  const std::string_view option = choice.substr(bar + 1);
+  return {.name = std::string(choice.substr(0, bar)),
+          .option = std::string(option.substr(0, option.find(' ')))};
 }
 
 /// "TARGET... [NAME|PATTERN...] [--count N]" has two; bracketed options are none.
@@ -51,6 +61,10 @@ std::vector<Slot> slots_of(std::string_view synopsis) {
     const std::size_t end = word_end(synopsis);
     std::string_view word = synopsis.substr(0, end);
     synopsis.remove_prefix(std::min(end + 1, synopsis.size()));
+    if (word.starts_with('{')) {
+      slots.push_back(choice_of(word.substr(1, word.size() - 2)));
+      continue;
+    }
     if (is_optional) word = word.substr(1, word.size() - 2);
     const bool repeats = word.ends_with("...");
     if (repeats) word.remove_suffix(3);
@@ -97,7 +111,8 @@ struct Typed {
   const CommandDescription* command = nullptr;
   std::vector<std::string> arguments = {};
   const OptionDescription* awaits_value = nullptr;
-  std::string profile = {};  ///< of --profile
+  std::string profile = {};         ///< of --profile
+  std::set<std::string> given = {};  ///< options that take a value, by their last names
   bool options_ended = false;
 };
 
@@ -136,6 +151,7 @@ class Completer {
     const std::size_t equals = word.find('=');
     const OptionDescription* option = find_option(word.substr(0, equals));
     if (option == nullptr || option->is_flag()) return;
+    typed_.given.insert(option->names.back());
     if (equals == std::string::npos) {
       typed_.awaits_value = option;
     } else {
@@ -183,8 +199,9 @@ class Completer {
     }
     if (typed_.command == nullptr) return offer_commands(description_->commands);
     if (!typed_.command->commands.empty()) return offer_commands(typed_.command->commands);
-    for (const Slot& slot :
-         possible_slots(slots_of(typed_.command->synopsis), typed_.arguments.size())) {
+    std::vector<Slot> slots = slots_of(typed_.command->synopsis);
+    std::erase_if(slots, [&](const Slot& slot) { return typed_.given.contains(slot.option); });
+    for (const Slot& slot : possible_slots(slots, typed_.arguments.size())) {
       offer_argument(slot, word);
     }
   }

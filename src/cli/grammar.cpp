@@ -282,8 +282,13 @@ struct TypedBackup {
   bool force = false;
   bool include_secrets = false;
 };
+struct TypedDiff {
+  commands::DiffOptions options;
+  std::string jobs;
+};
 struct TypedRestore {
   commands::RestoreOptions options;
+  std::string jobs;
   bool dry_run = false;
   bool force = false;
   bool no_rollback = false;
@@ -318,7 +323,7 @@ struct TypedCommands {
   TypedRemoteStop remote_stop;
   TypedAlarms alarms;
   TypedBackup backup;
-  commands::DiffOptions diff;
+  TypedDiff diff;
   TypedRestore restore;
   TypedSimulate simulate;
   TypedTools tools;
@@ -839,55 +844,83 @@ void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
   });
 }
 
+/// Beside --dir no second side and no FILE is named, so what stands there is the first NAME.
+void make_name_of(std::string& argument, std::vector<std::string>& names) {
+  if (!argument.empty()) names.insert(names.begin(), std::exchange(argument, {}));
+}
+
+Result<Outcome> run_diff(TypedDiff typed, Context& context) {
+  commands::DiffOptions& options = typed.options;
+  if (options.a.empty()) return tl::unexpected(missing("diff", "A"));
+  if (!options.folder.empty()) {
+    make_name_of(options.b, options.patterns);
+  } else if (options.b.empty()) {
+    return tl::unexpected(missing("diff", "B"));
+  }
+  return fill_jobs(typed.jobs, options.jobs).and_then([&] {
+    return commands::diff(options, context);
+  });
+}
+
 void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
-  constexpr Words words = {"diff", "A B [NAME|PATTERN...] [--ignore PATTERN]",
+  constexpr Words words = {"diff", "A {B|--dir FOLDER} [NAME|PATTERN...] [--ignore PATTERN]",
                            "compare tools, backup files and defaults by parameter name",
                            "spindle diff station3 station3.yaml\n"
                            "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
-                           "spindle diff station3 station4 --ignore 'preset.1.*'"};
-  const auto run = [](const commands::DiffOptions& options, Context& context) {
-    if (options.a.empty() || options.b.empty()) {
-      return Result<Outcome>(tl::unexpected(missing("diff", options.a.empty() ? "A" : "B")));
-    }
-    return commands::diff(options, context);
-  };
-  add_command(app, draft, words, typed.diff, run, [&typed](CLI::App* command) {
-    command->add_option("A", typed.diff.a, "tool, backup file, or 'defaults'");
-    command->add_option("B", typed.diff.b, "the same");
-    command->add_option("NAME", typed.diff.patterns, "compare only these");
-    command->add_option("--ignore", typed.diff.ignored, "leave these out, repeatable")
+                           "spindle diff station3 station4 --ignore 'preset.1.*'\n"
+                           "spindle diff @line1 --dir backups"};
+  add_command(app, draft, words, typed.diff, run_diff, [&typed](CLI::App* command) {
+    auto& options = typed.diff.options;
+    command->add_option("A", options.a, "tool, backup file, or 'defaults'; with --dir also @group");
+    command->add_option("B", options.b, "tool, backup file, or 'defaults'");
+    command->add_option("NAME", options.patterns, "compare only these");
+    command->add_option("--ignore", options.ignored, "leave these out, repeatable")
         ->type_name("PATTERN")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    option(command, "--dir", options.folder, "FOLDER",
+           "compare each tool with its own backup in this folder, as backup --dir writes it");
+    option(command, "--jobs", typed.diff.jobs, "N", std::string(jobs_words));
   });
 }
 
 Result<Outcome> run_restore(TypedRestore typed, Context& context) {
-  if (typed.options.target.empty()) return tl::unexpected(missing("restore", "TARGET"));
-  if (typed.options.file.empty()) return tl::unexpected(missing("restore", "FILE"));
-  if (typed.dry_run) typed.options.execution = commands::Execution::dry_run;
-  if (typed.force) typed.options.model = commands::ModelCheck::off;
-  if (typed.no_rollback) typed.options.on_failure = commands::OnFailure::leave;
-  if (typed.save) typed.options.storing = commands::Storing::yes;
-  return commands::restore(typed.options, context);
+  commands::RestoreOptions& options = typed.options;
+  if (options.target.empty()) return tl::unexpected(missing("restore", "TARGET"));
+  if (!options.folder.empty()) {
+    make_name_of(options.file, options.patterns);
+  } else if (options.file.empty()) {
+    return tl::unexpected(missing("restore", "FILE"));
+  }
+  if (typed.dry_run) options.execution = commands::Execution::dry_run;
+  if (typed.force) options.model = commands::ModelCheck::off;
+  if (typed.no_rollback) options.on_failure = commands::OnFailure::leave;
+  if (typed.save) options.storing = commands::Storing::yes;
+  return fill_jobs(typed.jobs, options.jobs).and_then([&] {
+    return commands::restore(options, context);
+  });
 }
 
 void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
-  constexpr Words words = {"restore", "TARGET FILE [NAME|PATTERN...]",
+  constexpr Words words = {"restore", "TARGET {FILE|--dir FOLDER} [NAME|PATTERN...]",
                            "plan, confirm, write what differs, verify; put back if it fails",
                            "spindle restore station3 station3.yaml --dry-run\n"
                            "spindle restore station3 station3.yaml 'preset.1.*'\n"
-                           "spindle restore station3 old-tool.yaml --yes --json"};
+                           "spindle restore station3 old-tool.yaml --yes --json\n"
+                           "spindle restore @line1 --dir backups"};
   add_command(app, draft, words, typed.restore, run_restore, [&typed](CLI::App* command) {
     auto& options = typed.restore.options;
-    command->add_option("TARGET", options.target, "tool name or URL");
+    command->add_option("TARGET", options.target, "tool name or URL; with --dir also @group");
     command->add_option("FILE", options.file, "backup file");
     command->add_option("NAME", options.patterns, "restore only these");
+    option(command, "--dir", options.folder, "FOLDER",
+           "restore each tool from its own backup in this folder, as backup --dir writes it");
     command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
     command->add_flag("--force", typed.restore.force, "also to a tool of another model");
     command->add_flag("--no-rollback", typed.restore.no_rollback,
                       "leave what was written when something fails");
     command->add_flag("--save", typed.restore.save, std::string(save_words));
+    option(command, "--jobs", typed.restore.jobs, "N", std::string(jobs_words));
   });
 }
 

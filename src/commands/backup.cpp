@@ -111,9 +111,7 @@ class Backup final : public Verb<std::monostate, Saved> {
         .map([&] { return std::move(*taken); });
   }
 
-  /// Of several tools it is shown how many are done.
   [[nodiscard]] Result<ToolSnapshot> read(OpenTool& tool, const Context& context) const {
-    if (paths_->size() > 1) return take_snapshot(tool, options_->secrets, context);
     ProgressLine progress(context);
     return take_snapshot(tool, options_->secrets, context,
                          progress.counter(tool.target.shown + ": reading"));

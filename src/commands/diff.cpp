@@ -1,117 +1,125 @@
 #include <fmt/format.h>
 
-#include <array>
 #include <optional>
 #include <utility>
 
-#include "diff_side.hpp"
-#include "listing.hpp"
-#include "records.hpp"
+#include "backup_paths.hpp"
+#include "comparison.hpp"
+#include "run_verb.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/files/backup_file.hpp"
-#include "spindle/work/snapshot.hpp"
 
 namespace spindle::commands {
 namespace {
 
-using catalogue::Difference;
 using catalogue::Lacking;
 using catalogue::Profile;
-using catalogue::Selection;
-using catalogue::Snapshot;
-using report::Align;
-using report::Column;
 
-const std::array<Column, 5> columns = {{{"NAME", "name"},
-                                        {"REGISTER", "register", Align::right},
-                                        {"A", "a", Align::right},
-                                        {"B", "b", Align::right},
-                                        {"UNIT", "unit"}}};
-
-/// Patterns are checked as early as they can be: before a tool is asked where its profile is known.
-Result<void> check_patterns(const DiffSide& side, const DiffOptions& options,
-                            const Context& context) {
-  const std::string id = profile_of(side, context);
-  if (id.empty()) return {};
-  const auto profile = context.profiles.load(id);
-  if (!profile) return tl::unexpected(profile.error());
-  return Selection::make(options.patterns, options.ignored, *profile).map([](const Selection&) {});
+/// The defaults of a profile say nothing of what has none.
+Lacking lacking_of(const DiffSide& side) {
+  return side.is_defaults() ? Lacking::is_not_compared : Lacking::differs;
 }
 
-using Contents = std::pair<SideContent, SideContent>;
+/// What a tool is compared with.
+struct Counterpart {
+  DiffSide side = {};
+  std::optional<SideContent> content = std::nullopt;  ///< empty: a tool that is still to be asked
+};
 
-Result<Contents> read_sides(const DiffSide& a, const DiffSide& b, const Context& context) {
-  const DiffSide& first = a.is_defaults() ? b : a;
-  auto read = read_side(first, context);
-  if (!read) return tl::unexpected(std::move(read.error()));
-  const bool with_defaults = a.is_defaults() || b.is_defaults();
-  auto other = with_defaults ? read_defaults(read->profile) : read_side(b, context);
-  if (!other) return tl::unexpected(std::move(other.error()));
-  if (a.is_defaults()) std::swap(*read, *other);
-  return Contents(std::move(*read), std::move(*other));
-}
+/// What tools are compared with: each with its own backup, or one with another side.
+struct Counterparts {
+  BackupPaths backups = {};
+  DiffSide side = {};
+  bool is_first = false;  ///< the other side is A
+};
 
-/// The unit of both sides, or one beside the other: "N.m / kgf.cm", "N.m / ?".
-std::string units_in_words(const Difference& difference) {
-  const std::string& common = difference.a ? difference.unit_a : difference.unit_b;
-  if (difference.units == catalogue::Units::same) return common;
-  const auto shown = [](const std::string& unit) { return unit.empty() ? std::string("?") : unit; };
-  return fmt::format("{} / {}", shown(difference.unit_a), shown(difference.unit_b));
-}
+/// What it refers to does not change while it runs.
+class Diff final : public Verb<Counterpart, DiffResult> {
+ public:
+  Diff(const DiffOptions& options, const Counterparts& counterparts, const Context& context)
+      : options_(&options), counterparts_(&counterparts), context_(&context) {}
 
-report::Record difference_record(const Difference& difference, const std::string& target,
-                                 const Clock& clock) {
-  const auto side = [](std::string key, const std::optional<catalogue::Value>& value) {
-    return value ? report::Field{std::move(key), value->number, value->to_string()}
-                 : report::Field{std::move(key), report::Cell(), "-"};
-  };
-  return {.type = "diff",
-          .target = target,
-          .time = clock.wall(),
-          .fields = {{"name", difference.parameter.name},
-                     {"register", number(difference.parameter.address.value)},
-                     side("a", difference.a),
-                     side("b", difference.b),
-                     {"unit", text_or_null(units_in_words(difference))},
-                     {"unit_a", text_or_null(difference.unit_a)},
-                     {"unit_b", text_or_null(difference.unit_b)}}};
-}
+  [[nodiscard]] Fit fit() const override { return Fit::one; }
 
-Result<Outcome> tell(const catalogue::Comparison& comparison, const Contents& contents,
-                     const std::string& target, Context& context) {
-  const bool compared = comparison.same > 0 || !comparison.differences.empty() ||
-                        !contents.first.unreadable.empty() || !contents.second.unreadable.empty();
-  if (!compared) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "no parameter is left to compare",
-                                .hint = "name more of them, or ignore fewer"});
-  }
-  Outcome outcome;
-  Listing listing(context, columns);
-  for (const Difference& difference : comparison.differences) {
-    listing.add(difference_record(difference, target, context.clock));
-  }
-  outcome.succeed();
-  if (!comparison.differences.empty()) outcome.negate();
-  for (const SideContent* content : {&contents.first, &contents.second}) {
-    for (const Error& error : content->unreadable) {
-      outcome.fail(error);
-      listing.add(error);
+  Result<Plan> plan(const Profile& profile, const Target& target) const override {
+    if (auto selected = check_selection(*options_, profile); !selected) {
+      return tl::unexpected(std::move(selected.error()));
     }
+    if (counterparts_->backups.empty()) return read_known({.side = counterparts_->side}, profile);
+    auto plan = find_backup(target).and_then(
+        [&](DiffSide side) { return read_known({.side = std::move(side)}, profile); });
+    if (!plan) plan.error() = with_target(std::move(plan.error()), target);
+    return plan;
   }
-  return finish(listing, outcome,
-                {.counts = {{"different", count(comparison.differences.size())},
-                            {"same", count(comparison.same)}},
-                 .sentence = fmt::format("{} different, {} the same", comparison.differences.size(),
-                                         comparison.same),
-                 .target = target},
-                context);
+
+  Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    auto own = read_tool(tool, context);
+    if (!own) return tl::unexpected(std::move(own.error()));
+    auto other = plan.content ? Result<SideContent>(*plan.content) : [&] {
+      tool.device.hang_up();  // the other one may be on the same line
+      return read_tool(*plan.side.target, context);
+    }();
+    if (!other) return tl::unexpected(std::move(other.error()));
+    ReadSides sides{std::move(*own), std::move(*other)};
+    if (counterparts_->is_first) std::swap(sides.a, sides.b);
+    return compare(sides, *options_, lacking_of(plan.side), tool.target.shown, context);
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    DiffResult sum;
+    std::size_t failed = 0;
+    for (const auto& done : all.done) {
+      if (!done || done->outcome.failed() > 0) ++failed;
+      if (!done) continue;
+      sum.different += done->different;
+      sum.same += done->same;
+    }
+    Summary summary = diff_summary(sum, {});
+    summary.sentence +=
+        fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
+    return summary;
+  }
+
+ private:
+  [[nodiscard]] Result<DiffSide> find_backup(const Target& target) const {
+    const std::string& path = counterparts_->backups.at(target.shown);
+    return read_backup_file(path, *context_).map([&](files::BackupFile file) {
+      return DiffSide{.text = path, .file = std::move(file)};
+    });
+  }
+
+  /// Reads the other side as far as no tool has to be asked; `profile` says the defaults.
+  [[nodiscard]] Result<Counterpart> read_known(Counterpart other, const Profile& profile) const {
+    if (other.side.target) return other;
+    auto content = other.side.file ? read_file(other.side, *context_) : read_defaults(profile);
+    if (!content) return tl::unexpected(std::move(content.error()));
+    other.content = std::move(*content);
+    return other;
+  }
+
+  const DiffOptions* options_;
+  const Counterparts* counterparts_;
+  const Context* context_;
+};
+
+/// Two sides of which none is a tool, and one at most the defaults.
+Result<Outcome> diff_files(const DiffSide& a, const DiffSide& b, const DiffOptions& options,
+                           Context& context) {
+  auto first = read_file(a.is_defaults() ? b : a, context);
+  if (!first) return tl::unexpected(std::move(first.error()));
+  if (auto selected = check_selection(options, first->profile); !selected) {
+    return tl::unexpected(std::move(selected.error()));
+  }
+  const bool with_defaults = a.is_defaults() || b.is_defaults();
+  auto other = with_defaults ? read_defaults(first->profile) : read_file(b, context);
+  if (!other) return tl::unexpected(std::move(other.error()));
+  ReadSides sides{std::move(*first), std::move(*other)};
+  if (a.is_defaults()) std::swap(sides.a, sides.b);
+  return compare(sides, options, lacking_of(a.is_defaults() ? a : b), {}, context)
+      .map([](const DiffResult& result) { return result.outcome; });
 }
 
-}  // namespace
-
-Result<Outcome> diff(const DiffOptions& options, Context& context) {
+Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
   if (options.a == factory_defaults && options.b == factory_defaults) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "one side must be a tool or a backup",
@@ -121,22 +129,28 @@ Result<Outcome> diff(const DiffOptions& options, Context& context) {
   if (!a) return tl::unexpected(a.error());
   const auto b = resolve_side(options.b, context);
   if (!b) return tl::unexpected(b.error());
-  for (const DiffSide* side : {&*a, &*b}) {
-    if (auto checked = check_patterns(*side, options, context); !checked) {
-      return tl::unexpected(std::move(checked.error()));
-    }
-  }
-  const auto contents = read_sides(*a, *b, context);
-  if (!contents) return tl::unexpected(contents.error());
-  const auto selection =
-      Selection::make(options.patterns, options.ignored, contents->first.profile);
-  if (!selection) return tl::unexpected(selection.error());
-  const bool with_defaults = a->is_defaults() || b->is_defaults();
-  const auto comparison =
-      catalogue::compare(contents->first.snapshot, contents->second.snapshot, *selection,
-                         with_defaults ? Lacking::is_not_compared : Lacking::differs);
-  const DiffSide& tool = a->target ? *a : *b;
-  return tell(comparison, *contents, tool.target ? tool.text : std::string(), context);
+  if (!a->target && !b->target) return diff_files(*a, *b, options, context);
+  const Counterparts other{.side = a->target ? *b : *a, .is_first = !a->target};
+  return run_verb(Diff(options, other, context),
+                  {.tools = {a->target ? *a->target : *b->target}}, options.jobs, context);
+}
+
+Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {
+  auto targets = resolve_one_or_group(options.a, Reach::one, context);
+  if (!targets) return tl::unexpected(std::move(targets.error()));
+  auto paths = check_names_only(options.patterns, context).and_then([&] {
+    return paths_in_folder(targets->tools, options.folder);
+  });
+  if (!paths) return tl::unexpected(std::move(paths.error()));
+  const Counterparts backups{.backups = std::move(*paths)};
+  return run_verb(Diff(options, backups, context), *targets, options.jobs, context);
+}
+
+}  // namespace
+
+Result<Outcome> diff(const DiffOptions& options, Context& context) {
+  return options.folder.empty() ? diff_sides(options, context)
+                                : diff_with_backups(options, context);
 }
 
 }  // namespace spindle::commands

@@ -35,8 +35,14 @@ struct SideContent {
   catalogue::Profile profile = {};
 };
 
-/// Reads the tool or the file.
-Result<SideContent> read_side(const DiffSide& side, const Context& context);
+/// Reads a tool that is open.
+Result<SideContent> read_tool(OpenTool& tool, const Context& context);
+
+/// Opens a tool and reads it. Every error is one of this tool.
+Result<SideContent> read_tool(const Target& target, const Context& context);
+
+/// What the backup of a side means.
+Result<SideContent> read_file(const DiffSide& side, const Context& context);
 
 /// What a profile says of a new tool. Error `usage` where it says nothing.
 Result<SideContent> read_defaults(const catalogue::Profile& profile);

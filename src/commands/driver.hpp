@@ -70,6 +70,7 @@ auto for_each_told(const std::vector<Item>& items, std::size_t jobs, GroupOutput
   for (const Item& item : items) turns.push_back({&item, &output.of_tool(turns.size())});
   const auto handle_one = [&](const Turn<Item>& turn) {
     Context own = with_renderer(context, *turn.renderer);
+    if (items.size() > 1) own.user.progress = report::Showing::unwanted;  // there is one for all
     Attempt attempt = handle(*turn.item, own);
     if (!attempt) {
       attempt.error() = with_target(std::move(attempt.error()), target_of(turn));

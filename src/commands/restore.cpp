@@ -2,147 +2,190 @@
 
 #include <utility>
 
+#include "backup_paths.hpp"
 #include "consent.hpp"
-#include "records.hpp"
 #include "restore_run.hpp"
-#include "restore_warnings.hpp"
+#include "run_verb.hpp"
 #include "spindle/base/text.hpp"
-#include "spindle/files/backup_file.hpp"
-#include "storing.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using catalogue::Profile;
-using catalogue::Skip;
-using catalogue::Snapshot;
 
-std::string counts_of(const RestoreTask& task) {
-  std::string text = fmt::format("{} to write, {} unchanged", task.plan.writes.size(),
-                                 task.plan.count(Skip::equal));
-  const std::size_t skipped = task.plan.skipped.size() - task.plan.count(Skip::equal);
-  if (skipped > 0) text += fmt::format(", {} skipped", skipped);
-  return text;
-}
+/// What it refers to does not change while it runs.
+class Restore final : public Verb<RestoreTask, RestoreResult> {
+ public:
+  Restore(const RestoreOptions& options, const Backups& backups, bool is_group)
+      : options_(&options), backups_(&backups), is_group_(is_group) {}
 
-/// Refuses the whole plan and says everything that is wrong with it.
-Result<Outcome> refuse(const RestoreTask& task, const Target& target, Context& context) {
-  Outcome outcome;
-  Listing listing(context, restore_columns());
-  for (const Error& finding : task.plan.findings) {
-    outcome.fail(finding);
-    listing.add(with_target(finding, target));
+  [[nodiscard]] Fit fit() const override { return Fit::all; }
+  [[nodiscard]] bool changes_tools() const override { return true; }
+  [[nodiscard]] Basis basis() const override { return Basis::tool; }
+  [[nodiscard]] Basis question_basis() const override { return Basis::tool; }
+
+  Result<Plan> plan(const Profile& profile, const Target& target) const override {
+    return plan_by_profile(backups_->at(target.shown), *options_, profile);
   }
-  return finish(listing, outcome);
-}
 
-Result<void> show_plan(const RestoreTask& task, const Target& target, Context& context) {
-  Listing listing(context, restore_columns());
-  for (const auto& write : task.plan.writes) {
-    listing.add(plan_record(write, target, context.clock));
+  /// All that is wrong for one tool of a group is told, and the last of it ends the command.
+  Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
+    auto task = plan_by_tool(std::move(plan), tool, *options_, context);
+    if (!task) return tl::unexpected(with_target(std::move(task.error()), tool.target));
+    if (!is_group_ || task->plan.findings.empty()) return task;
+    const Error last = task->plan.findings.back();
+    task->plan.findings.pop_back();
+    return tell_findings(*task, tool.target, context).and_then([&] {
+      return Result<Plan>(tl::unexpected(with_target(last, tool.target)));
+    });
   }
-  return listing.end();
-}
 
-Result<Outcome> end_dry_run(const RestoreTask& task, const Target& target, Context& context) {
-  Outcome outcome;
-  outcome.succeed();
-  const std::size_t unchanged = task.plan.count(Skip::equal);
-  return show_plan(task, target, context)
-      .and_then([&] {
-        return context.renderer.summary(
-            summary_record({{"planned", count(task.plan.writes.size())},
-                            {"unchanged", count(unchanged)},
-                            {"skipped", count(task.plan.skipped.size() - unchanged)}},
-                           outcome.status(), target.shown, context.clock),
-            counts_of(task) + "; nothing was written (dry run)");
-      })
-      .map([&] { return outcome; });
-}
-
-/// Whoever is asked sees first what it is about.
-Result<void> ask(const RestoreTask& task, const RestoreOptions& options, const Target& target,
-                 Context& context) {
-  const bool stores = options.storing == Storing::yes;
-  if (task.plan.writes.empty() && !stores) return {};
-  context.renderer.note(fmt::format("{}: {}", target.shown, counts_of(task)));
-  if (can_ask(context)) {
-    if (auto shown = show_plan(task, target, context); !shown) return shown;
+  /// The user sees first what the question is about.
+  Result<void> ask(const AllPlanned& planned, std::size_t of, Context& context) const override {
+    std::size_t writes = 0;
+    std::vector<std::string> names;
+    for (const auto& [target, task] : planned) {
+      tell_warnings(task, target, context);
+      if (!changes(task)) continue;
+      context.renderer.note(fmt::format("{}: {}", target.shown, in_words(counts_of(task.plan))));
+      writes += task.plan.writes.size();
+      names.push_back(target.shown);
+    }
+    if (names.empty()) return {};
+    if (can_ask(context)) {
+      if (auto shown = show_plans(planned, context); !shown) return shown;
+    }
+    return ask_consent(fmt::format("write {} to {}{}", counted(writes, "parameter"),
+                                   is_group_ ? tools_in_words(names, of) : names.front(),
+                                   stores() ? ", and save" : ""),
+                       context);
   }
-  return ask_consent(fmt::format("write {} to {}{}", counted(task.plan.writes.size(), "parameter"),
-                                 target.shown, stores ? ", and save" : ""),
-                     context);
-}
 
-/// A backup with what it means, and what of it is wanted.
-struct Wanted {
-  Snapshot backup;
-  catalogue::Selection selection;
-};
-
-Result<Wanted> understand(const files::BackupFile& file, const RestoreOptions& options,
-                          const Profile& profile) {
-  if (auto storing = check_storing(options.storing, profile); !storing) {
-    return tl::unexpected(std::move(storing.error()));
+  Result<Plan> confirm(OpenTool& tool, const Plan& plan, Context& context) const override {
+    return confirm_unchanged(plan, tool, *options_, context);
   }
-  auto backup = files::understand_backup(file, profile);
-  if (!backup) return tl::unexpected(std::move(backup.error()));
-  auto selection = catalogue::Selection::make(options.patterns, {}, profile);
-  if (!selection) return tl::unexpected(std::move(selection.error()));
-  return Wanted{std::move(*backup), std::move(*selection)};
-}
 
-Result<RestoreTask> plan(Wanted wanted, OpenTool& tool, const RestoreOptions& options,
-                         Context& context) {
-  ProgressLine progress(context);
-  auto present = take_snapshot(tool, Secrets::include, context,
-                               progress.counter(tool.target.shown + ": reading"));
-  if (!present) return tl::unexpected(std::move(present.error()));
-  for (const Error& error : present->unreadable) {
-    const auto* needed = wanted.backup.find(error.name);
-    if (needed != nullptr && wanted.selection.contains(needed->parameter)) {
-      return tl::unexpected(error);
+  [[nodiscard]] bool needs_tool(const Plan& plan) const override {
+    return !is_dry_run() && plan.plan.findings.empty();
+  }
+
+  Result<Done> conclude(const Target& target, const Plan& task, Context& context) const override {
+    RestoreResult result{.counts = counts_of(task.plan)};
+    for (const Error& finding : task.plan.findings) result.outcome.fail(finding);
+    if (result.outcome.failed() > 0) {
+      return tell_findings(task, target, context).map([&] { return result; });
+    }
+    result.outcome.succeed();
+    Listing listing(context, restore_columns());
+    add_plan(task, target, listing, context.clock);
+    Summary summary = restore_plan_summary(result.counts, target.shown);
+    if (!is_group_) summary.sentence += nothing_written;
+    return finish(listing, result.outcome, std::move(summary), context)
+        .map([&](const Outcome&) { return result; });
+  }
+
+  Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    return RestoreRun(*options_, plan, tool, context).run();
+  }
+
+  /// Nothing was written to this tool; its summary says so, too.
+  Result<Done> give_up(const Target& target, const Plan* plan, const Error& error,
+                       Context& context) const override {
+    if (plan == nullptr) return tl::unexpected(error);
+    RestoreResult result{.counts = counts_of(plan->plan)};
+    result.outcome.fail(error);
+    Listing listing(context, restore_columns());
+    listing.add(error);
+    return finish(listing, result.outcome, restore_summary(result.counts, {}, target.shown),
+                  context)
+        .map([&](const Outcome&) { return result; });
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    RestoreCounts counts;
+    std::size_t failed = all.tools - all.planned.size();
+    for (std::size_t index = 0; index < all.done.size(); ++index) {
+      const Result<RestoreResult>& done = all.done[index];
+      counts.add(done ? done->counts : counts_of(all.planned[index].plan.plan));
+      if (!done || done->outcome.failed() > 0) ++failed;
+    }
+    const bool planned = is_dry_run() && !all.is_rejected;
+    Summary summary = planned ? restore_plan_summary(counts, {}) : restore_summary(counts, {}, {});
+    if (counts.rolled_back > 0) {
+      summary.sentence += fmt::format(", {} rolled back", counts.rolled_back);
+    }
+    summary.sentence +=
+        fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
+    if (planned) summary.sentence += nothing_written;
+    return summary;
+  }
+
+ private:
+  static constexpr std::string_view nothing_written = "; nothing was written (dry run)";
+
+  [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
+  [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
+  [[nodiscard]] bool changes(const RestoreTask& task) const {
+    return needs_tool(task) && (stores() || !task.plan.writes.empty());
+  }
+
+  void tell_warnings(const RestoreTask& task, const Target& target, Context& context) const {
+    for (const std::string& warning : task.warnings) {
+      const std::string tool = is_group_ ? target.shown + ": " : std::string();
+      context.renderer.note(fmt::format("warning: {}{}", tool, warning));
     }
   }
-  RestoreTask task;
-  task.backup = std::move(wanted.backup);
-  task.present = std::move(present->snapshot);
-  task.selection = std::move(wanted.selection);
-  auto same = check_model(task.backup, task.present, options);
-  if (!same) return tl::unexpected(std::move(same.error()));
-  task.destination = catalogue::destination_of(task.backup, task.present);
-  task.plan = catalogue::plan_restore(
-      task.backup, task.present, tool.device.profile(), task.selection, task.destination,
-      options.model == ModelCheck::off ? catalogue::UnitRule::ignored
-                                       : catalogue::UnitRule::strict);
-  return task;
+
+  Result<void> show_plans(const AllPlanned& planned, Context& context) const {
+    const auto columns = restore_columns();
+    Listing listing(context, is_group_ ? with_target_column(columns)
+                                       : std::vector(columns.begin(), columns.end()));
+    for (const auto& [target, task] : planned) add_plan(task, target, listing, context.clock);
+    return listing.end();
+  }
+
+  const RestoreOptions* options_;
+  const Backups* backups_;
+  bool is_group_;
+};
+
+Result<Backups> find_backups(const std::vector<Target>& tools, const RestoreOptions& options,
+                             const Context& context) {
+  if (!options.folder.empty()) {
+    return check_names_only(options.patterns, context).and_then([&] {
+      return read_backups(tools, options.folder, context);
+    });
+  }
+  return read_backup_file(options.file, context).map([&](files::BackupFile file) {
+    return Backups{{tools.front().shown, std::move(file)}};
+  });
+}
+
+/// One file is the backup of one tool.
+Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
+  auto targets = resolve_one_or_group(options.target, Reach::one, context);
+  if (!targets || !options.folder.empty()) return targets;
+  if (targets->tools.size() > 1) {
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message = fmt::format("'{}' is {} tools, and one FILE is restored to one", options.target,
+                               targets->tools.size()),
+        .hint = "--dir FOLDER restores each from its own backup in it"});
+  }
+  targets->is_group = false;
+  return targets;
 }
 
 }  // namespace
 
+/// In a group all tools are read and checked before the first write, one question stands for all,
+/// and each is opened again to be written if it is still as it was shown.
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
-  const auto target = resolve_target(
-      options.target, context,
-      {.why = "a backup is restored to one", .instead = "restore them one by one, beginning with"});
-  if (!target) return tl::unexpected(target.error());
-  const auto file = read_backup_file(options.file, context);
-  if (!file) return tl::unexpected(file.error());
-  auto opened = open_prepared(*target, Need::named_registers, context, [&](const Profile& profile) {
-    return understand(*file, options, profile);
+  return resolve(options, context).and_then([&](const Targets& targets) {
+    return find_backups(targets.tools, options, context).and_then([&](const Backups& backups) {
+      return run_verb(Restore(options, backups, targets.is_group), targets, options.jobs, context);
+    });
   });
-  if (!opened) return tl::unexpected(std::move(opened.error()));
-  OpenTool& tool = opened->tool;
-  const auto task = plan(std::move(opened->prepared), tool, options, context);
-  if (!task) return tl::unexpected(with_target(task.error(), tool.target));
-  for (const std::string& warning : warnings_for(*task, tool.device.profile())) {
-    context.renderer.note("warning: " + warning);
-  }
-  if (!task->plan.findings.empty()) return refuse(*task, tool.target, context);
-  if (options.execution == Execution::dry_run) return end_dry_run(*task, tool.target, context);
-  if (auto agreed = ask(*task, options, tool.target, context); !agreed) {
-    return tl::unexpected(std::move(agreed.error()));
-  }
-  return RestoreRun(options, *task, tool, context).run();
 }
 
 }  // namespace spindle::commands

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "records.hpp"
@@ -20,8 +19,6 @@ using catalogue::Skip;
 using catalogue::Snapshot;
 using catalogue::Value;
 using device::PutBack;
-using report::Align;
-using report::Column;
 
 Error about(const Parameter& parameter, std::string message) {
   return {.code = Errc::mismatch,
@@ -55,11 +52,6 @@ Snapshot expected_after(const RestoreTask& task) {
   return expected;
 }
 
-/// What nobody can set is what the tool measures.
-bool changes_by_itself(const Parameter& parameter) {
-  return parameter.access == catalogue::Access::read_only;
-}
-
 std::string said(const std::optional<Value>& value) {
   return value ? value->to_string() : std::string("nothing");
 }
@@ -71,19 +63,6 @@ std::string without_colons(std::string time) {
 
 }  // namespace
 
-std::span<const Column> restore_columns() {
-  static const std::array<Column, 5> columns = {{{"NAME", "name"},
-                                                 {"OLD", "old", Align::right},
-                                                 {"NEW", "new", Align::right},
-                                                 {"UNIT", "unit"},
-                                                 {"RESULT", "result"}}};
-  return columns;
-}
-
-report::Record plan_record(const PlannedWrite& write, const Target& target, const Clock& clock) {
-  return change_record(write.parameter, write.before, Ending::planned, write.after, target, clock);
-}
-
 RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
                        Context& context)
     : options_(&options),
@@ -93,9 +72,10 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       uninterruptible_line_(tool, context),
       log_(change_log("restore", tool, context)),
       changer_(tool.device, log_),
-      progress_(context) {}
+      progress_(context),
+      counts_(counts_of(task.plan)) {}
 
-Result<Outcome> RestoreRun::run() {
+Result<RestoreResult> RestoreRun::run() {
   if (auto saved = save_present(); !saved) return tl::unexpected(std::move(saved.error()));
   listing_.emplace(*context_, restore_columns());
   write_all();
@@ -138,7 +118,7 @@ void RestoreRun::write_all() {
     }
     if (!errors_.empty()) return roll_back();
     progress_.advance(
-        {.what = tool_->target.shown + ": writing", .done = ++written_, .total = writes.size()});
+        {.what = tool_->target.shown + ": writing", .done = ++counts_.written, .total = writes.size()});
   }
 }
 
@@ -219,7 +199,7 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
   const auto& [parameter, before, tried, doubt] = report.write;
   if (report.result == PutBack::kept) return;
   if (report.result == PutBack::done) {
-    ++rolled_back_;
+    ++counts_.rolled_back;
     note(parameter, report.found.value_or(tried), Ending::rolled_back, before);
     return;
   }
@@ -271,53 +251,41 @@ void RestoreRun::fail(const Error& error) {
 }
 
 std::string RestoreRun::command_to_finish() const {
-  return command_for(tool_->target, *context_, options_->file, options_->patterns);
+  return command_for(tool_->target, *context_, task_->file, options_->patterns);
 }
 
 /// What was written and is not put back, because nobody wants it so.
 void RestoreRun::tell_what_stays() {
   const std::size_t planned = task_->plan.writes.size();
-  const bool left = !errors_.empty() && written_ < planned && rolled_back_ == 0;
+  const bool left =
+      !errors_.empty() && counts_.written < planned && counts_.rolled_back == 0;
   if (!left || options_->on_failure != OnFailure::leave) return;
   Error error = with_target(
       Error{
           .code = errors_.front().code,
-          .message = fmt::format("{} of {} parameters are written and stay so", written_, planned)},
+          .message = fmt::format("{} of {} parameters are written and stay so", counts_.written, planned)},
       tool_->target);
   error.hint = fmt::format("{} writes the rest", command_to_finish());
   errors_.push_back(error);
 }
 
-Result<Outcome> RestoreRun::end() {
+Result<RestoreResult> RestoreRun::end() {
   tell_what_stays();
-  auto listed = listing_->end();
-  if (listed && errors_.empty() && options_->storing == Storing::yes) {
-    listed = store(*tool_, log_, outcome_, *context_);
+  auto told = listing_->end();
+  if (told && errors_.empty() && options_->storing == Storing::yes) {
+    told = store(*tool_, log_, outcome_, *context_);
   }
   for (const Error& error : errors_) {
-    const auto told = context_->renderer.error(error, context_->clock.wall());
-    static_cast<void>(told);  // on stderr it is in any case
+    // On stderr it is in any case.
+    static_cast<void>(context_->renderer.error(error, context_->clock.wall()));
   }
   if (errors_.empty() && outcome_.failed() == 0) outcome_.succeed();
-  if (!listed && errors_.empty()) return tl::unexpected(listed.error());
-  if (!listed) return outcome_;
-  return summarise().map([&] { return outcome_; });
-}
-
-Result<void> RestoreRun::summarise() {
-  const catalogue::RestorePlan& plan = task_->plan;
-  const std::size_t unchanged = plan.count(Skip::equal);
-  std::string sentence = fmt::format("{} written, {} unchanged", written_, unchanged);
-  if (!errors_.empty()) sentence += fmt::format(", {} rolled back", rolled_back_);
-  return context_->renderer.summary(
-      summary_record({{"planned", count(plan.writes.size())},
-                      {"written", count(written_)},
-                      {"unchanged", count(unchanged)},
-                      {"skipped", count(plan.skipped.size() - unchanged)},
-                      {"rolled_back", count(rolled_back_)},
-                      {"saved_state", text_or_null(saved_)}},
-                     outcome_.status(), tool_->target.shown, context_->clock),
-      sentence);
+  if (!told && errors_.empty()) return tl::unexpected(std::move(told.error()));
+  const RestoreResult result{outcome_, counts_};
+  if (!told) return result;
+  Summary summary = restore_summary(counts_, saved_, tool_->target.shown);
+  if (!errors_.empty()) summary.sentence += fmt::format(", {} rolled back", counts_.rolled_back);
+  return tell(std::move(summary), outcome_, *context_).map([&] { return result; });
 }
 
 }  // namespace spindle::commands

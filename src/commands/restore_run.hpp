@@ -5,27 +5,18 @@
 #include <vector>
 
 #include "change_log.hpp"
-#include "listing.hpp"
 #include "progress.hpp"
+#include "restore_records.hpp"
 #include "set_records.hpp"
-#include "spindle/commands/commands.hpp"
-#include "spindle/work/snapshot.hpp"
 #include "spindle/work/uninterruptible_line.hpp"
 
 namespace spindle::commands {
 
-/// Everything about one restore that is known before the first write.
-struct RestoreTask {
-  catalogue::Snapshot backup = {};
-  catalogue::Snapshot present = {};
-  catalogue::Selection selection = {};
-  catalogue::Destination destination = catalogue::Destination::other_tool;
-  catalogue::RestorePlan plan = {};
+/// How a restore ended on one tool.
+struct RestoreResult {
+  Outcome outcome = {};
+  RestoreCounts counts = {};
 };
-
-std::span<const report::Column> restore_columns();
-report::Record plan_record(const catalogue::PlannedWrite& write, const Target& target,
-                           const Clock& clock);
 
 /// Carries out a plan: writes in its order, reads each back, compares everything at the end. On
 /// failure, an interrupt or a lost link it puts back what it wrote, and tells what the tool holds
@@ -38,7 +29,7 @@ class RestoreRun {
   RestoreRun(const RestoreRun&) = delete;
   RestoreRun& operator=(const RestoreRun&) = delete;
 
-  Result<Outcome> run();
+  Result<RestoreResult> run();
 
  private:
   Result<void> save_present();
@@ -57,8 +48,7 @@ class RestoreRun {
   void fail(const Error& error);
   [[nodiscard]] std::string command_to_finish() const;
   void tell_what_stays();
-  Result<Outcome> end();
-  Result<void> summarise();
+  Result<RestoreResult> end();
 
   const RestoreOptions* options_;
   const RestoreTask* task_;
@@ -72,8 +62,7 @@ class RestoreRun {
   Outcome outcome_ = {};
   std::vector<Error> errors_ = {};  ///< told last, where nobody overlooks them
   std::string saved_ = {};
-  std::size_t written_ = 0;
-  std::size_t rolled_back_ = 0;
+  RestoreCounts counts_;
 };
 
 }  // namespace spindle::commands

@@ -97,14 +97,14 @@ void warn_of_plan(const RestoreTask& task, const Profile& profile,
 
 }  // namespace
 
-Result<void> check_model(const Snapshot& backup, const Snapshot& present,
-                         const RestoreOptions& options) {
-  if (options.model == ModelCheck::off || is_same_model(backup, present)) return {};
-  return tl::unexpected(Error{.code = Errc::wrong_model,
-                              .message = fmt::format("the backup is of a {}, and this tool is a {}",
-                                                     shown_model(backup), shown_model(present)),
-                              .hint = "--force restores it all the same",
-                              .name = options.file});
+Result<void> check_model(const RestoreTask& task) {
+  if (is_same_model(task.backup, task.present)) return {};
+  return tl::unexpected(
+      Error{.code = Errc::wrong_model,
+            .message = fmt::format("the backup is of a {}, and this tool is a {}",
+                                   shown_model(task.backup), shown_model(task.present)),
+            .hint = "--force restores it all the same",
+            .name = task.file});
 }
 
 std::vector<std::string> warnings_for(const RestoreTask& task, const Profile& profile) {

@@ -3,13 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "restore_run.hpp"
+#include "restore_plan.hpp"
 
 namespace spindle::commands {
 
-/// Refuses the backup of another model, unless it is wanted. Error `wrong_model`.
-Result<void> check_model(const catalogue::Snapshot& backup, const catalogue::Snapshot& present,
-                         const RestoreOptions& options);
+/// Refuses the backup of another model. Error `wrong_model`.
+Result<void> check_model(const RestoreTask& task);
 
 /// What the user should know before the restore: how the tool and its profile differ from those of
 /// the backup, what the writes bring with them, and what is not written.

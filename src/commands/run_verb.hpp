@@ -35,11 +35,11 @@ class VerbRun {
   Result<Outcome> on_group(const std::vector<Target>& tools);
 
  private:
-  Result<Opened<Plan>> open(const Target& target, const Context& context) const;
-  Result<Opened<Plan>> open_again(const Planned<Plan>& planned, const Context& context) const;
+  Result<Opened<Plan>> open(const Target& target, Context& context) const;
+  Result<Opened<Plan>> open_again(const Planned<Plan>& planned, Context& context) const;
   Result<Plan> ask_for_one(const Target& target, Plan plan) const;
   Result<Planned<Plan>> plan_by_profile(const Target& target, const Context& context) const;
-  Result<Planned<Plan>> plan_one(const Target& target, const Context& context) const;
+  Result<Planned<Plan>> plan_one(const Target& target, Context& context) const;
   Result<Done> finish(OpenTool& tool, const Plan& plan, Context& context) const;
   Result<Done> take_turn(const Target& target, Context& context) const;
   Result<Done> take_turn(const Planned<Plan>& planned, Context& context) const;
@@ -76,13 +76,20 @@ auto VerbRun<V>::ask_for_one(const Target& target, Plan plan) const -> Result<Pl
 
 template <typename V>
 Result<Outcome> VerbRun<V>::on_one(const Target& target) {
+  const auto ask_by = [&](typename V::Basis basis, const Target& asked, Plan plan) -> Result<Plan> {
+    if (verb_->question_basis() != basis) return plan;
+    return ask_for_one(asked, std::move(plan));
+  };
   auto opened = open_prepared(target, verb_->need(), *context_, [&](const Profile& profile) {
     return verb_->plan(profile, target).and_then([&](Plan plan) {
-      return ask_for_one(target, std::move(plan));
+      return ask_by(V::Basis::profile, target, std::move(plan));
     });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  const auto plan = verb_->examine(opened->tool, std::move(opened->prepared));
+  const auto plan =
+      verb_->examine(opened->tool, std::move(opened->prepared), *context_).and_then([&](Plan known) {
+        return ask_by(V::Basis::tool, opened->tool.target, std::move(known));
+      });
   if (!plan) return tl::unexpected(plan.error());
   return finish(opened->tool, *plan, *context_).map([](const Done& done) {
     return outcome_of(done);
@@ -103,11 +110,11 @@ auto VerbRun<V>::finish(OpenTool& tool, const Plan& plan, Context& context) cons
 // ---- several tools, each alone ----
 
 template <typename V>
-auto VerbRun<V>::open(const Target& target, const Context& context) const -> Result<Opened<Plan>> {
+auto VerbRun<V>::open(const Target& target, Context& context) const -> Result<Opened<Plan>> {
   auto opened = open_prepared(target, verb_->need(), context,
                               [&](const Profile& profile) { return verb_->plan(profile, target); });
   if (!opened) return opened;
-  auto plan = verb_->examine(opened->tool, std::move(opened->prepared));
+  auto plan = verb_->examine(opened->tool, std::move(opened->prepared), context);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   return Opened<Plan>{std::move(opened->tool), std::move(*plan)};
 }
@@ -153,8 +160,7 @@ auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) c
 }
 
 template <typename V>
-auto VerbRun<V>::plan_one(const Target& target, const Context& context) const
-    -> Result<Planned<Plan>> {
+auto VerbRun<V>::plan_one(const Target& target, Context& context) const -> Result<Planned<Plan>> {
   if (verb_->basis() == V::Basis::profile) return plan_by_profile(target, context);
   return open(target, context).map([](Opened<Plan> opened) {
     return Planned<Plan>{known_target(opened.tool), std::move(opened.prepared)};
@@ -196,13 +202,13 @@ Result<Outcome> VerbRun<V>::reject(const Outcome& rejected, std::size_t of) cons
 }
 
 template <typename V>
-auto VerbRun<V>::open_again(const Planned<Plan>& planned, const Context& context) const
+auto VerbRun<V>::open_again(const Planned<Plan>& planned, Context& context) const
     -> Result<Opened<Plan>> {
   auto profile = load_profile(planned.target, context);
   if (!profile) return tl::unexpected(std::move(profile.error()));
   auto tool = open_tool(planned.target, std::move(*profile), verb_->need(), context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
-  auto plan = verb_->confirm(*tool, planned.plan);
+  auto plan = verb_->confirm(*tool, planned.plan, context);
   if (!plan) return tl::unexpected(with_target(std::move(plan.error()), tool->target));
   return Opened<Plan>{std::move(*tool), std::move(*plan)};
 }

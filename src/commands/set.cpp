@@ -35,7 +35,7 @@ class Set final : public Verb<SetPlan, SetResult> {
         });
   }
 
-  Result<Plan> examine(OpenTool& tool, Plan plan) const override {
+  Result<Plan> examine(OpenTool& tool, Plan plan, Context& /*context*/) const override {
     auto steps = options_->reach == Reach::everybody
                      ? steps_for_everybody(plan.assignments)
                      : check_against_tool(plan.assignments, tool.device);
@@ -56,7 +56,7 @@ class Set final : public Verb<SetPlan, SetResult> {
                        context);
   }
 
-  Result<Plan> confirm(OpenTool& tool, const Plan& plan) const override {
+  Result<Plan> confirm(OpenTool& tool, const Plan& plan, Context& /*context*/) const override {
     return confirm_plan(plan, tool.device);
   }
 

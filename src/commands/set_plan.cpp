@@ -7,6 +7,7 @@
 
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/snapshot.hpp"
+#include "spindle/work/change.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -107,15 +108,9 @@ Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading
 
 /// Whether a tool is still the one that was planned for, and holds what it held.
 Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
-  const auto moved = [&](std::string message) {
-    return tl::unexpected(
-        Error{.code = Errc::mismatch,
-              .message = std::move(message) + ", so nothing was written to this tool",
-              .hint = "look why, then give the command again"});
-  };
   if (now.serial != plan.serial) {
-    return moved(fmt::format("serial {} answers now, and it was {} that was planned for",
-                             now.serial, plan.serial));
+    return tl::unexpected(work::changed_meanwhile(fmt::format(
+        "serial {} answers now, and it was {} that was planned for", now.serial, plan.serial)));
   }
   for (std::size_t index = 0; index < now.steps.size(); ++index) {
     const SetStep& step = now.steps[index];
@@ -123,8 +118,9 @@ Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
     const bool same =
         step.before == planned.before && step.assignment.value == planned.assignment.value;
     if (same) continue;
-    return moved(fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
-                             planned.before->to_string(), step.before->to_string()));
+    return tl::unexpected(work::changed_meanwhile(
+        fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
+                    planned.before->to_string(), step.before->to_string())));
   }
   return {};
 }

@@ -45,9 +45,10 @@ struct GroupResult {
 /// handled side by side is the driver's part (driver.hpp). `Plan` is what is meant for a tool;
 /// `Done` is what came of it, an `Outcome` or something that has one.
 ///
-/// On one tool the order is plan, ask, open, examine, perform. On several it is the same for each
-/// alone, or where the verb changes tools: all are planned, one question stands for all of them,
-/// and each is opened again, confirmed and changed.
+/// On one tool the order is plan, ask, open, examine, perform; where the question rests on the tool
+/// it is asked behind examine. On several it is the same for each alone, or where the verb changes
+/// tools: all are planned, one question stands for all of them, and each is opened again, confirmed
+/// and changed.
 template <typename PlanType, typename DoneType>
 class Verb {
  public:
@@ -59,7 +60,7 @@ class Verb {
   /// Which tools of a group have to be fit for what is typed, as far as can be known before any is
   /// asked: otherwise the command ends.
   enum class Fit : std::uint8_t { none, one, all };
-  /// What a plan for a tool of a group rests on.
+  /// What a plan for a tool of a group rests on, or the question about one tool.
   enum class Basis : std::uint8_t { profile, tool };
 
   Verb() = default;
@@ -73,6 +74,7 @@ class Verb {
   /// Whether tools are changed, so that the tools of a group are planned as a whole.
   [[nodiscard]] virtual bool changes_tools() const { return false; }
   [[nodiscard]] virtual Basis basis() const { return Basis::profile; }
+  [[nodiscard]] virtual Basis question_basis() const { return Basis::profile; }
   /// The columns of a group whose lists are shown while they grow; none: shown at the end.
   [[nodiscard]] virtual std::vector<report::Column> live_columns() const { return {}; }
 
@@ -80,7 +82,9 @@ class Verb {
   virtual Result<Plan> plan(const catalogue::Profile& profile, const Target& target) const = 0;
 
   /// Adds to the plan what only the tool can say. Reads only.
-  virtual Result<Plan> examine(OpenTool& /*tool*/, Plan plan) const { return plan; }
+  virtual Result<Plan> examine(OpenTool& /*tool*/, Plan plan, Context& /*context*/) const {
+    return plan;
+  }
 
   /// Asks before anything is changed; `of` tools are meant.
   virtual Result<void> ask(const AllPlanned& /*planned*/, std::size_t /*of*/,
@@ -89,7 +93,9 @@ class Verb {
   }
 
   /// The plan as it is to be carried out on a tool of a group that was opened again. Reads only.
-  virtual Result<Plan> confirm(OpenTool& /*tool*/, const Plan& plan) const { return plan; }
+  virtual Result<Plan> confirm(OpenTool& /*tool*/, const Plan& plan, Context& /*context*/) const {
+    return plan;
+  }
 
   /// False: conclude() needs no tool for this plan.
   [[nodiscard]] virtual bool needs_tool(const Plan& /*plan*/) const { return true; }

@@ -1,5 +1,7 @@
 #include "spindle/work/change.hpp"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace spindle::work {
@@ -20,6 +22,12 @@ Error of_write(const std::string& parameter, Error error) {
   error.name = parameter;
   error.hint = "whether it was written is not known: read it again";
   return error;
+}
+
+Error changed_meanwhile(std::string_view what) {
+  return {.code = Errc::mismatch,
+          .message = fmt::format("{}, so nothing was written to this tool", what),
+          .hint = "look why, then give the command again"};
 }
 
 std::string_view result_of_failure(const Error& error) {

@@ -161,7 +161,9 @@ Result<Target> resolve_target(const std::string& text, const Environment& enviro
   return tl::unexpected(
       Error{.code = Errc::usage,
             .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
-            .hint = fmt::format("{} {}", words.instead, targets->front().shown)});
+            .hint = words.remedy.empty()
+                        ? fmt::format("{} {}", words.instead, targets->front().shown)
+                        : std::string(words.remedy)});
 }
 
 }  // namespace spindle::work

@@ -307,8 +307,8 @@ class OneToolTest(GroupTest):
             self.group(one=server.url, two=server.url)
             rows = (
                 (["remote-start", "@line", "--yes"], "one tool at a time"),
-                (["restore", "@line", "some.yaml"], "one by one"),
-                (["diff", "@line", "some.yaml"], "each side"),
+                (["restore", "@line", "some.yaml"], "--dir FOLDER restores each"),
+                (["diff", "@line", "some.yaml"], "--dir FOLDER compares each"),
                 (["set", "@line", f"{TORQUE}=2.80", "--broadcast"], "--broadcast"),
                 (["do", "@line", "auto-output=off", "--broadcast"], "--broadcast"),
             )

@@ -136,10 +136,12 @@ struct BackupOptions {
 Result<Outcome> backup(const BackupOptions& options, Context& context);
 
 struct DiffOptions {
-  std::string a;  ///< target, group of one, backup file, or "defaults"
-  std::string b;
+  std::string a;  ///< target, group of one, backup file, or "defaults"; with a folder any group
+  std::string b;  ///< not with a folder
   std::vector<std::string> patterns;
   std::vector<std::string> ignored;
+  std::string folder;  ///< each tool is compared with its backup in it; empty: `a` with `b`
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> diff(const DiffOptions& options, Context& context);
 
@@ -147,13 +149,15 @@ enum class ModelCheck : std::uint8_t { strict, off };
 enum class OnFailure : std::uint8_t { roll_back, leave };
 
 struct RestoreOptions {
-  std::string target;
-  std::string file;
+  std::string target;  ///< with a folder also a group
+  std::string file;    ///< not with a folder
+  std::string folder;  ///< each tool is restored from its backup in it; empty: from `file`
   std::vector<std::string> patterns;
   Execution execution = Execution::real;
   ModelCheck model = ModelCheck::strict;
   OnFailure on_failure = OnFailure::roll_back;
   Storing storing = Storing::no;  ///< in non-volatile memory, once and only when all succeeded
+  std::size_t jobs = usual_jobs;
 };
 Result<Outcome> restore(const RestoreOptions& options, Context& context);
 

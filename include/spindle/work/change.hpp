@@ -15,6 +15,10 @@ bool is_interruption(const Error& error);
 /// The error of a write; of one that was cut off it also says that its effect is not known.
 Error of_write(const std::string& parameter, Error error);
 
+/// A tool that was planned for is not as it was then, so nothing is written to it. Error
+/// `mismatch`; `what` says what differs.
+Error changed_meanwhile(std::string_view what);
+
 /// The result of an action that failed: "refused" by the tool, or "unknown" where it can not be
 /// said whether it was done.
 std::string_view result_of_failure(const Error& error);

@@ -46,10 +46,12 @@ struct Resolution {
 Resolution resolve_each_target(const std::vector<std::string>& texts,
                                const Environment& environment);
 
-/// Why a command does not take a group, and what helps instead, before the name of the first tool.
+/// Why a command does not take a group, and what helps instead: a remedy, or else a beginning for
+/// the name of the first tool.
 struct OneTool {
   std::string_view why = "this command takes one";
   std::string_view instead = "name one of them, such as";
+  std::string_view remedy = {};
 };
 
 /// The same for a command that takes one tool; a group of several is an error.

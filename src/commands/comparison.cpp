@@ -1,0 +1,105 @@
+#include "comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "records.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using catalogue::Difference;
+using catalogue::Lacking;
+using catalogue::Profile;
+using catalogue::Selection;
+using report::Align;
+using report::Column;
+
+const std::array<Column, 5> columns = {{{"NAME", "name"},
+                                        {"REGISTER", "register", Align::right},
+                                        {"A", "a", Align::right},
+                                        {"B", "b", Align::right},
+                                        {"UNIT", "unit"}}};
+
+Error nothing_left() {
+  return {.code = Errc::usage,
+          .message = "no parameter is left to compare",
+          .hint = "name more of them, or ignore fewer"};
+}
+
+/// The unit of both sides, or one beside the other: "N.m / kgf.cm", "N.m / ?".
+std::string units_in_words(const Difference& difference) {
+  const std::string& common = difference.a ? difference.unit_a : difference.unit_b;
+  if (difference.units == catalogue::Units::same) return common;
+  const auto shown = [](const std::string& unit) { return unit.empty() ? std::string("?") : unit; };
+  return fmt::format("{} / {}", shown(difference.unit_a), shown(difference.unit_b));
+}
+
+report::Record difference_record(const Difference& difference, const std::string& target,
+                                 const Clock& clock) {
+  const auto side = [](std::string key, const std::optional<catalogue::Value>& value) {
+    return value ? report::Field{std::move(key), value->number, value->to_string()}
+                 : report::Field{std::move(key), report::Cell(), "-"};
+  };
+  return {.type = "diff",
+          .target = target,
+          .time = clock.wall(),
+          .fields = {{"name", difference.parameter.name},
+                     {"register", number(difference.parameter.address.value)},
+                     side("a", difference.a),
+                     side("b", difference.b),
+                     {"unit", text_or_null(units_in_words(difference))},
+                     {"unit_a", text_or_null(difference.unit_a)},
+                     {"unit_b", text_or_null(difference.unit_b)}}};
+}
+
+}  // namespace
+
+Result<void> check_selection(const DiffOptions& options, const Profile& profile) {
+  const auto selection = Selection::make(options.patterns, options.ignored, profile);
+  if (!selection) return tl::unexpected(selection.error());
+  const auto stored = catalogue::stored_parameters(profile);
+  const bool selects = std::any_of(stored.begin(), stored.end(), [&](const auto& parameter) {
+    return selection->contains(parameter);
+  });
+  if (!selects) return tl::unexpected(nothing_left());
+  return {};
+}
+
+Summary diff_summary(const DiffResult& result, const std::string& target) {
+  return {.counts = {{"different", count(result.different)}, {"same", count(result.same)}},
+          .sentence = fmt::format("{} different, {} the same", result.different, result.same),
+          .target = target};
+}
+
+Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, Lacking lacking,
+                           const std::string& target, Context& context) {
+  const auto& [a, b] = sides;
+  const auto selection = Selection::make(options.patterns, options.ignored, a.profile);
+  if (!selection) return tl::unexpected(selection.error());
+  const auto comparison = catalogue::compare(a.snapshot, b.snapshot, *selection, lacking);
+  DiffResult result{.different = comparison.differences.size(), .same = comparison.same};
+  const bool compared = result.same + result.different > 0 || !a.unreadable.empty() ||
+                        !b.unreadable.empty();
+  if (!compared) return tl::unexpected(nothing_left());
+  Listing listing(context, columns);
+  for (const Difference& difference : comparison.differences) {
+    listing.add(difference_record(difference, target, context.clock));
+  }
+  result.outcome.succeed();
+  if (result.different > 0) result.outcome.negate();
+  for (const SideContent* content : {&a, &b}) {
+    for (const Error& error : content->unreadable) {
+      result.outcome.fail(error);
+      listing.add(error);
+    }
+  }
+  return finish(listing, result.outcome, diff_summary(result, target), context)
+      .map([&](const Outcome&) { return result; });
+}
+
+}  // namespace spindle::commands
