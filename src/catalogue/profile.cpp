@@ -296,7 +296,7 @@ Result<Action> Profile::find_action(std::string_view name) const {
 }
 
 bool Profile::is_guarded_start(std::string_view action) const {
-  if (!run) return false;
+  if (!run || run->is_derived) return false;
   if (const StartActionFacts* facts = run->action()) return facts->start == action;
   const auto found = std::find_if(actions.begin(), actions.end(),
                                   [action](const Action& each) { return each.name == action; });

@@ -46,7 +46,7 @@ class RegisterSetup final : public MotorSetup {
   }
   [[nodiscard]] std::unique_ptr<device::Stopper> stopper(StopMode mode) const override {
     auto stopper = std::make_unique<device::CommandRegisterStopper>(*plan_->model, mode);
-    stopper->enabled();
+    stopper->assume_enabled();
     return stopper;
   }
   [[nodiscard]] Duration stopping() const override { return facts().stopping; }

@@ -47,7 +47,7 @@ Result<void> check_options(const RemoteStartOptions& options, const Profile& pro
 
 std::vector<std::string> start_options(const Profile& profile) {
   std::vector<std::string> options;
-  if (!profile.run) return options;
+  if (!profile.run || profile.run->is_derived) return options;
   if (const auto* action = profile.run->action()) {
     for (const auto& selection : action->selections) {
       options.push_back(fmt::format("--{}", selection.option));
@@ -73,6 +73,15 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options, con
                                           const Target& target) {
   const auto model = device::RunModel::of(profile);
   if (!model) return tl::unexpected(model.error());
+  if (profile.run->is_derived) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "its profile does not say how it is run, so it can be stopped, and is not "
+                         "started",
+              .hint = "'run' in the profile names the action that starts it, see "
+                      "spindle-profile(5)",
+              .name = profile.id});
+  }
   if (auto known = check_options(options, profile); !known) return tl::unexpected(known.error());
   switch (profile.run->kind()) {
     case catalogue::RunKind::start_action:

@@ -53,7 +53,9 @@ StopPursuit::StopPursuit(const OpenTool& tool, StopMode mode, const Context& con
           motion(), [this](Duration patience) { return open(patience); }, context_.clock,
           start_under_way) {
   target_.endpoint.claim = link::Claim::beside;
-  static_cast<void>(prepare_stop());  // it was started, so it can be stopped
+  // It was started, so it can be stopped. On a line that was left in the middle of an exchange what
+  // enables it may not be read in time; without that a motor coasts instead of being braked.
+  if (prepare_stop()) stopper_->assume_enabled();
 }
 
 device::GuardedMotion StopPursuit::motion() {

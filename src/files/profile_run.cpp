@@ -257,7 +257,6 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   assign(run.evidence, map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, need));
   assign(run.source, map.text("source", need));
   assign(run.still_runs, map.text("still-runs"));
-  assign(run.alarm_reset, map.text("alarm-reset"));
   if (auto* word = std::get_if<CommandWordFacts>(&run.model)) read_command_word(map, *word, model);
   if (auto* action = std::get_if<StartActionFacts>(&run.model)) {
     read_start_action(map, *action, model);
@@ -266,6 +265,23 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
     read_command_register(map, *values, model);
   }
   map.finish();
+}
+
+void derive_run(ProfileDraft& draft) {
+  if (draft.run.entry != nullptr || draft.profile.run || draft.incomplete) return;
+  const catalogue::Action* start = nullptr;
+  for (const catalogue::Action& action : draft.profile.actions) {
+    const bool starts = action.hazard == catalogue::Hazard::moves && action.value &&
+                        action.stop_value && action.motion == catalogue::Motion::none;
+    if (!starts) continue;
+    if (start != nullptr) return;
+    start = &action;
+  }
+  if (start == nullptr) return;
+  draft.profile.run = RunFacts{.model = StartActionFacts{.start = start->name},
+                               .evidence = start->evidence,
+                               .source = start->source,
+                               .is_derived = true};
 }
 
 }  // namespace spindle::files

@@ -29,7 +29,6 @@ class RunRules {
     if (!draft_.profile.run) return;
     const catalogue::RunFacts& run = *draft_.profile.run;
     if (run.source.empty()) findings_.add_once(draft_.run.of("source"), "run has no source");
-    if (!run.alarm_reset.empty()) require_action(run.alarm_reset, draft_.run.of("alarm-reset"));
     if (const auto* facts = run.action()) check_start_action(*facts);
     if (const auto* facts = run.word()) check_command_word(*facts);
     if (const auto* facts = run.command_register()) check_command_register(*facts);

@@ -10,6 +10,7 @@
 
 #include "files/profile_file.hpp"
 #include "files/profile_rules.hpp"
+#include "files/profile_run.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::files {
@@ -227,6 +228,7 @@ ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings
   // On what is half read, rules would find faults that are none.
   draft.finish();
   check_rules(draft, findings);
+  derive_run(draft);
   if (strictness == Strictness::check) check_guards(draft, findings);
   return draft;
 }

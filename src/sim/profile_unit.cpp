@@ -37,7 +37,7 @@ ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::Sim
       registers_(profile, start, BlvRegisters::Layout::exactly_as_named) {
   if (!profile.run) return;
   if (const auto* facts = profile.run->command_register()) run_ = *facts;
-  if (auto reset = profile.find_action(profile.run->alarm_reset)) alarm_reset_ = std::move(*reset);
+  if (auto reset = profile.find_action(profile.alarm_reset)) alarm_reset_ = std::move(*reset);
   if (!run_) return;
   begin_stopped();
   for (const catalogue::Text* name :

@@ -36,7 +36,7 @@ struct Bench {
   device::Device open() {
     const device::OpenTransport line = [&](const link::Endpoint&, const catalogue::LinkFacts&,
                                            Duration) -> Result<std::unique_ptr<link::Transport>> {
-      return sim::make_sim_transport(*bus, {++connections}, modbus::Framing::rtu, {}, answers,
+      return sim::make_sim_transport(*bus, {++connections}, modbus::Framing::rtu, faults, answers,
                                      clock, never);
     };
     return device::Device::open({.text = "rtu:///dev/line",
@@ -62,6 +62,7 @@ struct Bench {
   test::FakeClock clock = {};
   catalogue::Profile profile;
   std::unique_ptr<sim::BlvBus> bus;
+  sim::FaultPlan faults = {};
   sim::AnswerCounter answers = {};
   std::uint32_t connections = 0;
 };
@@ -107,6 +108,33 @@ TEST_CASE("a stop of which nothing is known never enables a motor") {
   const auto model = CommandRegister::of(bench.profile).value();
   CommandRegisterStopper stopper(model, StopMode::decelerate);
   CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+  CHECK(bench.read(command_at) == 0);
+}
+
+TEST_CASE("a stop by who enabled a motor keeps it enabled, also where that can not be read") {
+  Bench bench("held-drive");
+  bench.write(command_at, forward | held);
+  bench.clock.advance(2s);
+  bench.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
+  auto device = bench.open();
+  device.set_retries(0);
+  const auto model = CommandRegister::of(bench.profile).value();
+  const auto stopper = model.stopper(StopMode::decelerate);
+  stopper->assume_enabled();
+  stopper->observe(device);
+  CHECK(stopper->stop(device, bench.clock) == StopResult::confirmed);
+  CHECK(bench.read(command_at) == held);
+}
+
+TEST_CASE("what is read of a motor counts more than what its program was about to do") {
+  Bench bench("held-drive");
+  bench.write(command_at, forward);
+  auto device = bench.open();
+  const auto model = CommandRegister::of(bench.profile).value();
+  const auto stopper = model.stopper(StopMode::decelerate);
+  stopper->assume_enabled();
+  stopper->observe(device);
+  CHECK(stopper->stop(device, bench.clock) == StopResult::confirmed);
   CHECK(bench.read(command_at) == 0);
 }
 

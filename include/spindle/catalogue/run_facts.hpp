@@ -174,9 +174,11 @@ struct RunFacts {
   std::variant<StartActionFacts, CommandWordFacts, CommandRegisterFacts> model = CommandWordFacts{};
   /// What to look at when a stop is not confirmed, as one sentence; may be empty.
   Text still_runs = {};
-  Text alarm_reset = {};  ///< action that ends an alarm; may be empty
   Evidence evidence = Evidence::inferred;
   Text source = {};
+  /// The profile does not say it, but has one action that starts a motion and ends it: it can be
+  /// stopped, and is not started.
+  bool is_derived = false;
 
   [[nodiscard]] RunKind kind() const { return static_cast<RunKind>(model.index()); }
   [[nodiscard]] const CommandWordFacts* word() const {

@@ -48,8 +48,7 @@ class CommandRegisterStopper final : public Stopper {
   CommandRegisterStopper(const CommandRegister& model, catalogue::StopMode mode)
       : model_(&model), mode_(mode) {}
 
-  /// This program has enabled the motor, which stays so while it is stopped.
-  void enabled() { enabling_ = model_->enabling_bit(); }
+  void assume_enabled() override { enabling_ = model_->enabling_bit(); }
   /// Reads whether it is enabled.
   void observe(Device& device) override;
   Result<void> send(Device& device) override;
@@ -58,7 +57,7 @@ class CommandRegisterStopper final : public Stopper {
  private:
   const CommandRegister* model_;
   catalogue::StopMode mode_;
-  std::uint32_t enabling_ = 0;  ///< not known: a stop never enables
+  std::uint32_t enabling_ = 0;  ///< nothing is known: a stop does not enable
 };
 
 }  // namespace spindle::device

@@ -20,6 +20,10 @@ class Stopper {
   /// The motor was seen to run by what this program sent.
   virtual void seen_running() {}
 
+  /// This program has enabled the motor, or was about to: it stays so while it is stopped, unless
+  /// observe() reads that it is not.
+  virtual void assume_enabled() {}
+
   /// Reads how a motor runs that another program started, before the first stop. A stop does not
   /// wait for it: an answer that does not come soon ends it, and what is not known is not needed.
   virtual void observe(Device& device) { static_cast<void>(device); }
