@@ -111,7 +111,7 @@ struct Typed {
   const CommandDescription* command = nullptr;
   std::vector<std::string> arguments = {};
   const OptionDescription* awaits_value = nullptr;
-  std::string profile = {};         ///< of --profile
+  std::string profile = {};          ///< of --profile
   std::set<std::string> given = {};  ///< options that take a value, by their last names
   bool options_ended = false;
 };

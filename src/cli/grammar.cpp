@@ -924,6 +924,26 @@ void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
   });
 }
 
+/// The options about what only some simulated tools have.
+void add_abilities(CLI::App* command, TypedSimulate& typed) {
+  option(command, "--identity-bytes", typed.identity_bytes, "N",
+         "length of the identity: 12, 13 or 17")
+      ->group(of_identity);
+  option(command, "--firmware", typed.firmware, "N", "firmware number to report")
+      ->group(of_identity);
+  option(command, "--serial", typed.serial, "N", "serial number to report")->group(of_identity);
+  option(command, "--model", typed.model, "N", "tool model code to report")->group(of_identity);
+  option(command, "--rundown-every", typed.rundown_every, "DURATION",
+         "an operator who drives a screw at this interval (default: nobody)")
+      ->group(of_screwdrivers);
+  option(command, "--ng-every", typed.ng_every, "N",
+         "every so many of the operator's screws end NG")
+      ->group(of_screwdrivers);
+  option(command, "--burst", typed.burst, "N",
+         "results that each of the operator's screws brings, all at once (default 1)")
+      ->group(of_screwdrivers);
+}
+
 void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
   constexpr Words words = {
       "simulate", "PROFILE [--listen URL]",
@@ -966,24 +986,7 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
     repeatable("--alarm", options.alarms,
                "an alarm that the tool raises, such as 30h, or 30h@5s after a time; repeatable");
     repeatable("--warning", options.warnings, "a warning in the same form");
-    option(command, "--identity-bytes", typed.simulate.identity_bytes, "N",
-           "length of the identity: 12, 13 or 17")
-        ->group(of_identity);
-    option(command, "--firmware", typed.simulate.firmware, "N", "firmware number to report")
-        ->group(of_identity);
-    option(command, "--serial", typed.simulate.serial, "N", "serial number to report")
-        ->group(of_identity);
-    option(command, "--model", typed.simulate.model, "N", "tool model code to report")
-        ->group(of_identity);
-    option(command, "--rundown-every", typed.simulate.rundown_every, "DURATION",
-           "an operator who drives a screw at this interval (default: nobody)")
-        ->group(of_screwdrivers);
-    option(command, "--ng-every", typed.simulate.ng_every, "N",
-           "every so many of the operator's screws end NG")
-        ->group(of_screwdrivers);
-    option(command, "--burst", typed.simulate.burst, "N",
-           "results that each of the operator's screws brings, all at once (default 1)")
-        ->group(of_screwdrivers);
+    add_abilities(command, typed.simulate);
     command
         ->add_option("--outage", options.outages,
                      "let the tool be away at times, repeatable; see below")

@@ -83,8 +83,8 @@ Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, L
   if (!selection) return tl::unexpected(selection.error());
   const auto comparison = catalogue::compare(a.snapshot, b.snapshot, *selection, lacking);
   DiffResult result{.different = comparison.differences.size(), .same = comparison.same};
-  const bool compared = result.same + result.different > 0 || !a.unreadable.empty() ||
-                        !b.unreadable.empty();
+  const bool compared =
+      result.same + result.different > 0 || !a.unreadable.empty() || !b.unreadable.empty();
   if (!compared) return tl::unexpected(nothing_left());
   Listing listing(context, columns);
   for (const Difference& difference : comparison.differences) {

@@ -29,8 +29,7 @@ struct DiffResult {
 /// Lists what differs, and what could not be read. `target` is the tool that it is told of; empty:
 /// none. Error `usage` where nothing could be compared, which proves nothing.
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options,
-                           catalogue::Lacking lacking, const std::string& target,
-                           Context& context);
+                           catalogue::Lacking lacking, const std::string& target, Context& context);
 
 Summary diff_summary(const DiffResult& result, const std::string& target);
 

@@ -131,8 +131,8 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
   if (!b) return tl::unexpected(b.error());
   if (!a->target && !b->target) return diff_files(*a, *b, options, context);
   const Counterparts other{.side = a->target ? *b : *a, .is_first = !a->target};
-  return run_verb(Diff(options, other, context),
-                  {.tools = {a->target ? *a->target : *b->target}}, options.jobs, context);
+  return run_verb(Diff(options, other, context), {.tools = {a->target ? *a->target : *b->target}},
+                  options.jobs, context);
 }
 
 Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {

@@ -5,10 +5,10 @@
 #include <variant>
 
 #include "listing.hpp"
+#include "motor_records.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/device/run_model.hpp"
 #include "spindle/work/identification.hpp"
 #include "spindle/work/shared_lines.hpp"
 
@@ -77,27 +77,6 @@ void tell_notes(const Identified& identified, const Context& context) {
   }
 }
 
-/// What can be read of a motor whose product has no identity: whether it runs, its alarm, and the
-/// setting that its run model depends on; empty where nothing says how it runs.
-std::string state_words(OpenTool& tool) {
-  const auto model = device::RunModel::of(*tool.profile);
-  const device::MotorMonitor* monitor = model ? (*model)->monitor() : nullptr;
-  if (monitor == nullptr) return {};
-  const auto state = monitor->look(tool.device);
-  if (!state) return "its registers could not be read";
-  std::string words = state->running ? "it says: motor runs" : "it says: motor stands still";
-  if (!monitor->facts().alarm.empty()) {
-    words += state->alarm == 0 ? ", no alarm" : fmt::format(", alarm {:02X}h", state->alarm);
-  }
-  const std::string setting = (*model)->telling_setting();
-  if (setting.empty()) return words;
-  const auto parameter = tool.profile->select({setting});
-  if (!parameter) return {};
-  const auto readings = tool.device.read_each(*parameter, device::Limits::skip);
-  if (!readings || !readings->front().value) return "its registers could not be read";
-  return fmt::format("{}, {} {}", words, setting, readings->front().value->to_string());
-}
-
 /// One exchange that touches nothing. A device that knows only reads and writes of registers stays
 /// silent to others, so its first parameter is read.
 Result<Duration> meet_once(OpenTool& tool) {
@@ -123,7 +102,7 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
       "{}, but {} can not prove what it is: profile {} is what the user named",
       tool.profile->link.loopback ? "answers a loop-back" : "answers",
       tool.profile->series.empty() ? "it" : "a " + tool.profile->series, tool.profile->id));
-  if (auto words = state_words(tool); !words.empty()) {
+  if (auto words = motor_state_words(tool); !words.empty()) {
     found.identity.notes.push_back(std::move(words));
   }
   return Identified{identity_record(tool, found, *round_trip, clock), std::nullopt};

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "records.hpp"
+#include "spindle/device/run_model.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -87,6 +88,25 @@ std::vector<report::Column> motor_columns(Tools tools) {
                                  {"LOAD", "load", Align::right, 4},
                                  {"TEXT", "text", Align::left, 1}});
   return columns;
+}
+
+std::string motor_state_words(OpenTool& tool) {
+  const auto model = device::RunModel::of(*tool.profile);
+  const device::MotorMonitor* monitor = model ? (*model)->monitor() : nullptr;
+  if (monitor == nullptr) return {};
+  const auto state = monitor->look(tool.device);
+  if (!state) return "its registers could not be read";
+  std::string words = state->running ? "it says: motor runs" : "it says: motor stands still";
+  if (!monitor->facts().alarm.empty()) {
+    words += state->alarm == 0 ? ", no alarm" : fmt::format(", alarm {:02X}h", state->alarm);
+  }
+  const std::string setting = (*model)->telling_setting();
+  if (setting.empty()) return words;
+  const auto parameter = tool.profile->select({setting});
+  if (!parameter) return {};
+  const auto readings = tool.device.read_each(*parameter, device::Limits::skip);
+  if (!readings || !readings->front().value) return "its registers could not be read";
+  return fmt::format("{}, {} {}", words, setting, readings->front().value->to_string());
 }
 
 }  // namespace spindle::commands

@@ -23,6 +23,10 @@ std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts);
 report::Record motor_record(const device::MotorNews& news, const Target& target,
                             const catalogue::CodeTables& tables);
 
+/// What can be read of a motor, in words: whether it runs, its alarm, and the setting that its run
+/// model depends on; empty where nothing says how it runs.
+std::string motor_state_words(OpenTool& tool);
+
 /// Columns of a stream of news of motors, drawn row by row.
 std::vector<report::Column> motor_columns(Tools tools);
 

@@ -80,8 +80,9 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     add_plan(task, target, listing, context.clock);
     Summary summary = restore_plan_summary(result.counts, target.shown);
     if (!is_group_) summary.sentence += nothing_written;
-    return finish(listing, result.outcome, std::move(summary), context)
-        .map([&](const Outcome&) { return result; });
+    return finish(listing, result.outcome, std::move(summary), context).map([&](const Outcome&) {
+      return result;
+    });
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
@@ -166,11 +167,11 @@ Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
   auto targets = resolve_one_or_group(options.target, Reach::one, context);
   if (!targets || !options.folder.empty()) return targets;
   if (targets->tools.size() > 1) {
-    return tl::unexpected(Error{
-        .code = Errc::usage,
-        .message = fmt::format("'{}' is {} tools, and one FILE is restored to one", options.target,
-                               targets->tools.size()),
-        .hint = "--dir FOLDER restores each from its own backup in it"});
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = fmt::format("'{}' is {} tools, and one FILE is restored to one",
+                                     options.target, targets->tools.size()),
+              .hint = "--dir FOLDER restores each from its own backup in it"});
   }
   targets->is_group = false;
   return targets;

@@ -81,8 +81,8 @@ Result<RestoreTask> confirm_unchanged(const RestoreTask& task, OpenTool& tool,
   if (!now) return now;
   const std::string before = serial_of(task.present);
   if (const std::string serial = serial_of(now->present); serial != before) {
-    return tl::unexpected(work::changed_meanwhile(fmt::format(
-        "serial {} answers now, and it was {} that was planned for", serial, before)));
+    return tl::unexpected(work::changed_meanwhile(
+        fmt::format("serial {} answers now, and it was {} that was planned for", serial, before)));
   }
   const auto changed = catalogue::compare(task.present, now->present, {});
   for (const catalogue::Difference& difference : changed.differences) {

@@ -39,8 +39,8 @@ std::span<const Column> restore_columns() {
 
 void add_plan(const RestoreTask& task, const Target& target, Listing& listing, const Clock& clock) {
   for (const catalogue::PlannedWrite& write : task.plan.writes) {
-    listing.add(change_record(write.parameter, write.before, Ending::planned, write.after, target,
-                              clock));
+    listing.add(
+        change_record(write.parameter, write.before, Ending::planned, write.after, target, clock));
   }
 }
 

@@ -117,8 +117,9 @@ void RestoreRun::write_all() {
       fail(done.error());
     }
     if (!errors_.empty()) return roll_back();
-    progress_.advance(
-        {.what = tool_->target.shown + ": writing", .done = ++counts_.written, .total = writes.size()});
+    progress_.advance({.what = tool_->target.shown + ": writing",
+                       .done = ++counts_.written,
+                       .total = writes.size()});
   }
 }
 
@@ -257,14 +258,13 @@ std::string RestoreRun::command_to_finish() const {
 /// What was written and is not put back, because nobody wants it so.
 void RestoreRun::tell_what_stays() {
   const std::size_t planned = task_->plan.writes.size();
-  const bool left =
-      !errors_.empty() && counts_.written < planned && counts_.rolled_back == 0;
+  const bool left = !errors_.empty() && counts_.written < planned && counts_.rolled_back == 0;
   if (!left || options_->on_failure != OnFailure::leave) return;
-  Error error = with_target(
-      Error{
-          .code = errors_.front().code,
-          .message = fmt::format("{} of {} parameters are written and stay so", counts_.written, planned)},
-      tool_->target);
+  Error error =
+      with_target(Error{.code = errors_.front().code,
+                        .message = fmt::format("{} of {} parameters are written and stay so",
+                                               counts_.written, planned)},
+                  tool_->target);
   error.hint = fmt::format("{} writes the rest", command_to_finish());
   errors_.push_back(error);
 }

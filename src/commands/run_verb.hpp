@@ -86,10 +86,10 @@ Result<Outcome> VerbRun<V>::on_one(const Target& target) {
     });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  const auto plan =
-      verb_->examine(opened->tool, std::move(opened->prepared), *context_).and_then([&](Plan known) {
-        return ask_by(V::Basis::tool, opened->tool.target, std::move(known));
-      });
+  const auto plan = verb_->examine(opened->tool, std::move(opened->prepared), *context_)
+                        .and_then([&](Plan known) {
+                          return ask_by(V::Basis::tool, opened->tool.target, std::move(known));
+                        });
   if (!plan) return tl::unexpected(plan.error());
   return finish(opened->tool, *plan, *context_).map([](const Done& done) {
     return outcome_of(done);

@@ -300,12 +300,15 @@ Result<void> FlagSource::take_result(EventOrigin origin) {
     block = device_->event_block();
   }
   if (!block) {
-    tell_(GapNews{std::nullopt, fmt::format("there is a result, and it could not be read: {}",
-                                            message_of(block.error()))});
+    tell_(GapNews{
+        std::nullopt,
+        fmt::format("there is a result, and it could not be read: {}", message_of(block.error())),
+        true});
   } else if (told_ == *block) {
     tell_(GapNews{1,
                   "the result that was read is the one before: another came before it was read, "
-                  "or both are equal"});
+                  "or both are equal",
+                  true});
   } else {
     tell(origin, std::move(*block));
   }
@@ -323,7 +326,7 @@ Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doub
     tell(origin, std::move(*block));
     return {};
   }
-  if (!doubt.empty()) tell_(GapNews{std::nullopt, doubt});
+  if (!doubt.empty()) tell_(GapNews{std::nullopt, doubt, true});
   if (!block) return tl::unexpected(std::move(block.error()));
   return {};
 }
@@ -331,7 +334,8 @@ Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doub
 void FlagSource::tell(EventOrigin origin, Registers block) {
   seen_ = block;
   told_ = block;
-  tell_(EventNews{origin, std::move(block), clock_->wall()});
+  tell_(EventNews{
+      .source = origin, .block = std::move(block), .time = clock_->wall(), .is_only_here = true});
 }
 
 }  // namespace

@@ -158,12 +158,11 @@ Result<Target> resolve_target(const std::string& text, const Environment& enviro
   auto targets = resolve_targets({text}, environment);
   if (!targets) return tl::unexpected(std::move(targets.error()));
   if (targets->size() == 1) return std::move(targets->front());
-  return tl::unexpected(
-      Error{.code = Errc::usage,
-            .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
-            .hint = words.remedy.empty()
-                        ? fmt::format("{} {}", words.instead, targets->front().shown)
-                        : std::string(words.remedy)});
+  return tl::unexpected(Error{
+      .code = Errc::usage,
+      .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
+      .hint = words.remedy.empty() ? fmt::format("{} {}", words.instead, targets->front().shown)
+                                   : std::string(words.remedy)});
 }
 
 }  // namespace spindle::work

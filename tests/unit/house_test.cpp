@@ -107,6 +107,11 @@ const std::vector<BannedWord> banned_words = {
 // Lines of code in main.cpp; includes, comments and blank lines are free.
 constexpr std::ptrdiff_t longest_main = 20;
 
+// Lines from the head of a function to its closing brace, and of the file of a verb.
+constexpr std::ptrdiff_t longest_function = 60;
+constexpr std::ptrdiff_t longest_verb = 200;
+constexpr std::string_view verbs_header = "include/spindle/commands/commands.hpp";
+
 // Spelt in halves so that this file does not find itself.
 const std::vector<std::string> unfinished = {std::string("TO") + "DO", std::string("FIX") + "ME"};
 
@@ -375,23 +380,122 @@ void check_run_models(const Source& source, Findings& findings) {
   findings.push_back(source.path + ": asks the profile how it is run, instead of the run model");
 }
 
-Findings judge(const Source& source) {
-  Findings findings;
-  for (const auto rule :
-       {check_layers, check_private_headers, check_homes, check_words, check_formats,
-        check_finished, check_pragma_once, check_main, check_run_models}) {
-    rule(source, findings);
-  }
-  return findings;
-}
-
-// ---- the tree ----
+// ---- budgets ----
 
 std::string read(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   REQUIRE_MESSAGE(stream.is_open(), path.string());
   return {std::istreambuf_iterator<char>(stream), {}};
 }
+
+/// Walks through the braces of a file. A brace whose head has parentheses opens a function, or
+/// what looks like one from outside; any other one a space, a class or a table, which may hold
+/// functions.
+class FunctionWalk {
+ public:
+  explicit FunctionWalk(const Source& source) : code_(statements_of(source)) {}
+
+  struct Function {
+    std::string name;
+    std::ptrdiff_t lines;
+  };
+
+  std::vector<Function> run() {
+    for (; at_ < code_.size(); ++at_) {
+      const char c = code_[at_];
+      if (c == '(') ++parentheses_;
+      if (c == ')') --parentheses_;
+      if (parentheses_ == 0 && c == '{' && has_parameters_) end_function();
+      if (parentheses_ == 0 && (c == '{' || c == '}' || c == ';')) {
+        head_ = std::string::npos;
+        has_parameters_ = false;
+        continue;
+      }
+      if (head_ == std::string::npos && std::isspace(static_cast<unsigned char>(c)) == 0)
+        head_ = at_;
+      has_parameters_ = has_parameters_ || c == ')';
+    }
+    return std::move(functions_);
+  }
+
+ private:
+  /// Goes to the brace that ends the function that begins here.
+  void end_function() {
+    const std::string head = code_.substr(head_, at_ - head_);
+    for (std::size_t depth = 0; at_ < code_.size(); ++at_) {
+      if (code_[at_] == '{') ++depth;
+      if (code_[at_] == '}' && --depth == 0) break;
+    }
+    const std::string whole = code_.substr(head_, at_ - head_);
+    functions_.push_back({name_of(head), std::count(whole.begin(), whole.end(), '\n') + 1});
+  }
+
+  static std::string name_of(const std::string& head) {
+    const std::string_view front = trimmed(std::string_view(head).substr(0, head.find('(')));
+    const std::size_t blank = front.find_last_of(" \n\t*&");
+    return std::string(blank == std::string_view::npos ? front : front.substr(blank + 1));
+  }
+
+  std::string code_;
+  std::size_t at_ = 0;
+  std::size_t head_ = std::string::npos;  ///< where what stands before the next brace begins
+  std::ptrdiff_t parentheses_ = 0;
+  bool has_parameters_ = false;
+  std::vector<Function> functions_ = {};
+};
+
+void check_functions(const Source& source, Findings& findings) {
+  for (const auto& [name, lines] : FunctionWalk(source).run()) {
+    if (lines <= longest_function) continue;
+    findings.push_back(fmt::format("{}: {} has {} lines, more than {}", source.path, name, lines,
+                                   longest_function));
+  }
+}
+
+/// What stands at the beginning of a line where a command is declared or defined.
+std::vector<std::string> commands_in(const std::string& text) {
+  constexpr std::string_view begin = "Result<Outcome> ";
+  std::vector<std::string> names;
+  for (const std::string& line : lines_of(text)) {
+    const std::size_t open = line.find('(');
+    if (!line.starts_with(begin) || open == std::string::npos) continue;
+    names.push_back(line.substr(begin.size(), open - begin.size()));
+  }
+  return names;
+}
+
+Names verbs() {
+  const auto names =
+      commands_in(read(std::filesystem::path(SPINDLE_SOURCE_DIR) / std::string(verbs_header)));
+  return {names.begin(), names.end()};
+}
+
+bool defines_verb(const Source& source) {
+  static const Names known = verbs();
+  const auto defined = commands_in(source.text);
+  return source.path.starts_with("src/commands/") && source.path.ends_with(".cpp") &&
+         std::any_of(defined.begin(), defined.end(),
+                     [&](const std::string& name) { return known.contains(name); });
+}
+
+void check_verbs(const Source& source, Findings& findings) {
+  const std::ptrdiff_t lines = std::count(source.text.begin(), source.text.end(), '\n');
+  if (lines <= longest_verb || !defines_verb(source)) return;
+  findings.push_back(fmt::format("{}: is the file of a verb and has {} lines, more than {}",
+                                 source.path, lines, longest_verb));
+}
+
+Findings judge(const Source& source) {
+  Findings findings;
+  for (const auto rule : {check_layers, check_private_headers, check_homes, check_words,
+                          check_formats, check_finished, check_pragma_once, check_main,
+                          check_run_models, check_functions, check_verbs}) {
+    rule(source, findings);
+  }
+  return findings;
+}
+
+// ---- the tree ----
 
 std::vector<Source> sources_under(const std::string& folder) {
   const std::filesystem::path root(SPINDLE_SOURCE_DIR);
@@ -498,6 +602,8 @@ TEST_CASE("a file that breaks the law is found") {
       {{"src/link/a.cpp", "#include <modbus/modbus.h>\n"},
        "src/link/a.cpp: modbus/modbus.h is not at home in link"},
       {{"src/main.cpp", "#include <modbus.h>\n"}, "src/main.cpp: modbus.h is not at home in main"},
+      {{"src/work/a.cpp", "#include \"spindle/report/renderer.hpp\"\n"},
+       "src/work/a.cpp: work must not see spindle/report/renderer.hpp"},
       {{"src/report/a.cpp", "#include <iostream>\n"},
        "src/report/a.cpp: iostream is not at home in report"},
       {{"src/cli/a.cpp", "#include <cstdio>\n"}, "src/cli/a.cpp: cstdio is not at home in cli"},
@@ -540,6 +646,81 @@ TEST_CASE("a main that grew too long is found") {
   CHECK(joined(judge({.path = "src/main.cpp", .text = lines + "call();\n"})) ==
         fmt::format("src/main.cpp: has {} lines of code, more than {}", longest_main + 1,
                     longest_main));
+}
+
+namespace {
+
+std::string repeated(std::string_view line, std::ptrdiff_t times) {
+  std::string lines;
+  for (std::ptrdiff_t at = 0; at < times; ++at) lines += line;
+  return lines;
+}
+
+}  // namespace
+
+TEST_CASE("a function that grew too long is found, wherever it stands") {
+  struct Row {
+    const char* what;
+    std::string before;  ///< with the head
+    std::string behind;  ///< the closing brace
+    std::ptrdiff_t lines = 2;
+  };
+  const Row rows[] = {
+      {"a function", "void f() {\n", "}\n"},
+      {"of a namespace", "namespace a {\nnamespace {\nvoid f() {\n", "}\n}\n}\n"},
+      {"of a class", "class A final : public B {\n public:\n  void f() const override {\n",
+       "  }\n};\n"},
+      {"its head counts",
+       "template <typename T>\nauto A<T>::f(int a,\n  int b) const -> Result<T> {\n", "}\n", 4},
+      {"behind defaults in braces", "void f(Options options = {},\n  int b = 1) {\n", "}\n", 3},
+      {"behind a table", "const int table[] = {1, 2};\nvoid f() {\n", "}\n"},
+      {"behind parentheses and braces that are none",
+       "const char a = '{';\nauto b = \"}) {\";\n// ) {\nvoid f() {\n", "}\n"},
+      {"with braces in it", "void f() {\n  if (a) {\n  } else {\n  }\n", "}\n", 5},
+      {"with members in its head", "A::f(int a) : b_(a) {\n", "}\n"},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.what);
+    const auto source = [&](std::ptrdiff_t more) -> Source {
+      const std::string body = repeated("  call();\n", longest_function - row.lines + more);
+      return {.path = "src/base/a.cpp", .text = row.before + body + row.behind};
+    };
+    CHECK(joined(judge(source(0))).empty());
+    const std::string found = joined(judge(source(1)));
+    CHECK_MESSAGE(found.ends_with(fmt::format("f has {} lines, more than {}", longest_function + 1,
+                                              longest_function)),
+                  found);
+  }
+}
+
+TEST_CASE("a class or a table may be longer than a function") {
+  for (const char* head : {"class A {\n", "const Row rows[] = {\n", "namespace a {\n"}) {
+    CAPTURE(head);
+    const std::string text = head + repeated("  {1, 2},\n", 2 * longest_function) + "};\n";
+    CHECK(judge({.path = "src/base/a.cpp", .text = text}).empty());
+  }
+}
+
+TEST_CASE("a verb that grew too long is found, and every verb is known") {
+  const std::string verb = "Result<Outcome> get(const GetOptions& options, Context& context) {}\n";
+  const std::string filled = verb + repeated("\n", longest_verb - 1);
+  CHECK(judge({.path = "src/commands/get.cpp", .text = filled}).empty());
+  CHECK(joined(judge({.path = "src/commands/a.cpp", .text = filled + "\n"})) ==
+        fmt::format("src/commands/a.cpp: is the file of a verb and has {} lines, more than {}",
+                    longest_verb + 1, longest_verb));
+  CHECK(judge({.path = "src/commands/a.cpp",
+               .text = "Result<Outcome> help() {}\n" + repeated("\n", longest_verb)})
+            .empty());
+  Names defined;
+  for (const Source& source : sources_under("src/commands")) {
+    if (!defines_verb(source)) continue;
+    for (const std::string& name : commands_in(source.text)) defined.insert(name);
+  }
+  for (const std::string& name : verbs()) {
+    CAPTURE(name);
+    CHECK(defined.contains(name));
+  }
+  CHECK(verbs().size() >= 20);
 }
 
 TEST_CASE("a file that keeps the law is left alone") {

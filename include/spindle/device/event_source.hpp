@@ -32,12 +32,14 @@ struct EventNews {
   Registers block;
   WallTime time;
   Standing standing = Standing::result;
+  bool is_only_here = false;  ///< the tool gave it away when it was read
 };
 
 /// Events that happened, or may have, and were not seen.
 struct GapNews {
   std::optional<std::uint32_t> missed;  ///< empty: unknown
   std::string reason;
+  bool is_only_here = false;  ///< as of a result
 };
 
 /// How events are learned of.

@@ -1,0 +1,240 @@
+#include "watch_stream.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+#include "records.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using device::Heed;
+
+/// Whether the tool gave it away: then it is told, or lost.
+bool is_only_here(const device::News& news) {
+  const auto* event = std::get_if<device::EventNews>(&news);
+  const auto* gap = std::get_if<device::GapNews>(&news);
+  return (event != nullptr && event->is_only_here) || (gap != nullptr && gap->is_only_here);
+}
+
+}  // namespace
+
+WatchStream::WatchStream(const WatchOptions& options, std::size_t tools,
+                         const std::vector<report::Column>& columns, Context& context)
+    : options_(&options),
+      context_(&context),
+      tools_(tools),
+      status_(context),
+      out_(context.io, context.interrupt),
+      listing_(context, columns),
+      started_(context.clock.now()),
+      last_event_(started_) {}
+
+Heed WatchStream::tell(const device::News& news, Voice& voice) {
+  const std::lock_guard lock(mutex_);
+  if (ended_ && !is_only_here(news)) return Heed::stop;
+  if (out_.is_full()) {
+    drop(news, voice.dropped);
+    return Heed::go_on;
+  }
+  status_.clear();
+  tell_dropped(voice);
+  listing_.add(std::visit([&](const auto& one) { return record_of(one, *voice.records); }, news));
+  show_status();
+  const bool counted = options_->count > 0 && heard_ >= options_->count;
+  if (counted || !listing_.open()) end();
+  return ended_ ? Heed::stop : Heed::go_on;
+}
+
+/// How the watch of one tool ended. `unreached` says why there never was a link to it.
+void WatchStream::leave(const Result<void>& watched, const std::optional<Error>& unreached,
+                        Voice& voice) {
+  const std::lock_guard lock(mutex_);
+  status_.clear();
+  tell_dropped(voice);
+  // Once the whole ends, it is we who interrupt the others.
+  const bool ends_well = watched || ended_;
+  const bool asked_to_end = !ends_well && (watched.error().status() == ExitStatus::interrupted ||
+                                           watched.error().status() == ExitStatus::terminated);
+  if (unreached && !closed_ && (ends_well || asked_to_end)) {
+    outcome_.fail(*unreached);
+    listing_.add(*unreached);
+  } else if (ends_well) {
+    outcome_.succeed();
+  }
+  if (ends_well) return;
+  outcome_.fail(watched.error());
+  if (!asked_to_end) listing_.add(watched.error());
+}
+
+/// When to end, as far as is known now.
+TimePoint WatchStream::until() {
+  const std::lock_guard lock(mutex_);
+  if (context_->io.out_is_open && !context_->io.out_is_open()) {
+    closed_ = true;
+    end();
+  }
+  if (ended_) return TimePoint::min();
+  TimePoint until = TimePoint::max();
+  if (options_->duration) until = started_ + *options_->duration;
+  if (options_->idle_timeout) until = std::min(until, last_event_ + *options_->idle_timeout);
+  return until;
+}
+
+Result<Outcome> WatchStream::finish() {
+  status_.clear();
+  if (closed_) return tl::unexpected(Error{.code = Errc::closed_pipe});
+  if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  const bool idle =
+      options_->idle_timeout && context_->clock.now() >= last_event_ + *options_->idle_timeout;
+  if (idle && heard_ == 0) outcome_.negate();
+  const auto left = out_.drain();
+  if (!left) return tl::unexpected(left.error());
+  if (*left > 0) return give_up(*left);
+  if (auto told = summarise(); !told) return tl::unexpected(std::move(told.error()));
+  return out_.drain().map([&](std::size_t) { return outcome_; });
+}
+
+report::Record WatchStream::record_of(const device::EventNews& news, const NewsRecords& records) {
+  report::Record record = records.event(news);
+  if (news.standing == device::Standing::remembered) {
+    ++counts_.remembered;
+    return record;
+  }
+  if (news.source == device::EventOrigin::catch_up) ++counts_.caught_up;
+  const catalogue::EventKind kind = records.kind_of(news.block);
+  ++counts_.events;
+  if (kind == catalogue::EventKind::fastening_ok) ++counts_.ok;
+  if (kind == catalogue::EventKind::fastening_ng) ++counts_.ng;
+  hear();
+  return record;
+}
+
+report::Record WatchStream::record_of(const device::MotorNews& news, const NewsRecords& records) {
+  ++counts_.events;
+  hear();
+  return records.motor(news);
+}
+
+report::Record WatchStream::record_of(const device::ValueNews& news, const NewsRecords& records) {
+  const bool sample = options_->samples == device::Samples::all;
+  ++(sample ? counts_.samples : counts_.changes);
+  hear();
+  return records.value(news, sample ? "sample" : "change", context_->clock.wall());
+}
+
+report::Record WatchStream::record_of(const device::GapNews& news, const NewsRecords& records) {
+  ++counts_.gaps;
+  return records.gap(news, context_->clock.wall());
+}
+
+report::Record WatchStream::record_of(const device::LagNews& news, const NewsRecords& records) {
+  counts_.missed_intervals += news.missed;
+  return records.lag(news, context_->clock.wall());
+}
+
+report::Record WatchStream::record_of(const device::LinkNews& news, const NewsRecords& records) {
+  note_link(news);
+  return records.link(news, context_->clock.wall());
+}
+
+void WatchStream::note_link(const device::LinkNews& news) {
+  if (news.state == device::LinkState::lost) {
+    ++counts_.losses;
+    --connected_;
+  }
+  if (news.state == device::LinkState::connected) ++connected_;
+}
+
+/// Something came, as --count and --idle-timeout mean it.
+void WatchStream::hear() {
+  ++heard_;
+  last_event_ = context_->clock.now();
+}
+
+void WatchStream::drop(const device::News& news, Dropped& dropped) {
+  ++dropped.records;
+  if (const auto* link = std::get_if<device::LinkNews>(&news)) note_link(*link);
+  std::optional<std::uint32_t> events = 0;
+  if (std::holds_alternative<device::EventNews>(news) ||
+      std::holds_alternative<device::MotorNews>(news)) {
+    events = 1;
+  }
+  if (const auto* gap = std::get_if<device::GapNews>(&news)) events = gap->missed;
+  if (!events) dropped.events.reset();
+  if (dropped.events) *dropped.events += *events;
+}
+
+/// In the place of what was not told.
+void WatchStream::tell_dropped(Voice& voice) {
+  if (voice.dropped.records == 0) return;
+  const Dropped dropped = std::exchange(voice.dropped, {});
+  ++counts_.gaps;
+  report::Record record = voice.records->gap(
+      {dropped.events, fmt::format("{} not told, because nobody took what was told before",
+                                   counted(dropped.records, "record"))},
+      context_->clock.wall());
+  record.fields.push_back({"dropped", count(dropped.records)});
+  listing_.add(record);
+}
+
+/// Under the stream, where both are one terminal.
+void WatchStream::show_status() {
+  const bool alone = context_->user.verbosity == Verbosity::normal;
+  if (!context_->io.out_is_terminal || !alone) return;
+  out_.settle();
+  status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),
+                           counted(counts_.ok + counts_.ng, "result"), counts_.ng));
+}
+
+/// Wakes the other tools' threads too; each still says its farewell.
+void WatchStream::end() {
+  if (!ended_) context_->end_waits();
+  ended_ = true;
+}
+
+/// A signal came, and nobody takes what there is to tell.
+Result<Outcome> WatchStream::give_up(std::size_t left) {
+  outcome_.fail(context_->interrupt.error());
+  if (!context_->io.err_is_ready || context_->io.err_is_ready()) {
+    context_->renderer.note(fmt::format(
+        "{} could not be written: nobody took them from standard output", counted(left, "record")));
+  }
+  return outcome_;
+}
+
+std::string WatchStream::sentence() const {
+  std::string text = counted(counts_.events, "event");
+  if (counts_.caught_up > 0) text += fmt::format(" ({} caught up)", counts_.caught_up);
+  text += fmt::format(", {} OK, {} NG, {}, ", counts_.ok, counts_.ng,
+                      counted(counts_.changes, "change"));
+  if (counts_.samples > 0) text += counted(counts_.samples, "sample") + ", ";
+  if (counts_.remembered > 0)
+    text += fmt::format("{} remembered by a restarted tool, ", counts_.remembered);
+  text += fmt::format("{}, {}", counted(counts_.gaps, "gap"), counted(counts_.losses, "reconnect"));
+  if (counts_.missed_intervals > 0)
+    text += ", " + counted(counts_.missed_intervals, "interval") + " missed";
+  return text;
+}
+
+Result<void> WatchStream::summarise() {
+  return context_->renderer.summary(
+      summary_record({{"events", count(counts_.events)},
+                      {"ok", count(counts_.ok)},
+                      {"ng", count(counts_.ng)},
+                      {"caught_up", count(counts_.caught_up)},
+                      {"remembered", count(counts_.remembered)},
+                      {"changes", count(counts_.changes)},
+                      {"samples", count(counts_.samples)},
+                      {"gaps", count(counts_.gaps)},
+                      {"reconnects", count(counts_.losses)},
+                      {"missed_intervals", count(counts_.missed_intervals)}},
+                     outcome_.status(), {}, context_->clock),
+      sentence());
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "event_records.hpp"
+#include "listing.hpp"
+#include "patient_out.hpp"
+#include "progress.hpp"
+#include "spindle/commands/commands.hpp"
+
+namespace spindle::commands {
+
+/// What was not told of one tool, because nobody took what was told before.
+struct Dropped {
+  std::size_t records = 0;
+  std::optional<std::uint32_t> events = 0;  ///< among them, and in gaps; empty: unknown
+};
+
+/// What one tool tells, and how.
+struct Voice {
+  std::optional<NewsRecords> records = std::nullopt;
+  Dropped dropped = {};
+};
+
+/// What all tools of one watch share: the stream of records, its counts, and when it ends. Several
+/// threads may call it. Never waits for the reader of the output: what finds no room is a gap.
+class WatchStream {
+ public:
+  /// All must outlive it.
+  WatchStream(const WatchOptions& options, std::size_t tools,
+              const std::vector<report::Column>& columns, Context& context);
+  WatchStream(const WatchStream&) = delete;
+  WatchStream& operator=(const WatchStream&) = delete;
+
+  /// What a tool has to tell. Once the watch has ended, only what would be lost is still told.
+  device::Heed tell(const device::News& news, Voice& voice);
+
+  /// How the watch of one tool ended. `unreached` says why there never was a link to it.
+  void leave(const Result<void>& watched, const std::optional<Error>& unreached, Voice& voice);
+
+  /// When to end, as far as is known now; asks, too, whether the output still has a reader.
+  TimePoint until();
+
+  /// The end of the whole, with its summary, once every tool has left.
+  Result<Outcome> finish();
+
+ private:
+  struct Counts {
+    std::size_t events = 0;
+    std::size_t ok = 0;
+    std::size_t ng = 0;
+    std::size_t caught_up = 0;
+    std::size_t remembered = 0;
+    std::size_t changes = 0;
+    std::size_t samples = 0;
+    std::size_t gaps = 0;
+    std::size_t losses = 0;
+    std::size_t missed_intervals = 0;
+  };
+
+  report::Record record_of(const device::EventNews& news, const NewsRecords& records);
+  report::Record record_of(const device::MotorNews& news, const NewsRecords& records);
+  report::Record record_of(const device::ValueNews& news, const NewsRecords& records);
+  report::Record record_of(const device::GapNews& news, const NewsRecords& records);
+  report::Record record_of(const device::LagNews& news, const NewsRecords& records);
+  report::Record record_of(const device::LinkNews& news, const NewsRecords& records);
+  void note_link(const device::LinkNews& news);
+  void hear();
+  void drop(const device::News& news, Dropped& dropped);
+  void tell_dropped(Voice& voice);
+  void show_status();
+  void end();
+  Result<Outcome> give_up(std::size_t left);
+  [[nodiscard]] std::string sentence() const;
+  Result<void> summarise();
+
+  const WatchOptions* options_;
+  Context* context_;
+  std::size_t tools_;
+  std::mutex mutex_ = {};
+  ProgressLine status_;
+  PatientOut out_;
+  Listing listing_;
+  Outcome outcome_ = {};
+  TimePoint started_;
+  TimePoint last_event_;
+  std::size_t heard_ = 0;  ///< as --count means it
+  Counts counts_ = {};
+  std::size_t connected_ = 0;
+  bool ended_ = false;
+  bool closed_ = false;  ///< the output has no reader any more
+};
+
+}  // namespace spindle::commands
