@@ -30,6 +30,7 @@ class FlagServer(support.Port):
         self.results = 0
         self.mute = []  # first registers of the reads that get no answer, each once
         self.is_simple = False  # silent to whatever is no read or write of registers
+        self.gate = None  # what the answer of a flag that was set waits for
         self.behind_flag = []  # torques of results that come right behind a flag that was set
         self._guard = threading.RLock()
 
@@ -55,10 +56,13 @@ class FlagServer(support.Port):
         with self._guard:
             if self.is_simple and request.function == support.REPORT_SERVER_ID:
                 return
+            is_taken = request.words and request.words[0] == FLAG and self.is_waiting
             function, data = self._read(request)
             if request.words and request.words[0] in self.mute:
                 self.mute.remove(request.words[0])
                 return
+        if is_taken and self.gate:
+            self.gate.wait(support.DEADLINE)
         connection.sendall(hostile_server.frame(request.transaction, function, data, unit=1))
 
     def _read(self, request):
@@ -102,6 +106,21 @@ class Results(unittest.TestCase):
             self.assertEqual((summary["ok"], summary["ng"]), (16, 4))
             told = [record["message"] for record in watching.records("link") if "cannot be known" in record["message"]]
             self.assertEqual(len(told), 1)
+
+    def test_a_result_that_was_taken_while_another_tool_ended_the_watch(self):
+        with FlagServer() as one, FlagServer() as other:
+            watching = self.enterContext(Watching(one.url, other.url, *PROFILE, "--json", "--count", "1"))
+            support.wait_until(lambda: one.flag_reads and other.flag_reads, "both flags were looked at")
+            other.gate = threading.Event()
+            other.result(200)
+            support.wait_until(lambda: not other.is_waiting, "the flag is taken")
+            one.result(100)
+            self.wait_for(watching, "event")
+            other.gate.set()
+            self.assertEqual(watching.end(None)[0], 0)
+            self.assertEqual(sorted(self.torques(watching)), [100, 200])
+            self.assertEqual(watching.records("gap"), [])
+            self.assertEqual(watching.records("summary")[0]["events"], 2)
 
     def test_nothing_else_reads_the_flag(self):
         with FlagServer() as server:
