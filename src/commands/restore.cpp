@@ -65,8 +65,9 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     return confirm_unchanged(plan, tool, *options_, context);
   }
 
-  [[nodiscard]] bool needs_tool(const Plan& plan) const override {
-    return !is_dry_run() && plan.plan.findings.empty();
+  /// What the tool has no register for is told as part of the run.
+  [[nodiscard]] bool needs_tool(const Plan& task) const override {
+    return changes(task) || (is_carried_out(task) && task.plan.count(catalogue::Skip::absent) > 0);
   }
 
   Result<Done> conclude(const Target& target, const Plan& task, Context& context) const override {
@@ -78,8 +79,9 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     result.outcome.succeed();
     Listing listing(context, restore_columns());
     add_plan(task, target, listing, context.clock);
-    Summary summary = restore_plan_summary(result.counts, target.shown);
-    if (!is_group_) summary.sentence += nothing_written;
+    Summary summary = is_dry_run() ? restore_plan_summary(result.counts, target.shown)
+                                   : restore_summary(result.counts, {}, target.shown);
+    if (is_dry_run() && !is_group_) summary.sentence += nothing_written;
     return finish(listing, result.outcome, std::move(summary), context).map([&](const Outcome&) {
       return result;
     });
@@ -126,8 +128,11 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
 
   [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
   [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
+  [[nodiscard]] bool is_carried_out(const RestoreTask& task) const {
+    return !is_dry_run() && task.plan.findings.empty();
+  }
   [[nodiscard]] bool changes(const RestoreTask& task) const {
-    return needs_tool(task) && (stores() || !task.plan.writes.empty());
+    return is_carried_out(task) && (stores() || !task.plan.writes.empty());
   }
 
   void tell_warnings(const RestoreTask& task, const Target& target, Context& context) const {
