@@ -181,26 +181,20 @@ Error bad_raw_register(std::string_view text) {
     return unknown(text, "not a raw register", std::move(hint));
   }
   return unknown(text, "not a raw register",
-                 "write @holding:2 or @input:3204/i16, with u16, i16, u32 or i32 behind the slash");
-}
-
-std::optional<RegisterTable> parse_table(std::string_view text) {
-  for (const auto table : {RegisterTable::holding, RegisterTable::input}) {
-    if (to_text(table) == text) return table;
-  }
-  return std::nullopt;
+                 fmt::format("write @holding:2 or @input:3204/i16, with {} behind the slash",
+                             kind_words.alternatives()));
 }
 
 Result<Parameter> parse_raw(std::string_view text) {
   const std::string_view body = text.substr(1);
   const std::size_t colon = body.find(':');
   if (colon == std::string_view::npos) return tl::unexpected(bad_raw_register(text));
-  const auto table = parse_table(body.substr(0, colon));
+  const auto table = modbus::table_words.find(body.substr(0, colon));
   const std::string_view rest = body.substr(colon + 1);
   const std::size_t slash = rest.find('/');
   const auto address = parse_unsigned(rest.substr(0, slash), last_register);
   const auto kind = slash == std::string_view::npos ? std::optional(Kind::u16)
-                                                    : parse_kind(rest.substr(slash + 1));
+                                                    : kind_words.find(rest.substr(slash + 1));
   if (!table || !address || !kind) return tl::unexpected(bad_raw_register(text));
   if (*address + register_count(*kind) - 1 > last_register) {
     return tl::unexpected(
@@ -220,14 +214,11 @@ Result<Parameter> parse_raw(std::string_view text) {
 
 }  // namespace
 
-std::string_view to_text(EventKind kind) {
-  return event_kind_texts.at(static_cast<std::size_t>(kind));
-}
-
-std::optional<EventKind> parse_event_kind(std::string_view text) {
-  const auto* const known = std::find(event_kind_texts.begin(), event_kind_texts.end(), text);
-  if (known == event_kind_texts.end()) return std::nullopt;
-  return static_cast<EventKind>(known - event_kind_texts.begin());
+std::optional<Duration> SerialFacts::gap_at(unsigned baud) const {
+  for (const GapRule& rule : gaps) {
+    if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
+  }
+  return std::nullopt;
 }
 
 Result<void> check_pair(Kind kind, const LinkFacts& link) {

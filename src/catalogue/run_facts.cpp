@@ -70,18 +70,6 @@ std::uint16_t CommandWordFacts::selecting(std::uint16_t number) const {
   return static_cast<std::uint16_t>(shifted & select);
 }
 
-std::string_view to_text(RunKind kind) {
-  switch (kind) {
-    case RunKind::start_action:
-      return "start-action";
-    case RunKind::command_word:
-      return "command-word";
-    case RunKind::command_register:
-      return "command-register";
-  }
-  return "";
-}
-
 bool RunFacts::is_command(std::string_view parameter) const {
   if (const auto* by_word = word()) return parameter == by_word->command;
   const auto* by_register = command_register();

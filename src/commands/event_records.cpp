@@ -78,31 +78,16 @@ Field result_of(EventKind kind) {
   return only_shown("result", "");
 }
 
-std::string_view to_text(device::EventOrigin source) {
-  switch (source) {
-    case device::EventOrigin::push:
-      return "push";
-    case device::EventOrigin::poll:
-      return "poll";
-    case device::EventOrigin::catch_up:
-      return "catch-up";
-  }
-  return "";
-}
+constexpr auto origin_words =
+    enum_table<device::EventOrigin>({{"push", device::EventOrigin::push},
+                                     {"poll", device::EventOrigin::poll},
+                                     {"catch-up", device::EventOrigin::catch_up}});
 
-std::string_view to_text(device::LinkState state) {
-  switch (state) {
-    case device::LinkState::connecting:
-      return "connecting";
-    case device::LinkState::connected:
-      return "connected";
-    case device::LinkState::lost:
-      return "lost";
-    case device::LinkState::reconnecting:
-      return "reconnecting";
-  }
-  return "";
-}
+constexpr auto link_words =
+    enum_table<device::LinkState>({{"connecting", device::LinkState::connecting},
+                                   {"connected", device::LinkState::connected},
+                                   {"lost", device::LinkState::lost},
+                                   {"reconnecting", device::LinkState::reconnecting}});
 
 std::string missed_text(std::optional<std::uint32_t> missed) {
   if (!missed) return "perhaps events missed";
@@ -144,7 +129,7 @@ Record NewsRecords::event(const device::EventNews& news) const {
   const EventKind kind = kind_of(news.block);
   record.fields.reserve(keys_.size() + 7);
   record.fields.push_back({"kind", std::string(catalogue::to_text(kind))});
-  record.fields.push_back({"source", std::string(to_text(news.source))});
+  record.fields.push_back({"source", std::string(origin_words.text(news.source))});
   std::string text;
   for (std::size_t index = 0; index < keys_.size(); ++index) {
     const auto& [parameter, at] = layout_->fields()[index];
@@ -228,12 +213,13 @@ Record NewsRecords::link(const device::LinkNews& news, WallTime time) const {
   const Tone tone = news.state == device::LinkState::lost ? Tone::bad : Tone::plain;
   std::string text = news.state == device::LinkState::connected
                          ? news.message
-                         : fmt::format("{}: {}", to_text(news.state), news.message);
+                         : fmt::format("{}: {}", link_words.text(news.state), news.message);
   if (news.state == device::LinkState::reconnecting ||
       news.state == device::LinkState::connecting) {
-    text = fmt::format("{}, attempt {}: {}", to_text(news.state), news.attempt, news.message);
+    text =
+        fmt::format("{}, attempt {}: {}", link_words.text(news.state), news.attempt, news.message);
   }
-  record.fields = {{"state", std::string(to_text(news.state))},
+  record.fields = {{"state", std::string(link_words.text(news.state))},
                    {"attempt", number(news.attempt)},
                    {"message", news.message},
                    only_shown("kind", "link", tone),

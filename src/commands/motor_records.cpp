@@ -36,22 +36,6 @@ std::string words_of(const device::MotorNews& news, const catalogue::CodeTables&
 
 }  // namespace
 
-std::string_view kind_of(MotorEvent event) {
-  switch (event) {
-    case MotorEvent::started:
-      return "started";
-    case MotorEvent::at_speed:
-      return "at-speed";
-    case MotorEvent::warning:
-      return "warning";
-    case MotorEvent::alarm:
-      return "alarm";
-    case MotorEvent::stopped:
-      return "stopped";
-  }
-  return "";
-}
-
 std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts) {
   if (code == 0) return {};
   const std::string meaning = meaning_of(code, texts);
@@ -63,7 +47,7 @@ report::Record motor_record(const device::MotorNews& news, const Target& target,
   const device::MotorState& state = news.state;
   const bool bad = news.event == MotorEvent::alarm || news.event == MotorEvent::warning;
   report::Record record{.type = "event", .target = target.shown, .time = news.time, .fields = {}};
-  record.fields = {{"kind", std::string(kind_of(news.event))},
+  record.fields = {{"kind", std::string(motor_event_words.text(news.event))},
                    {"source", std::string("poll")},
                    {"speed", number_or_null(state.feedback_speed)},
                    {"command_speed", number_or_null(state.command_speed)},

@@ -13,8 +13,13 @@
 
 namespace spindle::commands {
 
-/// "started", "at-speed", "warning", "alarm" or "stopped".
-std::string_view kind_of(device::MotorEvent event);
+/// As in records.
+inline constexpr auto motor_event_words =
+    enum_table<device::MotorEvent>({{"started", device::MotorEvent::started},
+                                    {"at-speed", device::MotorEvent::at_speed},
+                                    {"warning", device::MotorEvent::warning},
+                                    {"alarm", device::MotorEvent::alarm},
+                                    {"stopped", device::MotorEvent::stopped}});
 
 /// "30h overload"; the code alone when it is not known, empty when it is 0.
 std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts);

@@ -24,23 +24,13 @@ std::string_view words_of(Direction direction) {
   return direction == Direction::forward ? "forward" : "in reverse";
 }
 
-std::string_view to_text(MotorEnding ending) {
-  switch (ending) {
-    case MotorEnding::elapsed:
-      return "ran";
-    case MotorEnding::alarm:
-      return "alarm";
-    case MotorEnding::stopped:
-      return "stopped";
-    case MotorEnding::ignored:
-      return "not-started";
-    case MotorEnding::too_fast:
-      return "too-fast";
-    case MotorEnding::unseen:
-      return "not-seen";
-  }
-  return "";
-}
+/// As in records.
+constexpr auto ending_words = enum_table<MotorEnding>({{"ran", MotorEnding::elapsed},
+                                                       {"alarm", MotorEnding::alarm},
+                                                       {"stopped", MotorEnding::stopped},
+                                                       {"not-started", MotorEnding::ignored},
+                                                       {"too-fast", MotorEnding::too_fast},
+                                                       {"not-seen", MotorEnding::unseen}});
 
 /// One run of a motor: what is told of it, and how it ended.
 class MotorRun final : public ToolRun {
@@ -129,7 +119,7 @@ class MotorRun final : public ToolRun {
     } else {
       guarded_->outcome().succeed();
     }
-    const std::string result(followed ? to_text(*ending_) : "");
+    const std::string result(followed ? ending_words.text(*ending_) : "");
     return {.result = result,
             .subject = result == "ran" ? "ran; the motor" : "the motor",
             .logged = result};

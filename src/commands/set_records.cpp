@@ -49,30 +49,6 @@ std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
 
 }  // namespace
 
-std::string_view to_text(Ending ending) {
-  switch (ending) {
-    case Ending::planned:
-      return "planned";
-    case Ending::written:
-      return "written";
-    case Ending::unchanged:
-      return "unchanged";
-    case Ending::coerced:
-      return "coerced";
-    case Ending::mismatch:
-      return "mismatch";
-    case Ending::refused:
-      return "refused";
-    case Ending::unknown:
-      return "unknown";
-    case Ending::rolled_back:
-      return "rolled-back";
-    case Ending::sent:
-      return "sent";
-  }
-  return "";
-}
-
 Ending ending_of(device::WriteResult result) {
   switch (result) {
     case device::WriteResult::written:
@@ -111,7 +87,7 @@ report::Record change_record(const Parameter& parameter, const std::optional<Val
     const bool changes = before != now;
     record.fields.push_back({"changes", changes, changes ? "yes" : "no"});
   }
-  record.fields.push_back({"result", std::string(to_text(ending))});
+  record.fields.push_back({"result", std::string(ending_words.text(ending))});
   return record;
 }
 

@@ -26,7 +26,15 @@ enum class Ending : std::uint8_t {
   sent
 };
 
-std::string_view to_text(Ending ending);
+inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::planned},
+                                                         {"written", Ending::written},
+                                                         {"unchanged", Ending::unchanged},
+                                                         {"coerced", Ending::coerced},
+                                                         {"mismatch", Ending::mismatch},
+                                                         {"refused", Ending::refused},
+                                                         {"unknown", Ending::unknown},
+                                                         {"rolled-back", Ending::rolled_back},
+                                                         {"sent", Ending::sent}});
 Ending ending_of(device::WriteResult result);
 
 std::span<const report::Column> set_plan_columns();

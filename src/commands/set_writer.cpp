@@ -57,7 +57,8 @@ void SetWriter::fail(const Error& error) {
 
 void SetWriter::send_one(const SetStep& step) {
   const auto& [parameter, value, text] = step.assignment;
-  work::LoggedChange change = work::logged(parameter, value, value, to_text(Ending::sent));
+  work::LoggedChange change =
+      work::logged(parameter, value, value, ending_words.text(Ending::sent));
   change.old_value.reset();
   const std::string id = log_.begin(change);
   const auto sent = tool_->device.broadcast(parameter, value);

@@ -7,39 +7,21 @@
 namespace spindle::commands {
 namespace {
 
-std::string_view to_text(link::Decision decision) {
-  switch (decision) {
-    case link::Decision::request:
-      return "request";
-    case link::Decision::answer:
-      return "answer";
-    case link::Decision::exception_response:
-      return "exception response";
-    case link::Decision::spontaneous:
-      return "event, kept";
-    case link::Decision::broken:
-      return "not the answer to our request, ignored";
-    case link::Decision::stray:
-      return "stray frame, ignored";
-    case link::Decision::late:
-      return "late answer, ignored";
-    case link::Decision::echo:
-      return "echo of our request, ignored";
-    case link::Decision::junk:
-      return "no frame";
-    case link::Decision::unanswered:
-      return "no answer";
-    case link::Decision::retry:
-      return "asking again";
-    case link::Decision::resync:
-      return "resync";
-    case link::Decision::doubt:
-      return "doubt";
-    case link::Decision::proof:
-      return "proving the answer";
-  }
-  return "";
-}
+constexpr auto decision_words =
+    enum_table<link::Decision>({{"request", link::Decision::request},
+                                {"answer", link::Decision::answer},
+                                {"exception response", link::Decision::exception_response},
+                                {"event, kept", link::Decision::spontaneous},
+                                {"not the answer to our request, ignored", link::Decision::broken},
+                                {"stray frame, ignored", link::Decision::stray},
+                                {"late answer, ignored", link::Decision::late},
+                                {"echo of our request, ignored", link::Decision::echo},
+                                {"no frame", link::Decision::junk},
+                                {"no answer", link::Decision::unanswered},
+                                {"asking again", link::Decision::retry},
+                                {"resync", link::Decision::resync},
+                                {"doubt", link::Decision::doubt},
+                                {"proving the answer", link::Decision::proof}});
 
 link::Trace frames_as_lines(const std::string& target, const report::Streams& io,
                             const Clock& clock) {
@@ -56,7 +38,7 @@ link::Trace frames_as_lines(const std::string& target, const report::Streams& io
               },
           .decision =
               [line](link::Decision decision, std::string_view text) {
-                line(fmt::format("   {}: {}", to_text(decision), text));
+                line(fmt::format("   {}: {}", decision_words.text(decision), text));
               }};
 }
 

@@ -39,9 +39,9 @@ sim::ServeOptions serve_options(const link::Endpoint& place, const catalogue::Pr
                           .pty = place.device,
                           .faults = std::move(faults)};
   if (profile.link.framing == modbus::Framing::tcp) return serve;
-  serve.baud = options.tool.baud.value_or(profile.link.serial.baud);
-  serve.line = {.character_time = simulated_character_time(profile.link, options.tool.baud),
-                .gaps = options.gaps};
+  const modbus::SerialSettings line = simulated_line(profile.link, options.tool.baud);
+  serve.baud = line.baud;
+  serve.line = {.character_time = character_time(line), .gaps = options.gaps};
   return serve;
 }
 
@@ -69,23 +69,14 @@ struct Traffic {
   }
 };
 
-std::string_view words_of(sim::Heard heard) {
-  switch (heard) {
-    case sim::Heard::connected:
-      return "connected";
-    case sim::Heard::request:
-      return "->";
-    case sim::Heard::response:
-      return "<-";
-    case sim::Heard::disconnected:
-      return "disconnected";
-  }
-  return "";
-}
+constexpr auto heard_words = enum_table<sim::Heard>({{"connected", sim::Heard::connected},
+                                                     {"->", sim::Heard::request},
+                                                     {"<-", sim::Heard::response},
+                                                     {"disconnected", sim::Heard::disconnected}});
 
 void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Context& context) {
   context.io.err(fmt::format("{} client {} {} {}\n", report::to_text(context.clock.wall()),
-                             connection, words_of(heard), to_hex(bytes)));
+                             connection, heard_words.text(heard), to_hex(bytes)));
 }
 
 /// What was heard and will not be answered, which a real tool would keep to itself.

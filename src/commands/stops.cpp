@@ -7,17 +7,10 @@
 namespace spindle::commands {
 namespace {
 
-std::string_view to_text(device::StopResult result) {
-  switch (result) {
-    case device::StopResult::confirmed:
-      return "confirmed";
-    case device::StopResult::sent:
-      return "sent";
-    case device::StopResult::unconfirmed:
-      return "not-confirmed";
-  }
-  return "";
-}
+constexpr auto stop_words =
+    enum_table<device::StopResult>({{"confirmed", device::StopResult::confirmed},
+                                    {"sent", device::StopResult::sent},
+                                    {"not-confirmed", device::StopResult::unconfirmed}});
 
 }  // namespace
 
@@ -27,7 +20,7 @@ report::Record stop_record(device::StopResult result, const Target& target, cons
           .time = clock.wall(),
           .fields = {{"action", std::string("stop")},
                      {"value", report::Cell()},
-                     {"result", std::string(to_text(result))}}};
+                     {"result", std::string(stop_words.text(result))}}};
 }
 
 std::span<const report::Column> stop_columns() {

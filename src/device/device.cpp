@@ -8,7 +8,6 @@
 
 #include "device/hints.hpp"
 #include "spindle/device/command_word.hpp"
-#include "spindle/link/serial_settings.hpp"
 
 namespace spindle::device {
 namespace {
@@ -113,11 +112,8 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
 /// A profile without rules gives more than the standard asks for, because there are devices that do
 /// not hear what the standard allows.
 Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
-  for (const catalogue::GapRule& rule : serial.gaps) {
-    if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
-  }
   constexpr int caution = 3;
-  return caution * link::standard_silence(baud);
+  return serial.gap_at(baud).value_or(caution * modbus::standard_silence(baud));
 }
 
 link::Units units_of(const catalogue::Profile& profile) {
@@ -148,7 +144,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   session.first_transaction = transaction_at(now);
   if (session.rules.framing == modbus::Framing::rtu) {
     const catalogue::SerialFacts& serial = profile.link.serial;
-    const auto line = link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits);
+    const auto line = link::serial_settings(endpoint, serial.line);
     session.gap = endpoint.gap.value_or(gap_of(serial, line.baud));
     session.broadcast_gap = session.gap + serial.broadcast_pause;
     session.character_time = character_time(line);
@@ -238,22 +234,6 @@ std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& o
 }
 
 }  // namespace
-
-std::string_view to_text(WriteResult result) {
-  switch (result) {
-    case WriteResult::written:
-      return "written";
-    case WriteResult::coerced:
-      return "coerced";
-    case WriteResult::mismatch:
-      return "mismatch";
-    case WriteResult::refused:
-      return "refused";
-    case WriteResult::unknown:
-      break;
-  }
-  return "unknown";
-}
 
 bool is_refusal(const Error& error) {
   return error.code == Errc::exception_response && !is_postponed(error) &&

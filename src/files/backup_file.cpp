@@ -35,12 +35,9 @@ constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max(
 /// The longest value that any encoding has.
 constexpr std::size_t most_words = 2;
 
-constexpr std::array<std::pair<std::string_view, modbus::RegisterTable>, 2> table_words = {
-    {{"holding", modbus::RegisterTable::holding}, {"input", modbus::RegisterTable::input}}};
-constexpr std::array<std::pair<std::string_view, Missing>, 3> missing_words = {
-    {{"absent", Missing::absent},
-     {"unreadable", Missing::unreadable},
-     {"left-out", Missing::left_out}}};
+constexpr auto missing_words = enum_table<Missing>({{"absent", Missing::absent},
+                                                    {"unreadable", Missing::unreadable},
+                                                    {"left-out", Missing::left_out}});
 
 // ---- writing ----
 
@@ -141,9 +138,8 @@ std::string lines_of_missing(const Snapshot& snapshot) {
   if (snapshot.missing.empty()) return {};
   std::string lines = "missing:\n";
   for (const MissingEntry& entry : snapshot.missing) {
-    const auto* const why = std::find_if(missing_words.begin(), missing_words.end(),
-                                         [&](const auto& row) { return row.second == entry.why; });
-    lines += fmt::format("  - {{{}, why: {}}}\n", place_of(entry.parameter), why->first);
+    lines += fmt::format("  - {{{}, why: {}}}\n", place_of(entry.parameter),
+                         missing_words.text(entry.why));
   }
   return lines;
 }
@@ -174,7 +170,7 @@ BackupLine read_place(YamlMap& map) {
   line.value_at = line.at;
   assign(line.name, map.text("name", Need::required));
   assign(line.address, map.number<std::uint16_t>("register", Need::required));
-  assign(line.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  assign(line.table, map.word("table", "table", modbus::table_words));
   return line;
 }
 
@@ -204,7 +200,7 @@ void read_entry(const YamlNode& node, BackupFile& file, Findings& findings) {
 void read_missing(const YamlNode& node, BackupFile& file, Findings& findings) {
   YamlMap map(node, findings);
   BackupLine line = read_place(map);
-  line.missing = map.word<Missing>("why", "reason", missing_words, Need::required);
+  line.missing = map.word("why", "reason", missing_words, Need::required);
   map.finish();
   file.lines.push_back(std::move(line));
 }

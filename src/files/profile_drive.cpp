@@ -16,11 +16,11 @@ namespace {
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 
-constexpr std::array<std::pair<std::string_view, catalogue::CodeTable>, 4> table_of_codes = {
-    {{"error-codes", catalogue::CodeTable::error},
-     {"warning-codes", catalogue::CodeTable::warning},
-     {"refusals", catalogue::CodeTable::refusal},
-     {"none", catalogue::CodeTable::none}}};
+constexpr auto code_table_words =
+    enum_table<catalogue::CodeTable>({{"error-codes", catalogue::CodeTable::error},
+                                      {"warning-codes", catalogue::CodeTable::warning},
+                                      {"refusals", catalogue::CodeTable::refusal},
+                                      {"none", catalogue::CodeTable::none}});
 
 // ---- rules ----
 
@@ -206,8 +206,7 @@ void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findi
     if (auto parameter = map.text("parameters", Need::required)) {
       list.parameters = {std::move(*parameter)};
     }
-    assign(list.codes,
-           map.word<catalogue::CodeTable>("codes", "table", table_of_codes, Need::required));
+    assign(list.codes, map.word("codes", "table", code_table_words, Need::required));
     map.finish();
     lists.push_back(std::move(list));
   }

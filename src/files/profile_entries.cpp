@@ -24,38 +24,21 @@ constexpr std::size_t most_parameters = 10'000;
 
 constexpr std::string_view counter = "{n}";
 
-constexpr std::array<std::pair<std::string_view, Kind>, 4> encoding_words = {
-    {{"u16", Kind::u16}, {"i16", Kind::i16}, {"u32", Kind::u32}, {"i32", Kind::i32}}};
-
 /// Longer ones would break every table.
 constexpr std::size_t longest_unit = 12;
 
-constexpr std::array<std::pair<std::string_view, catalogue::Cloning>, 2> clone_words = {
-    {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}}};
+constexpr auto clone_words = enum_table<catalogue::Cloning>(
+    {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}});
 
-constexpr std::array<std::pair<std::string_view, catalogue::Reading>, 2> reading_words = {
-    {{"harmless", catalogue::Reading::harmless}, {"consumes", catalogue::Reading::consumes}}};
+constexpr auto reading_words = enum_table<catalogue::Reading>(
+    {{"harmless", catalogue::Reading::harmless}, {"consumes", catalogue::Reading::consumes}});
 
-constexpr std::array<std::pair<std::string_view, catalogue::Effect>, 5> effect_words = {
-    {{"at-once", catalogue::Effect::at_once},
-     {"after-stop", catalogue::Effect::after_stop},
-     {"after-configuration", catalogue::Effect::after_configuration},
-     {"after-power-cycle", catalogue::Effect::after_power_cycle},
-     {"unknown", catalogue::Effect::unknown}}};
+constexpr auto notation_words = enum_table<catalogue::Notation>(
+    {{"decimal", catalogue::Notation::decimal}, {"hex", catalogue::Notation::hexadecimal}});
 
-constexpr std::array<std::pair<std::string_view, catalogue::Notation>, 2> notation_words = {
-    {{"decimal", catalogue::Notation::decimal}, {"hex", catalogue::Notation::hexadecimal}}};
-
-constexpr std::array<std::pair<std::string_view, catalogue::Motion>, 2> motion_words = {
-    {{"start", catalogue::Motion::start}, {"stop", catalogue::Motion::stop}}};
-
-constexpr std::array<std::pair<std::string_view, Hazard>, 6> hazard_words = {
-    {{"none", Hazard::none},
-     {"moves", Hazard::moves},
-     {"locks", Hazard::locks},
-     {"unclear", Hazard::unclear},
-     {"erases", Hazard::erases},
-     {"link", Hazard::link}}};
+constexpr auto motion_words = enum_table<catalogue::Motion>({{"start", catalogue::Motion::start},
+                                                             {"stop", catalogue::Motion::stop},
+                                                             {"", catalogue::Motion::none}});
 
 /// One entry before it is repeated.
 struct Template {
@@ -199,7 +182,7 @@ std::string read_name(YamlMap& map, const YamlNode* group) {
 void read_repetition(YamlMap& map, Template& entry) {
   const auto numbers = map.range("n", last_register);
   const auto stride = map.number<std::uint16_t>("stride");
-  entry.repeats = map.word<Evidence>("repeats", "evidence", evidence_words);
+  entry.repeats = map.word("repeats", "evidence", catalogue::evidence_words);
   const bool has_counter = entry.parameter.name.view().find(counter) != std::string_view::npos;
   const bool has_range = map.get("n") != nullptr;
   if (has_counter != has_range) {
@@ -222,12 +205,12 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
   Parameter& parameter = entry.parameter;
   parameter.name = read_name(map, group);
   assign(parameter.title, map.text("title", Need::required));
-  assign(parameter.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  assign(parameter.table, map.word("table", "table", modbus::table_words));
   if (auto address = map.number<std::uint16_t>("register", Need::required)) {
     parameter.address = {*address};
   }
   assign(parameter.encoding.kind,
-         map.word<Kind>("encoding", "encoding", encoding_words, Need::required));
+         map.word("encoding", "encoding", catalogue::kind_words, Need::required));
   read_scale(map, parameter);
   read_unit(map, parameter);
   read_limits(map, parameter);
@@ -236,20 +219,19 @@ Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
     parameter.labels = read_labels(*labels, map.findings());
   }
   read_bits(map, parameter);
-  assign(parameter.notation, map.word<catalogue::Notation>("notation", "notation", notation_words));
-  assign(parameter.effect, map.word<catalogue::Effect>("effect", "effect", effect_words));
+  assign(parameter.notation, map.word("notation", "notation", notation_words));
+  assign(parameter.effect, map.word("effect", "effect", catalogue::effect_words));
   assign(parameter.risk, map.text("risk"));
   parameter.settle = map.duration("settle");
-  assign(parameter.hazard, map.word<Hazard>("hazard", "hazard", hazard_words));
-  assign(parameter.access,
-         map.word<catalogue::Access>("access", "access", access_words, Need::required));
-  assign(parameter.reading, map.word<catalogue::Reading>("reading", "reading", reading_words));
+  assign(parameter.hazard, map.word("hazard", "hazard", catalogue::hazard_words));
+  assign(parameter.access, map.word("access", "access", catalogue::access_words, Need::required));
+  assign(parameter.reading, map.word("reading", "reading", reading_words));
   assign(parameter.evidence,
-         map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+         map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
   assign(parameter.source, map.text("source", Need::required));
   assign(parameter.note, map.text("note"));
   overlaps = map.flag("overlaps").value_or(false);
-  assign(parameter.cloning, map.word<catalogue::Cloning>("clone", "value of clone", clone_words));
+  assign(parameter.cloning, map.word("clone", "value of clone", clone_words));
   if (map.flag("secret").value_or(false)) parameter.secrecy = catalogue::Secrecy::secret;
   read_repetition(map, entry);
   return entry;
@@ -381,8 +363,8 @@ void read_given_value(YamlMap& map, Action& action) {
 
 /// How an action is carried out beyond one write.
 void read_procedure(YamlMap& map, Action& action) {
-  assign(action.kind, map.word<Kind>("encoding", "encoding", encoding_words));
-  assign(action.motion, map.word<catalogue::Motion>("motion", "motion", motion_words));
+  assign(action.kind, map.word("encoding", "encoding", catalogue::kind_words));
+  assign(action.motion, map.word("motion", "motion", motion_words));
   action.rest = map.number<std::uint16_t>("rest");
   assign(action.busy, map.duration("busy"));
   if (const YamlNode* node = map.get("prepare")) {
@@ -407,9 +389,9 @@ Action read_action(YamlMap& map) {
   action.stop_value = map.number<std::uint16_t>("stop");
   read_procedure(map, action);
   read_given_value(map, action);
-  assign(action.hazard, map.word<Hazard>("hazard", "hazard", hazard_words, Need::required));
+  assign(action.hazard, map.word("hazard", "hazard", catalogue::hazard_words, Need::required));
   assign(action.evidence,
-         map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+         map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
   assign(action.source, map.text("source", Need::required));
   assign(action.note, map.text("note"));
   assign(action.check, map.text("check"));

@@ -25,14 +25,11 @@ using catalogue::Evidence;
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
 
-constexpr std::array<std::pair<std::string_view, modbus::Framing>, 2> framing_words = {
-    {{"tcp", modbus::Framing::tcp}, {"rtu", modbus::Framing::rtu}}};
-constexpr std::array<std::pair<std::string_view, char>, 3> parity_words = {
-    {{"none", 'N'}, {"even", 'E'}, {"odd", 'O'}}};
-constexpr std::array<std::pair<std::string_view, bool>, 2> pair_words = {
-    {{"even", true}, {"any", false}}};
+constexpr auto framing_words =
+    enum_table<modbus::Framing>({{"tcp", modbus::Framing::tcp}, {"rtu", modbus::Framing::rtu}});
+constexpr auto pair_words = enum_table<bool>({{"even", true}, {"any", false}});
 /// A tool that does not copy the transaction id cannot be told from its own pushed frames.
-constexpr std::array<std::pair<std::string_view, bool>, 1> transaction_words = {{{"echoed", true}}};
+constexpr auto transaction_words = enum_table<bool>({{"echoed", true}, {"", false}});
 
 Need need_of(bool inherited) { return inherited ? Need::optional : Need::required; }
 
@@ -61,7 +58,7 @@ std::optional<std::vector<Area>> read_areas(const YamlNode* node, Findings& find
   if (node == nullptr) return std::nullopt;
   YamlMap map(*node, findings);
   std::vector<Area> areas;
-  for (const auto& [name, table] : table_words) {
+  for (const auto& [name, table] : modbus::table_words) {
     const YamlNode* list = map.get(name);
     if (list == nullptr || !expect(*list, YamlNode::Kind::sequence, findings)) continue;
     for (const YamlNode& item : list->items) {
@@ -91,9 +88,9 @@ std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node, F
 
 void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings& findings) {
   YamlMap map(node, findings);
-  assign(serial.baud, map.number<unsigned>("baud"));
-  assign(serial.parity, map.word<char>("parity", "parity", parity_words));
-  assign(serial.stop_bits, map.number<unsigned>("stop"));
+  assign(serial.line.baud, map.number<unsigned>("baud"));
+  assign(serial.line.parity, map.word("parity", "parity", modbus::parity_words));
+  assign(serial.line.stop_bits, map.number<unsigned>("stop"));
   assign(serial.gaps, read_gaps(map.get("gaps"), findings));
   assign(serial.broadcast_pause, map.duration("broadcast-pause"));
   map.finish();
@@ -102,15 +99,14 @@ void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings&
 void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   catalogue::LinkFacts& link = draft.profile.link;
-  assign(link.framing,
-         map.word<modbus::Framing>("framing", "framing", framing_words,
-                                   need_of(draft.link.entry != nullptr || draft.incomplete)));
+  assign(link.framing, map.word("framing", "framing", framing_words,
+                                need_of(draft.link.entry != nullptr || draft.incomplete)));
   assign(link.port, map.number<std::uint16_t>("port"));
   assign(link.unit, map.number<std::uint8_t>("unit"));
   if (const auto units = map.range("units", last_byte)) {
     link.units = {static_cast<std::uint8_t>(units->from), static_cast<std::uint8_t>(units->to)};
   }
-  map.word<bool>("transaction", "transaction", transaction_words);
+  map.word("transaction", "transaction", transaction_words);
   assign(link.max_read, map.number<std::uint16_t>("max-read"));
   assign(link.max_write, map.number<std::uint16_t>("max-write"));
   assign(link.keep_alive, map.duration("keep-alive"));
@@ -120,7 +116,7 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   assign(link.settle, map.duration("settle"));
   assign(link.loopback, map.flag("loopback"));
   assign(link.any_unit, map.flag("any-unit"));
-  assign(link.even_pairs, map.word<bool>("pairs", "pairs", pair_words));
+  assign(link.even_pairs, map.word("pairs", "pairs", pair_words));
   if (const YamlNode* serial = map.get("serial")) read_serial(*serial, link.serial, findings);
   assign(link.contiguous, read_areas(map.get("contiguous"), findings));
   assign(link.absent, read_areas(map.get("absent"), findings));
@@ -192,10 +188,10 @@ void read_identity(const YamlNode& node, ProfileDraft& draft, Findings& findings
 
 // ---- events, limits, numbered ----
 
-constexpr std::array<std::pair<std::string_view, catalogue::EventModel>, 3> source_words = {
-    {{"push", catalogue::EventModel::push},
-     {"counter", catalogue::EventModel::counter},
-     {"flag", catalogue::EventModel::flag}}};
+constexpr auto source_words =
+    enum_table<catalogue::EventModel>({{"push", catalogue::EventModel::push},
+                                       {"counter", catalogue::EventModel::counter},
+                                       {"flag", catalogue::EventModel::flag}});
 
 void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
   YamlMap map(node, findings);
@@ -210,10 +206,9 @@ void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& fin
 
 std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at,
                                             Findings& findings) {
-  const auto kind = catalogue::parse_event_kind(name);
+  const auto kind = catalogue::event_kind_words.find(name);
   if (!kind) {
-    const auto& known = catalogue::event_kind_texts;
-    findings.add_once(at, unknown_word("event kind", name, {known.begin(), known.end()}));
+    findings.add_once(at, unknown_word("event kind", name, catalogue::event_kind_words.words()));
   }
   return kind;
 }
@@ -247,7 +242,7 @@ void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings&
 void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   auto [events, need] = section_of(draft.profile.events);
-  assign(events.model, map.word<catalogue::EventModel>("source", "source of events", source_words));
+  assign(events.model, map.word("source", "source of events", source_words));
   if (const YamlNode* arm = map.get("arm")) read_arm(*arm, events, findings);
   assign(events.function, map.number<std::uint8_t>("function", need));
   assign(events.first, map.number<std::uint16_t>("first", need));
@@ -276,19 +271,21 @@ void read_numbered(const YamlNode& node, ProfileDraft& draft, Findings& findings
   YamlMap map(node, findings);
   auto [numbered, need] = section_of(draft.profile.numbered);
   assign(numbered.prefix, map.text("prefix", need));
-  assign(numbered.table, map.word<modbus::RegisterTable>("table", "table", table_words));
+  assign(numbered.table, map.word("table", "table", modbus::table_words));
   assign(numbered.from, map.number<std::uint16_t>("from", need));
   assign(numbered.to, map.number<std::uint16_t>("to", need));
-  assign(numbered.access, map.word<catalogue::Access>("access", "access", access_words));
-  assign(numbered.evidence, map.word<Evidence>("evidence", "evidence", evidence_words));
+  assign(numbered.access, map.word("access", "access", catalogue::access_words));
+  assign(numbered.evidence, map.word("evidence", "evidence", catalogue::evidence_words));
   assign(numbered.source, map.text("source"));
   map.finish();
 }
 
 // ---- codes ----
 
-constexpr std::array<std::pair<std::string_view, catalogue::Resettable>, 2> reset_words = {
-    {{"possible", catalogue::Resettable::yes}, {"power-cycle", catalogue::Resettable::no}}};
+constexpr auto reset_words =
+    enum_table<catalogue::Resettable>({{"possible", catalogue::Resettable::yes},
+                                       {"power-cycle", catalogue::Resettable::no},
+                                       {"", catalogue::Resettable::unknown}});
 
 struct Provenance {
   Evidence evidence = Evidence::inferred;
@@ -307,9 +304,9 @@ std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& f
   YamlMap map(node, findings);
   assign(code.text, map.text("text", Need::required));
   assign(code.remedy, map.text("remedy"));
-  assign(code.evidence, map.word<Evidence>("evidence", "evidence", evidence_words));
+  assign(code.evidence, map.word("evidence", "evidence", catalogue::evidence_words));
   assign(code.source, map.text("source"));
-  assign(code.resettable, map.word<catalogue::Resettable>("reset", "reset", reset_words));
+  assign(code.resettable, map.word("reset", "reset", reset_words));
   map.finish();
   return code;
 }
@@ -345,7 +342,7 @@ void read_code_maps(const YamlNode& node, Codes& codes, Findings& findings) {
     YamlMap map(item, findings);
     Provenance from;
     assign(from.evidence,
-           map.word<Evidence>("evidence", "evidence", evidence_words, Need::required));
+           map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
     assign(from.source, map.text("source", Need::required));
     const YamlNode* list = map.get("codes", Need::required);
     map.finish();
@@ -597,17 +594,17 @@ void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findi
   ++draft.layers;
 }
 
-const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_view part,
-                          Findings& findings) {
+const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Findings& findings) {
   const YamlNode* found = nullptr;
   for (std::size_t i = 1; i < documents.size(); ++i) {
     YamlMap map(documents[i], findings);
-    constexpr std::array<std::pair<std::string_view, std::string_view>, 2> part_words = {
-        {{"texts", "texts"}, {"simulation", "simulation"}}};
-    const auto name = map.word<std::string_view>("part", "part", part_words, Need::required);
+    constexpr auto part_words =
+        enum_table<Part>({{"texts", Part::texts}, {"simulation", Part::simulation}});
+    const auto name = map.word("part", "part", part_words, Need::required);
     if (!name || *name != part) continue;
     if (found != nullptr) {
-      findings.add(documents[i].at, fmt::format("a second document of part '{}'", part));
+      findings.add(documents[i].at,
+                   fmt::format("a second document of part '{}'", part_words.text(part)));
     }
     found = &documents[i];
   }

@@ -74,10 +74,12 @@ ProfileHead read_head(const YamlNode& document, Findings& findings);
 /// Lays one first document over the draft. Missing, unknown and ill-typed keys are findings.
 void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findings);
 
-/// The document with this `part`, among those behind the first; null when there is none. Documents
+/// What the documents behind the first are about.
+enum class Part : std::uint8_t { texts, simulation };
+
+/// The document of this part, among those behind the first; null when there is none. Documents
 /// of unknown parts, and second ones of the same part, are findings.
-const YamlNode* find_part(const std::vector<YamlNode>& documents, std::string_view part,
-                          Findings& findings);
+const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Findings& findings);
 
 /// `part: texts`, laid over what is there.
 void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Findings& findings);

@@ -21,11 +21,6 @@ using catalogue::StartActionFacts;
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 
-constexpr std::array<std::pair<std::string_view, RunKind>, 3> kind_words = {
-    {{"start-action", RunKind::start_action},
-     {"command-word", RunKind::command_word},
-     {"command-register", RunKind::command_register}}};
-
 /// What may be selected before a start, as options behind two hyphens.
 constexpr std::array<std::string_view, 2> selectable = {"preset", "direction"};
 
@@ -63,7 +58,7 @@ void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Finding
     assign(function.number, map.number<std::uint16_t>("number", Need::required));
     function.bit = map.number<std::uint8_t>("bit");
     assign(function.evidence,
-           map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, Need::required));
+           map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
     assign(function.source, map.text("source", Need::required));
     map.finish();
     functions.push_back(std::move(function));
@@ -251,10 +246,10 @@ Need begin_model(RunFacts& run, RunKind kind, Need need) {
 void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   YamlMap map(node, findings);
   auto [run, need] = section_of(draft.profile.run);
-  const auto named = map.word<RunKind>("model", "run model", kind_words);
+  const auto named = map.word("model", "run model", catalogue::run_words);
   if (!named && map.get("model") != nullptr) return;  // its keys are not known
   const Need model = begin_model(run, named.value_or(run.kind()), need);
-  assign(run.evidence, map.word<catalogue::Evidence>("evidence", "evidence", evidence_words, need));
+  assign(run.evidence, map.word("evidence", "evidence", catalogue::evidence_words, need));
   assign(run.source, map.text("source", need));
   assign(run.still_runs, map.text("still-runs"));
   if (auto* word = std::get_if<CommandWordFacts>(&run.model)) read_command_word(map, *word, model);

@@ -237,7 +237,7 @@ catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
   catalogue::CodeTables codes;
   if (chain.root != nullptr) codes = *chain.root->codes;
   for (auto layer = chain.layers.rbegin(); layer != chain.layers.rend(); ++layer) {
-    if (const YamlNode* part = find_part((*layer)->documents, "texts", findings)) {
+    if (const YamlNode* part = find_part((*layer)->documents, Part::texts, findings)) {
       read_texts(*part, codes, findings);
     }
   }
@@ -246,7 +246,7 @@ catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
 
 const YamlNode* nearest_simulation(const Chain& chain, Findings& findings) {
   for (const Layer* layer : chain.layers) {
-    if (const YamlNode* part = find_part(layer->documents, "simulation", findings)) return part;
+    if (const YamlNode* part = find_part(layer->documents, Part::simulation, findings)) return part;
   }
   return nullptr;
 }

@@ -51,6 +51,17 @@ std::vector<std::string> read_words(const YamlNode& list, Findings& findings) {
   return words;
 }
 
+std::optional<std::string> read_torque_unit(YamlMap& map) {
+  auto unit = map.text("torque-unit");
+  if (!unit || std::find(torque_units.begin(), torque_units.end(), *unit) != torque_units.end()) {
+    return unit;
+  }
+  map.findings().add(
+      map.get("torque-unit")->at,
+      unknown_word("torque unit", *unit, {torque_units.begin(), torque_units.end()}));
+  return std::nullopt;
+}
+
 Tool read_tool(const YamlEntry& entry, Findings& findings) {
   check_name(entry, findings);
   Tool tool;
@@ -58,10 +69,7 @@ Tool read_tool(const YamlEntry& entry, Findings& findings) {
   YamlMap map(entry.value, findings);
   assign(tool.url, map.text("url", Need::required));
   assign(tool.profile, map.text("profile"));
-  std::array<std::pair<std::string_view, std::string_view>, torque_units.size()> units;
-  std::transform(torque_units.begin(), torque_units.end(), units.begin(),
-                 [](std::string_view unit) { return std::pair(unit, unit); });
-  assign(tool.torque_unit, map.word<std::string_view>("torque-unit", "torque unit", units));
+  assign(tool.torque_unit, read_torque_unit(map));
   const auto place_of = [&](std::string_view key) {
     const YamlNode* value = entry.value.find(key);
     return value == nullptr ? Place() : Place{value->at.line, value->at.column};

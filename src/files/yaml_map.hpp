@@ -12,6 +12,7 @@
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
+#include "spindle/base/enum_table.hpp"
 
 namespace spindle::files {
 
@@ -67,21 +68,17 @@ class YamlMap {
     return static_cast<Number>(*read);
   }
 
-  /// A word out of a fixed list of {text, meaning}.
-  template <typename Meaning, typename Words>
-  std::optional<Meaning> word(std::string_view key, std::string_view what, const Words& words,
-                              Need need = Need::optional) {
+  /// A word of the table; `what` it is, for the finding about another one.
+  template <typename Meaning, std::size_t count>
+  std::optional<Meaning> word(std::string_view key, std::string_view what,
+                              const EnumTable<Meaning, count>& words, Need need = Need::optional) {
     const YamlNode* node = get(key, need);
     if (node == nullptr) return std::nullopt;
     const auto read = to_text(*node, findings_);
     if (!read) return std::nullopt;
-    std::vector<std::string> known;
-    for (const auto& [name, meaning] : words) {
-      if (name == *read) return meaning;
-      known.emplace_back(name);
-    }
-    findings_.add(node->at, unknown_word(what, *read, known));
-    return std::nullopt;
+    const auto meant = words.find(*read);
+    if (!meant) findings_.add(node->at, unknown_word(what, *read, words.words()));
+    return meant;
   }
 
   /// Marks a key as known that is read elsewhere.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "spindle/base/duration.hpp"
+#include "spindle/base/enum_table.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::link {
@@ -234,14 +235,18 @@ Result<void> set_baud(Endpoint& endpoint, std::string_view value) {
   return {};
 }
 
-Result<void> set_parity(Endpoint& endpoint, std::string_view value) {
-  if (value == "none") endpoint.parity = Parity::none;
-  if (value == "even") endpoint.parity = Parity::even;
-  if (value == "odd") endpoint.parity = Parity::odd;
-  if (!endpoint.parity) {
-    return tl::unexpected(bad_option(endpoint, "parity", value, "none, even or odd"));
-  }
+/// One of the words of a table.
+template <typename Into, typename E, std::size_t count>
+Result<void> set_word(const Endpoint& endpoint, std::string_view name, std::string_view value,
+                      const EnumTable<E, count>& words, Into& into) {
+  const auto meant = words.find(value);
+  if (!meant) return tl::unexpected(bad_option(endpoint, name, value, words.alternatives()));
+  into = *meant;
   return {};
+}
+
+Result<void> set_parity(Endpoint& endpoint, std::string_view value) {
+  return set_word(endpoint, "parity", value, modbus::parity_words, endpoint.parity);
 }
 
 Result<void> set_stop(Endpoint& endpoint, std::string_view value) {
@@ -262,22 +267,15 @@ Result<void> set_gap(Endpoint& endpoint, std::string_view value) {
 }
 
 Result<void> set_switching(Endpoint& endpoint, std::string_view value) {
-  if (value != "true" && value != "false") {
-    return tl::unexpected(bad_option(endpoint, "rs485", value, "true or false"));
-  }
-  endpoint.switching = value == "true" ? LineSwitching::kernel : LineSwitching::adapter;
-  return {};
+  constexpr auto words = enum_table<LineSwitching>(
+      {{"true", LineSwitching::kernel}, {"false", LineSwitching::adapter}});
+  return set_word(endpoint, "rs485", value, words, endpoint.switching);
 }
 
 Result<void> set_echo(Endpoint& endpoint, std::string_view value) {
-  if (value == "true") {
-    endpoint.echo = LocalEcho::present;
-  } else if (value == "false") {
-    endpoint.echo = LocalEcho::absent;
-  } else if (value != "auto") {
-    return tl::unexpected(bad_option(endpoint, "echo", value, "true, false or auto"));
-  }
-  return {};
+  constexpr auto words = enum_table<LocalEcho>(
+      {{"true", LocalEcho::present}, {"false", LocalEcho::absent}, {"auto", LocalEcho::automatic}});
+  return set_word(endpoint, "echo", value, words, endpoint.echo);
 }
 
 const std::vector<UrlOption>& url_options() {
@@ -342,6 +340,13 @@ Result<Endpoint> parse_endpoint(std::string_view url) {
     }
   }
   return endpoint;
+}
+
+modbus::SerialSettings serial_settings(const Endpoint& endpoint,
+                                       const modbus::SerialSettings& usual) {
+  return {.baud = endpoint.baud.value_or(usual.baud),
+          .parity = endpoint.parity.value_or(usual.parity),
+          .stop_bits = endpoint.stop_bits.value_or(usual.stop_bits)};
 }
 
 std::string to_url(const Endpoint& endpoint) {

@@ -114,8 +114,7 @@ std::string_view plural(std::size_t count) { return count == 1 ? "" : "s"; }
 
 struct Describe {
   std::string operator()(const ReadRequest& read) const {
-    return fmt::format("read {} {} register{} from {}", read.count,
-                       read.table == RegisterTable::holding ? "holding" : "input",
+    return fmt::format("read {} {} register{} from {}", read.count, to_text(read.table),
                        plural(read.count), read.first.value);
   }
   std::string operator()(const WriteSingleRequest& write) const {

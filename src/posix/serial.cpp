@@ -80,28 +80,16 @@ bool is_pseudo_terminal(int descriptor) {
   return ::major(status.st_rdev) >= first_major && ::major(status.st_rdev) <= last_major;
 }
 
-std::string_view to_text(link::Parity parity) {
-  switch (parity) {
-    case link::Parity::none:
-      return "no parity";
-    case link::Parity::even:
-      return "even parity";
-    case link::Parity::odd:
-      return "odd parity";
-  }
-  return "";
-}
-
-bool has_parity(const termios& found, link::Parity parity) {
-  if ((found.c_cflag & PARENB) == 0) return parity == link::Parity::none;
+bool has_parity(const termios& found, modbus::Parity parity) {
+  if ((found.c_cflag & PARENB) == 0) return parity == modbus::Parity::none;
   const bool odd = (found.c_cflag & PARODD) != 0;
-  return parity == (odd ? link::Parity::odd : link::Parity::even);
+  return parity == (odd ? modbus::Parity::odd : modbus::Parity::even);
 }
 
 enum class Terminal : std::uint8_t { real, pseudo };
 
 /// Whether the port does what it was told.
-Result<void> check_settings(const termios& found, const link::SerialSettings& wanted,
+Result<void> check_settings(const termios& found, const modbus::SerialSettings& wanted,
                             Terminal terminal) {
   const auto speed = speed_of(wanted.baud);
   const bool rate_taken =
@@ -114,7 +102,9 @@ Result<void> check_settings(const termios& found, const link::SerialSettings& wa
   }
   const bool dropped = terminal == Terminal::pseudo && (found.c_cflag & PARENB) == 0;
   if (!dropped && !has_parity(found, wanted.parity)) {
-    return tl::unexpected(lacks(std::string(to_text(wanted.parity))));
+    const bool none = wanted.parity == modbus::Parity::none;
+    return tl::unexpected(
+        lacks(fmt::format("{} parity", none ? "no" : modbus::parity_words.text(wanted.parity))));
   }
   return {};
 }
@@ -125,8 +115,11 @@ struct FreeModbus {
 using Modbus = std::unique_ptr<modbus_t, FreeModbus>;
 
 /// Lets libmodbus open and set the port; all that it is ever asked. errno tells why it did not.
-Modbus connect(const std::string& path, const link::SerialSettings& settings, link::Parity parity) {
-  const char letter = parity == link::Parity::none ? 'N' : parity == link::Parity::odd ? 'O' : 'E';
+Modbus connect(const std::string& path, const modbus::SerialSettings& settings,
+               modbus::Parity parity) {
+  const char letter = parity == modbus::Parity::none  ? 'N'
+                      : parity == modbus::Parity::odd ? 'O'
+                                                      : 'E';
   Modbus context(modbus_new_rtu(path.c_str(), static_cast<int>(settings.baud), letter, 8,
                                 static_cast<int>(settings.stop_bits)));
   if (context && modbus_connect(context.get()) != 0) {
@@ -147,7 +140,7 @@ class Port {
   Port& operator=(const Port&) = delete;
   ~Port();
 
-  Result<void> set(const std::string& path, const link::SerialSettings& settings);
+  Result<void> set(const std::string& path, const modbus::SerialSettings& settings);
   Result<void> switch_by_kernel();
   [[nodiscard]] int number() const { return modbus_get_socket(line_.get()); }
 
@@ -175,7 +168,7 @@ Result<Port> Port::open(const std::string& path) {
   return Port(std::move(lock), before);
 }
 
-Result<void> Port::set(const std::string& path, const link::SerialSettings& settings) {
+Result<void> Port::set(const std::string& path, const modbus::SerialSettings& settings) {
   if (!speed_of(settings.baud)) {
     return tl::unexpected(lacks(fmt::format("{} baud", settings.baud)));
   }
@@ -184,7 +177,7 @@ Result<void> Port::set(const std::string& path, const link::SerialSettings& sett
   // glibc calls it an error when a terminal was told a parity, dropped it, and changed nothing
   // else.
   if (!line_ && errno == EINVAL && terminal == Terminal::pseudo) {
-    line_ = connect(path, settings, link::Parity::none);
+    line_ = connect(path, settings, modbus::Parity::none);
   }
   if (!line_) return tl::unexpected(open_error(errno, path));
   ::fcntl(number(), F_SETFD, FD_CLOEXEC);
@@ -323,7 +316,7 @@ Result<std::size_t> SerialTransport::receive(std::span<std::uint8_t> into, TimeP
 }  // namespace
 
 Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
-                                                     const link::SerialSettings& settings,
+                                                     const modbus::SerialSettings& settings,
                                                      link::LineSwitching switching,
                                                      const Clock& clock,
                                                      const Interrupt& interrupt) {

@@ -26,11 +26,8 @@ line_opener(Clock& clock, const Interrupt& interrupt) {
       [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
                            Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
         if (endpoint.medium == link::Medium::serial) {
-          const catalogue::SerialFacts& serial = facts.serial;
-          return open_serial(
-              endpoint.device,
-              link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits),
-              endpoint.switching, clock, interrupt);
+          return open_serial(endpoint.device, link::serial_settings(endpoint, facts.serial.line),
+                             endpoint.switching, clock, interrupt);
         }
         return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
                         interrupt, behind(endpoint));

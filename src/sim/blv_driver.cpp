@@ -15,13 +15,6 @@ using modbus::Pdu;
 
 constexpr std::uint8_t everybody = 0;
 
-Duration gap_at(const catalogue::SerialFacts& serial, unsigned baud) {
-  for (const catalogue::GapRule& rule : serial.gaps) {
-    if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
-  }
-  return {};
-}
-
 using MakeUnit = std::function<std::unique_ptr<BusUnit>(std::uint8_t address)>;
 
 class SimulatedBus final : public BlvBus {
@@ -34,8 +27,8 @@ class SimulatedBus final : public BlvBus {
       trouble_.push_back({warning, &BusUnit::raise_warning});
     }
     const catalogue::SerialFacts& serial = profile.link.serial;
-    const unsigned baud = options.baud == 0 ? serial.baud : options.baud;
-    if (options.gaps == Gaps::enforced) gap_ = gap_at(serial, baud);
+    const unsigned baud = options.baud == 0 ? serial.line.baud : options.baud;
+    if (options.gaps == Gaps::enforced) gap_ = serial.gap_at(baud).value_or(Duration());
   }
 
   std::optional<Pdu> answer(ConnectionId /*connection*/, modbus::UnitId unit, const Pdu& request,

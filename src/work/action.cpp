@@ -146,20 +146,6 @@ Result<void> check_evidence(const Action& action, const Target& target, Acceptan
       .register_address = action.address.value});
 }
 
-std::string_view to_text(device::ActionResult result) {
-  switch (result) {
-    case device::ActionResult::confirmed:
-      return "confirmed";
-    case device::ActionResult::sent:
-      return "sent";
-    case device::ActionResult::finished:
-      return "finished";
-    case device::ActionResult::not_confirmed:
-      return "not-confirmed";
-  }
-  return "";
-}
-
 Error not_confirmed(const ActionRequest& request) {
   const bool busy = request.action.confirm.empty();
   return {.code = Errc::mismatch,

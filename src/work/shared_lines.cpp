@@ -4,7 +4,6 @@
 
 #include <utility>
 
-#include "spindle/link/serial_settings.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/side_by_side.hpp"
 
@@ -31,10 +30,8 @@ device::OpenTransport SharedLines::opener() {
 Result<void> check_same_settings(const std::vector<Target>& targets,
                                  const std::vector<catalogue::LinkFacts>& facts) {
   const auto settings = [&](std::size_t index) {
-    const catalogue::SerialFacts& serial = facts[index].serial;
     const link::Endpoint& endpoint = targets[index].endpoint;
-    return std::pair(link::serial_settings(endpoint, serial.baud, serial.parity, serial.stop_bits),
-                     endpoint.switching);
+    return std::pair(link::serial_settings(endpoint, facts[index].serial.line), endpoint.switching);
   };
   for (const auto& line : by_line(targets)) {
     for (const std::size_t index : line) {

@@ -6,7 +6,6 @@
 #include <set>
 #include <utility>
 
-#include "spindle/link/serial_settings.hpp"
 #include "spindle/sim/sim_transport.hpp"
 #include "spindle/sim/simulated_tool.hpp"
 
@@ -74,11 +73,9 @@ Result<SimulatedTool> make_simulated_tool(const std::string& profile,
   return SimulatedTool{std::move(*loaded), std::move(*server)};
 }
 
-Duration simulated_character_time(const catalogue::LinkFacts& facts, std::optional<unsigned> baud) {
-  const catalogue::SerialFacts& serial = facts.serial;
-  const link::Endpoint line{.baud = baud};
-  return link::character_time(
-      link::serial_settings(line, serial.baud, serial.parity, serial.stop_bits));
+modbus::SerialSettings simulated_line(const catalogue::LinkFacts& facts,
+                                      std::optional<unsigned> baud) {
+  return link::serial_settings({.baud = baud}, facts.serial.line);
 }
 
 device::OpenTransport with_simulated_tools(const Environment& environment,
@@ -97,7 +94,7 @@ device::OpenTransport with_simulated_tools(const Environment& environment,
     return sim::make_sim_transport(
         std::move(tool->server), tool->profile.link.framing, {}, environment.clock,
         environment.interrupt,
-        {.character_time = simulated_character_time(tool->profile.link, endpoint.baud)});
+        {.character_time = character_time(simulated_line(tool->profile.link, endpoint.baud))});
   };
 }
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "spindle/link/serial_settings.hpp"
+#include "spindle/modbus/serial_settings.hpp"
 #include "spindle/posix/clock.hpp"
 #include "spindle/posix/serve.hpp"
 #include "spindle/posix/signals.hpp"
@@ -52,7 +52,7 @@ Wish understand(const std::vector<std::string>& words) {
         wish.bank.units.push_back({static_cast<std::uint8_t>(unit)});
     }
   }
-  if (wish.wire) wish.serve.line.character_time = link::character_time({.baud = wish.serve.baud});
+  if (wish.wire) wish.serve.line.character_time = modbus::character_time({.baud = wish.serve.baud});
   return wish;
 }
 

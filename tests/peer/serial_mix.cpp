@@ -83,7 +83,7 @@ int main(int count, char** arguments) {
   const auto turns = static_cast<std::uint16_t>(std::stoul(arguments[4]));
   const Interrupt never;
   posix::SteadyClock clock(never);
-  const link::SerialSettings line{.baud = baud};
+  const modbus::SerialSettings line{.baud = baud};
   auto port = posix::open_serial(arguments[1], line, link::LineSwitching::adapter, clock, never);
   if (!port) {
     std::cout << describe(port.error()) << '\n';
@@ -95,7 +95,7 @@ int main(int count, char** arguments) {
                          .answer_timeout = std::chrono::seconds(1),
                          .gap = gap,
                          .broadcast_gap = gap + std::chrono::milliseconds(5),
-                         .character_time = link::character_time(line),
+                         .character_time = modbus::character_time(line),
                          .in_use_until = clock.now()});
   for (std::uint16_t turn = 0; turn < turns; ++turn) {
     if (const auto asked = ask(session, turn); !asked) {

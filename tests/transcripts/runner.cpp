@@ -51,7 +51,6 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/cli/run.hpp"
-#include "spindle/link/serial_settings.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/world.hpp"
 #include "spindle/shipped/profiles.hpp"
@@ -330,9 +329,8 @@ class Stage {
       return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
     if (found == tools_.end()) return tl::unexpected(Error{.code = Errc::connection_refused});
-    const catalogue::SerialFacts& line = facts.serial;
-    const sim::LineModel model{.character_time = link::character_time(link::serial_settings(
-                                   endpoint, line.baud, line.parity, line.stop_bits))};
+    const sim::LineModel model{
+        .character_time = character_time(link::serial_settings(endpoint, facts.serial.line))};
     Tool& tool = *found->second;
     return sim::make_sim_transport(*tool.server, {++tool.connections}, tool.profile.link.framing,
                                    tool.faults, tool.answers, clock_, *interrupt_, model);

@@ -566,7 +566,7 @@ Profile drive() {
   profile.link.unit = 1;
   profile.link.loopback = true;
   profile.link.serial = {
-      .baud = 19200, .gaps = {{19200, 5500us}, {0, 3500us}}, .broadcast_pause = 5ms};
+      .line = {.baud = 19200}, .gaps = {{19200, 5500us}, {0, 3500us}}, .broadcast_pause = 5ms};
   return profile;
 }
 

@@ -7,6 +7,7 @@
 
 using namespace spindle;
 using namespace spindle::link;
+using modbus::Parity;
 using namespace std::chrono_literals;
 
 namespace {

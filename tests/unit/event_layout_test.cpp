@@ -7,16 +7,6 @@
 using namespace spindle;
 using catalogue::EventKind;
 
-TEST_CASE("every kind of event has a text of its own") {
-  for (const std::string_view text : catalogue::event_kind_texts) {
-    const auto kind = catalogue::parse_event_kind(text);
-    REQUIRE(kind.has_value());
-    CHECK(catalogue::to_text(*kind) == text);
-  }
-  CHECK(catalogue::to_text(EventKind::other) == "other");
-  CHECK(catalogue::parse_event_kind("Error") == std::nullopt);
-}
-
 TEST_CASE("number and kind stand in the block where the profile says") {
   const catalogue::Profile profile = test::bm_profile();
   const catalogue::EventLayout layout(profile);

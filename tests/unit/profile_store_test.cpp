@@ -432,7 +432,7 @@ TEST_CASE("serial facts, 32-bit pairs and hexadecimal registers") {
   CHECK(drive->link.loopback);
   CHECK(drive->link.max_write == 16);
   CHECK(drive->link.answer == std::chrono::milliseconds(500));
-  CHECK(drive->link.serial.parity == 'E');
+  CHECK(drive->link.serial.line.parity == modbus::Parity::even);
   REQUIRE(drive->link.serial.gaps.size() == 2);
   CHECK(drive->link.serial.gaps[0].up_to_baud == 19200);
   CHECK(drive->link.serial.gaps[0].gap == std::chrono::microseconds(5500));

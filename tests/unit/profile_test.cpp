@@ -225,15 +225,6 @@ TEST_CASE("kinds: sizes, bounds and names") {
   CHECK(register_count(Kind::u32) == 2);
   CHECK(lowest(Kind::i32) == -2147483648LL);
   CHECK(highest(Kind::u32) == 4294967295LL);
-  for (const Kind kind : {Kind::u16, Kind::i16, Kind::u32, Kind::i32}) {
-    CHECK(parse_kind(to_text(kind)) == kind);
-  }
-  CHECK_FALSE(parse_kind("f32").has_value());
-  for (const Evidence evidence :
-       {Evidence::manual, Evidence::transcribed, Evidence::sibling, Evidence::inferred}) {
-    CHECK(parse_evidence(to_text(evidence)) == evidence);
-  }
-  CHECK_FALSE(parse_evidence("rumour").has_value());
 }
 
 TEST_CASE("a secret is one by whatever name or number its registers are asked for") {

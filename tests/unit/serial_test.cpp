@@ -21,8 +21,8 @@ using namespace spindle;
 using namespace spindle::posix;
 using namespace std::chrono_literals;
 using link::LineSwitching;
-using link::Parity;
-using link::SerialSettings;
+using modbus::Parity;
+using modbus::SerialSettings;
 using spindle::test::hex;
 using spindle::test::WakingInterrupt;
 

@@ -8,6 +8,7 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
+#include "spindle/base/enum_table.hpp"
 #include "spindle/catalogue/list.hpp"
 #include "spindle/catalogue/text.hpp"
 #include "spindle/modbus/types.hpp"
@@ -16,7 +17,15 @@ namespace spindle::catalogue {
 
 /// Where a fact comes from, strongest first (contract, section 5, Evidence).
 enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
+inline constexpr auto evidence_words = enum_table<Evidence>({{"manual", Evidence::manual},
+                                                             {"transcribed", Evidence::transcribed},
+                                                             {"sibling", Evidence::sibling},
+                                                             {"inferred", Evidence::inferred}});
+
 enum class Access : std::uint8_t { read_only, read_write };
+inline constexpr auto access_words =
+    enum_table<Access>({{"r", Access::read_only}, {"rw", Access::read_write}});
+
 /// Whether a value may be restored to another tool than its own.
 enum class Cloning : std::uint8_t { allowed, never };
 /// What reading does to the register.
@@ -27,6 +36,9 @@ enum class Reading : std::uint8_t {
 /// Whether backups hold a value without being told to.
 enum class Secrecy : std::uint8_t { open, secret };
 enum class Kind : std::uint8_t { u16, i16, u32, i32 };
+/// As written in profiles and raw registers.
+inline constexpr auto kind_words = enum_table<Kind>(
+    {{"u16", Kind::u16}, {"i16", Kind::i16}, {"u32", Kind::u32}, {"i32", Kind::i32}});
 
 /// How registers become a number: an integer of `kind` (32-bit kinds: high word first) times
 /// `scale`.
@@ -40,8 +52,6 @@ std::uint16_t register_count(Kind kind);
 /// Smallest and largest integer of the kind.
 std::int64_t lowest(Kind kind);
 std::int64_t highest(Kind kind);
-std::string_view to_text(Kind kind);  ///< "u16", as written in profiles and raw registers
-std::optional<Kind> parse_kind(std::string_view text);
 
 /// What a write may do beyond storing a value.
 enum class Hazard : std::uint8_t {
@@ -52,6 +62,12 @@ enum class Hazard : std::uint8_t {
   erases,   ///< overwrites stored settings
   link,     ///< erases settings without which the tool may no longer be reached
 };
+inline constexpr auto hazard_words = enum_table<Hazard>({{"none", Hazard::none},
+                                                         {"moves", Hazard::moves},
+                                                         {"locks", Hazard::locks},
+                                                         {"unclear", Hazard::unclear},
+                                                         {"erases", Hazard::erases},
+                                                         {"link", Hazard::link}});
 
 /// Meaning of one number of an enumeration.
 struct Label {
@@ -77,6 +93,12 @@ enum class Effect : std::uint8_t {
   after_power_cycle,    ///< when it was stored and the product switched off and on
   unknown,              ///< no source says
 };
+inline constexpr auto effect_words =
+    enum_table<Effect>({{"at-once", Effect::at_once},
+                        {"after-stop", Effect::after_stop},
+                        {"after-configuration", Effect::after_configuration},
+                        {"after-power-cycle", Effect::after_power_cycle},
+                        {"unknown", Effect::unknown}});
 
 enum class Notation : std::uint8_t {
   decimal,
@@ -127,11 +149,12 @@ std::vector<std::string> to_strings(const List<Text>& texts);
 /// so only names that always count.
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value);
 
-std::string_view to_text(Hazard hazard);  ///< "moves", as written in profiles
-std::string_view to_text(Effect effect);  ///< "at-once", as written in profiles
-std::string_view to_text(Evidence evidence);
-std::optional<Evidence> parse_evidence(std::string_view text);
-std::string_view to_text(Access access);                ///< "r" or "rw"
-std::string_view to_text(modbus::RegisterTable table);  ///< "holding" or "input"
+// As written in profiles and records.
+constexpr std::string_view to_text(Kind kind) { return kind_words.text(kind); }
+constexpr std::string_view to_text(Hazard hazard) { return hazard_words.text(hazard); }
+constexpr std::string_view to_text(Effect effect) { return effect_words.text(effect); }
+constexpr std::string_view to_text(Evidence evidence) { return evidence_words.text(evidence); }
+constexpr std::string_view to_text(Access access) { return access_words.text(access); }
+using modbus::to_text;  // "holding" or "input"
 
 }  // namespace spindle::catalogue

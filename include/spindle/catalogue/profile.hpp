@@ -13,6 +13,7 @@
 #include "spindle/catalogue/parameter.hpp"
 #include "spindle/catalogue/run_facts.hpp"
 #include "spindle/modbus/adu.hpp"
+#include "spindle/modbus/serial_settings.hpp"
 
 namespace spindle::catalogue {
 
@@ -32,11 +33,12 @@ struct GapRule {
 };
 
 struct SerialFacts {
-  unsigned baud = 9600;
-  char parity = 'E';  ///< 'N', 'E' or 'O'
-  unsigned stop_bits = 1;
+  modbus::SerialSettings line = {};
   List<GapRule> gaps = {};
   Duration broadcast_pause = {};  ///< on top of the gap
+
+  /// The silence that the product needs at this rate; empty: the profile has no rule for it.
+  [[nodiscard]] std::optional<Duration> gap_at(unsigned baud) const;
 };
 
 /// Unit identifiers, both inclusive.
@@ -88,12 +90,18 @@ enum class EventKind : std::uint8_t {
   other,
 };
 
-/// In the order of the enumeration; as written in profiles and records.
-inline constexpr std::array<std::string_view, 9> event_kind_texts = {
-    "fastening-ok", "fastening-ng", "direction-change", "preset-change", "alarm-reset",
-    "error",        "barcode",      "screw-count",      "other"};
-std::string_view to_text(EventKind kind);
-std::optional<EventKind> parse_event_kind(std::string_view text);
+/// As written in profiles and records.
+inline constexpr auto event_kind_words =
+    enum_table<EventKind>({{"fastening-ok", EventKind::fastening_ok},
+                           {"fastening-ng", EventKind::fastening_ng},
+                           {"direction-change", EventKind::direction_change},
+                           {"preset-change", EventKind::preset_change},
+                           {"alarm-reset", EventKind::alarm_reset},
+                           {"error", EventKind::error},
+                           {"barcode", EventKind::barcode},
+                           {"screw-count", EventKind::screw_count},
+                           {"other", EventKind::other}});
+constexpr std::string_view to_text(EventKind kind) { return event_kind_words.text(kind); }
 
 /// How a tool lets it be known that something happened.
 enum class EventModel : std::uint8_t {

@@ -167,7 +167,11 @@ struct CommandRegisterFacts {
 enum class RunKind : std::uint8_t { start_action, command_word, command_register };
 
 /// As written in profiles: "command-word".
-std::string_view to_text(RunKind kind);
+inline constexpr auto run_words =
+    enum_table<RunKind>({{"start-action", RunKind::start_action},
+                         {"command-word", RunKind::command_word},
+                         {"command-register", RunKind::command_register}});
+constexpr std::string_view to_text(RunKind kind) { return run_words.text(kind); }
 
 /// The section `run` of a profile.
 struct RunFacts {

@@ -63,7 +63,14 @@ enum class WriteResult : std::uint8_t {
   unknown,   ///< it could not be read back: the tool holds the old value, the new one or a third
 };
 
-std::string_view to_text(WriteResult result);  ///< "written", as in records
+/// As in records.
+inline constexpr auto write_result_words =
+    enum_table<WriteResult>({{"written", WriteResult::written},
+                             {"coerced", WriteResult::coerced},
+                             {"mismatch", WriteResult::mismatch},
+                             {"refused", WriteResult::refused},
+                             {"unknown", WriteResult::unknown}});
+constexpr std::string_view to_text(WriteResult result) { return write_result_words.text(result); }
 
 /// Whether the tool says by its exception that it did nothing. Acknowledge (05), busy (06) and what
 /// a gateway says (0A, 0B) leave open what became of a request.
@@ -102,6 +109,13 @@ enum class ActionResult : std::uint8_t {
   finished,       ///< acknowledged, and the tool says that it no longer works on it
   not_confirmed,  ///< acknowledged, but the reading does not show the effect in time
 };
+/// As in records.
+inline constexpr auto action_result_words =
+    enum_table<ActionResult>({{"confirmed", ActionResult::confirmed},
+                              {"sent", ActionResult::sent},
+                              {"finished", ActionResult::finished},
+                              {"not-confirmed", ActionResult::not_confirmed}});
+constexpr std::string_view to_text(ActionResult result) { return action_result_words.text(result); }
 
 /// What came back for a loop-back that any unit may answer.
 enum class Answered : std::uint8_t { data, exception };

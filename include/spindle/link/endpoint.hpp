@@ -6,12 +6,12 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/link/local_echo.hpp"
+#include "spindle/modbus/serial_settings.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::link {
 
 enum class Medium : std::uint8_t { tcp, serial, rtu_over_tcp, simulated };
-enum class Parity : std::uint8_t { none, even, odd };
 
 /// Who switches an RS-485 line between sending and receiving: an adapter that does it by itself, or
 /// the kernel with the port's RTS signal.
@@ -34,7 +34,7 @@ struct Endpoint {
   std::string profile = {};  ///< profile of a simulated tool (sim)
   std::optional<modbus::UnitId> unit = std::nullopt;
   std::optional<unsigned> baud = std::nullopt;
-  std::optional<Parity> parity = std::nullopt;
+  std::optional<modbus::Parity> parity = std::nullopt;
   std::optional<unsigned> stop_bits = std::nullopt;
   std::optional<Duration> gap = std::nullopt;  ///< silence before a request; else the profile's
   LineSwitching switching = LineSwitching::adapter;
@@ -52,6 +52,10 @@ bool looks_like_url(std::string_view text);
 /// unknown or repeated option. The `baud` of rtu+tcp is that of the line behind the device server;
 /// it only says how long bytes and gaps take there.
 Result<Endpoint> parse_endpoint(std::string_view url);
+
+/// How the line of the endpoint is set: as its URL says, and where that says nothing as `usual`.
+modbus::SerialSettings serial_settings(const Endpoint& endpoint,
+                                       const modbus::SerialSettings& usual);
 
 /// "tcp://HOST:PORT" or "rtu+tcp://HOST:PORT", with brackets around an IPv6 address: a network
 /// endpoint whose port has been filled in, for messages.

@@ -2,8 +2,10 @@
 
 #include <compare>
 #include <cstdint>
+#include <string_view>
 
 #include "spindle/base/bytes.hpp"
+#include "spindle/base/enum_table.hpp"
 
 namespace spindle::modbus {
 
@@ -38,6 +40,9 @@ inline constexpr std::uint16_t max_read_count = 125;
 inline constexpr std::uint16_t max_write_count = 123;
 
 enum class RegisterTable : std::uint8_t { holding, input };
+inline constexpr auto table_words = enum_table<RegisterTable>(
+    {{"holding", RegisterTable::holding}, {"input", RegisterTable::input}});
+constexpr std::string_view to_text(RegisterTable table) { return table_words.text(table); }
 
 struct UnitId {
   std::uint8_t value = 0;

@@ -5,7 +5,7 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/interrupt.hpp"
-#include "spindle/link/serial_settings.hpp"
+#include "spindle/link/endpoint.hpp"
 #include "spindle/link/transport.hpp"
 
 namespace spindle::posix {
@@ -17,7 +17,7 @@ namespace spindle::posix {
 /// Another program that has the port open without a lock is the transport's company().
 /// When an adapter is pulled out, sending and receiving fail with `reset`.
 Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
-                                                     const link::SerialSettings& settings,
+                                                     const modbus::SerialSettings& settings,
                                                      link::LineSwitching switching,
                                                      const Clock& clock,
                                                      const Interrupt& interrupt);

@@ -33,8 +33,6 @@ std::string words_of(const ActionRequest& request);
 Result<void> check_evidence(const catalogue::Action& action, const Target& target,
                             Acceptance acceptance);
 
-std::string_view to_text(device::ActionResult result);
-
 /// An action as it is sent, and what became of it.
 LoggedChange logged(const ActionRequest& request);
 LoggedChange logged(const ActionRequest& request, const Result<device::ActionResult>& result);

@@ -31,8 +31,9 @@ struct SimulatedTool {
   std::unique_ptr<sim::Server> server;
 };
 
-/// How long bytes take on the line of a simulated serial tool.
-Duration simulated_character_time(const catalogue::LinkFacts& facts, std::optional<unsigned> baud);
+/// How the line of a simulated serial tool is set; an empty rate is the profile's.
+modbus::SerialSettings simulated_line(const catalogue::LinkFacts& facts,
+                                      std::optional<unsigned> baud);
 
 Result<SimulatedTool> make_simulated_tool(const std::string& profile,
                                           const SimulatedToolOptions& options,

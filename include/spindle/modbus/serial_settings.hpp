@@ -1,9 +1,16 @@
 #pragma once
 
-#include "spindle/base/clock.hpp"
-#include "spindle/link/endpoint.hpp"
+#include <cstdint>
 
-namespace spindle::link {
+#include "spindle/base/clock.hpp"
+#include "spindle/base/enum_table.hpp"
+
+namespace spindle::modbus {
+
+enum class Parity : std::uint8_t { none, even, odd };
+/// As written in profiles and URLs.
+inline constexpr auto parity_words =
+    enum_table<Parity>({{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}});
 
 /// How a serial line is set. There are always eight data bits.
 struct SerialSettings {
@@ -14,11 +21,6 @@ struct SerialSettings {
   bool operator==(const SerialSettings&) const = default;
 };
 
-/// What the endpoint says, and where it says nothing the profile's: rate, parity ('N', 'E' or 'O')
-/// and stop bits.
-SerialSettings serial_settings(const Endpoint& endpoint, unsigned baud, char parity,
-                               unsigned stop_bits);
-
 /// Time of one character on the line: start bit, data, parity and stop bits.
 Duration character_time(const SerialSettings& line);
 
@@ -26,4 +28,4 @@ Duration character_time(const SerialSettings& line);
 /// 19200 baud 1.75 ms.
 Duration standard_silence(unsigned baud);
 
-}  // namespace spindle::link
+}  // namespace spindle::modbus

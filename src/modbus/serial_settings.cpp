@@ -1,6 +1,6 @@
-#include "spindle/link/serial_settings.hpp"
+#include "spindle/modbus/serial_settings.hpp"
 
-namespace spindle::link {
+namespace spindle::modbus {
 namespace {
 
 constexpr unsigned start_and_data_bits = 9;
@@ -13,19 +13,7 @@ Duration time_of_bits(unsigned bits, unsigned baud) {
   return Duration(std::chrono::seconds(bits)) / baud;
 }
 
-Parity parity_of(char letter) {
-  if (letter == 'N') return Parity::none;
-  return letter == 'O' ? Parity::odd : Parity::even;
-}
-
 }  // namespace
-
-SerialSettings serial_settings(const Endpoint& endpoint, unsigned baud, char parity,
-                               unsigned stop_bits) {
-  return {.baud = endpoint.baud.value_or(baud),
-          .parity = endpoint.parity.value_or(parity_of(parity)),
-          .stop_bits = endpoint.stop_bits.value_or(stop_bits)};
-}
 
 Duration character_time(const SerialSettings& line) {
   const unsigned parity_bits = line.parity == Parity::none ? 0 : 1;
@@ -37,4 +25,4 @@ Duration standard_silence(unsigned baud) {
   return time_of_bits(standard_character_bits * twice_the_characters, baud) / 2;
 }
 
-}  // namespace spindle::link
+}  // namespace spindle::modbus
