@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "grammar.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/commands/commands.hpp"
@@ -238,11 +239,18 @@ class Completer {
     }
   }
 
+  template <typename Table>
+  static std::vector<Candidate> candidates_of(const Table& table) {
+    std::vector<Candidate> words;
+    for (std::string& word : table.words()) words.push_back({std::move(word), ""});
+    return words;
+  }
+
   void offer_value(const OptionDescription& option, const std::string& before) {
     const std::string& kind = option.placeholder;
     std::vector<Candidate> values;
-    if (kind == "FORMAT") values = {{"table", ""}, {"json", ""}, {"csv", ""}};
-    if (kind == "WHEN") values = {{"auto", ""}, {"always", ""}, {"never", ""}};
+    if (kind == "FORMAT") values = candidates_of(format_words);
+    if (kind == "WHEN") values = candidates_of(color_words);
     if (kind == "NAME|FILE") values = profiles();
     if (kind == "FAULT") values = faults();
     if (kind == "OUTAGE") values = outages();
@@ -429,8 +437,9 @@ Completion complete(const std::vector<std::string>& words, const Description& de
 }
 
 std::string to_text(const Completion& completion) {
-  constexpr std::array<std::string_view, 3> paths = {"none", "files", "folders"};
-  std::string text = fmt::format("{}\n", paths[static_cast<std::size_t>(completion.paths)]);
+  constexpr auto path_words = enum_table<Paths>(
+      {{"none", Paths::none}, {"files", Paths::files}, {"folders", Paths::folders}});
+  std::string text = fmt::format("{}\n", path_words.text(completion.paths));
   for (const Candidate& candidate : completion.candidates) {
     text += fmt::format("{}\t{}\n", candidate.text, candidate.meaning);
   }

@@ -8,8 +8,8 @@
 #include <map>
 #include <utility>
 
+#include "binder.hpp"
 #include "help.hpp"
-#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/work/connect.hpp"
@@ -21,25 +21,6 @@ namespace {
 using commands::Context;
 using commands::Outcome;
 using Run = std::function<Result<Outcome>(Context&)>;
-
-/// The common options as typed.
-struct Typed {
-  std::string output;
-  std::string profile;
-  std::string tools;
-  std::string timeout;
-  std::string connect_timeout;
-  std::string retries;
-  std::string color;
-  std::string trace;
-  bool json = false;
-  bool yes = false;
-  bool no_input = false;
-  bool quiet = false;
-  bool verbose = false;
-  bool help = false;
-  bool version = false;
-};
 
 /// What people read of a command beside its options.
 struct Words {
@@ -56,88 +37,52 @@ struct Words {
 /// is named, because most of a short run would else be the others'.
 enum class Extent : std::uint8_t { whole, as_named };
 
+struct WatchArguments {
+  commands::WatchOptions options;
+  std::vector<std::string> arguments;  ///< TARGET... [NAME|PATTERN...]
+};
+
+/// The options of every command, where the parser writes them.
+struct AllOptions {
+  commands::IdentifyOptions identify;
+  commands::ListOptions list;
+  commands::GetOptions get;
+  commands::SetOptions set;
+  commands::DoOptions perform;
+  commands::PingOptions ping;
+  commands::ScanOptions scan;
+  WatchArguments watch;
+  commands::RemoteStartOptions remote_start;
+  commands::RemoteStopOptions remote_stop;
+  commands::AlarmsOptions alarms;
+  commands::BackupOptions backup;
+  commands::DiffOptions diff;
+  commands::RestoreOptions restore;
+  commands::SimulateOptions simulate;
+  bool check_tools = false;
+  commands::ProfileNameOptions profile;
+  commands::ProfileNameOptions profile_list;
+  commands::ProfileNameOptions profile_show;
+  commands::ProfileNameOptions profile_check;
+};
+
 /// The grammar while it is being parsed: the innermost command that was named.
 struct Draft {
   Extent extent = Extent::as_named;
-  Typed typed;
-  std::map<const CLI::App*, Words> words;
+  AllOptions options = {};
+  Invocation invocation = {};  ///< as far as the common options say
+  bool help = false;
+  bool version = false;
+  Faults common_faults = {};
+  std::map<const CLI::App*, Words> words = {};
+  std::map<const CLI::App*, Faults> faults = {};
   const CLI::App* chosen = nullptr;
   /// Instead of what the command's words say.
   std::optional<Invocation::ToolsFile> tools_file = std::nullopt;
-  std::string only_as_text;  ///< why neither JSON nor CSV can be had; empty: they can
-  Run run;
+  std::string only_as_text = {};  ///< why neither JSON nor CSV can be had; empty: they can
 };
 
 constexpr std::string_view end_of_options = "--";
-
-Error usage(std::string message, std::string hint = {}) {
-  return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
-}
-
-Error missing(std::string_view command, std::string_view argument) {
-  return usage(fmt::format("{}: {} is missing", command, argument),
-               fmt::format("'spindle {} --help' shows examples", command));
-}
-
-Error bad_option(std::string_view option, std::string message, std::string hint) {
-  Error error = usage(std::move(message), std::move(hint));
-  error.code = Errc::bad_value;
-  error.name = option;
-  return error;
-}
-
-Result<std::uint64_t> to_number(std::string_view option, const std::string& text,
-                                std::uint64_t minimum, std::uint64_t maximum) {
-  const auto number = parse_unsigned(text, maximum);
-  if (number && *number >= minimum) return *number;
-  return tl::unexpected(
-      bad_option(option, fmt::format("'{}' does not fit", text),
-                 fmt::format("it takes a number from {} to {}", minimum, maximum)));
-}
-
-Result<std::optional<Duration>> to_duration(std::string_view option, const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  auto duration = parse_duration(text);
-  if (duration && *duration > Duration::zero()) return *duration;
-  const std::string_view why = duration ? "is too short" : "is not a duration";
-  return tl::unexpected(
-      bad_option(option, fmt::format("'{}' {}", text, why), "write it like 500ms, 2.5s or 5min"));
-}
-
-/// One of a few words, with a suggestion for a misspelt one.
-template <typename Choice, std::size_t count>
-Result<Choice> to_choice(std::string_view option, const std::string& text,
-                         const std::array<std::pair<std::string_view, Choice>, count>& choices) {
-  std::vector<std::string> words;
-  for (const auto& [word, choice] : choices) {
-    if (word == text) return choice;
-    words.emplace_back(word);
-  }
-  std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));
-  if (const std::string meant = suggestion(text, words); !meant.empty()) hint += "; " + meant;
-  return tl::unexpected(bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint)));
-}
-
-constexpr std::array<std::pair<std::string_view, report::Format>, 3> formats = {
-    {{"table", report::Format::table},
-     {"json", report::Format::json},
-     {"csv", report::Format::csv}}};
-
-constexpr std::array<std::pair<std::string_view, ColorChoice>, 3> colors = {
-    {{"auto", ColorChoice::automatic},
-     {"always", ColorChoice::always},
-     {"never", ColorChoice::never}}};
-
-CLI::Option* option(CLI::App* app, const std::string& names, std::string& into,
-                    const std::string& placeholder, const std::string& meaning) {
-  return app->add_option(names, into, meaning)
-      ->type_name(placeholder)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-}
-
-CLI::Option* flag(CLI::App* app, const std::string& names, bool& into, const std::string& meaning) {
-  return app->add_flag(names, into, meaning)->disable_flag_override();
-}
 
 /// Of options that only some profiles declare: CLI11's groups say which.
 constexpr std::string_view declared_prefix = "of ";
@@ -148,233 +93,134 @@ constexpr const char* of_identity = "of profiles with an identity";
 constexpr const char* of_screwdrivers = "of profiles that count their results";
 constexpr const char* of_alarms = "of profiles whose run names alarms and warnings";
 
-void add_common_options(CLI::App& app, Typed& typed) {
-  option(&app, "-o,--output", typed.output, "FORMAT", "table, json (JSON Lines) or csv");
-  flag(&app, "--json", typed.json, "the same as -o json");
-  option(&app, "--profile", typed.profile, "NAME|FILE", "what the tool's registers mean");
-  option(&app, "--tools", typed.tools, "FILE", "file of named tools");
-  option(&app, "--timeout", typed.timeout, "DURATION", "how long to wait for one answer");
-  option(&app, "--connect-timeout", typed.connect_timeout, "DURATION",
-         "how long to wait for the connection");
-  option(&app, "--retries", typed.retries, "N", "how often a read without an answer is repeated");
-  flag(&app, "-y,--yes", typed.yes, "answer every question with yes");
-  flag(&app, "--no-input", typed.no_input, "never ask; what would have to be asked is refused");
-  flag(&app, "-q,--quiet", typed.quiet, "no summary, notes and progress on stderr");
-  flag(&app, "-v,--verbose", typed.verbose, "every frame and decision on stderr");
-  option(&app, "--trace", typed.trace, "FILE", "every frame into a pcapng file for Wireshark");
-  option(&app, "--color", typed.color, "WHEN", "auto, always or never");
-  flag(&app, "-h,--help", typed.help, "show this help");
-  flag(&app, "--version", typed.version, "show the version");
+void add_common_options(CLI::App& app, Draft& draft) {
+  Binder bind(app, "", draft.common_faults);
+  Invocation& invocation = draft.invocation;
+  work::CommonOptions& common = invocation.common;
+  commands::UserOptions& user = invocation.user;
+  bind.option("-o,--output", "FORMAT", invocation.format, one_of(format_words),
+              "table, json (JSON Lines) or csv");
+  bind.flag(
+      "--json", [] {}, "the same as -o json");  // see with_one_output_option()
+  bind.option("--profile", "NAME|FILE", common.profile, "what the tool's registers mean");
+  bind.option("--tools", "FILE", common.tools_file, "file of named tools");
+  bind.option("--timeout", "DURATION", common.timeout, to_duration,
+              "how long to wait for one answer");
+  bind.option("--connect-timeout", "DURATION", common.connect_timeout, to_duration,
+              "how long to wait for the connection");
+  bind.option("--retries", "N", common.retries, NumberFrom{0, 100},
+              "how often a read without an answer is repeated");
+  const auto give_consent = [&user] { user.consent = commands::Consent::given; };
+  bind.flag("-y,--yes", give_consent, "answer every question with yes");
+  const auto ask_nothing = [&user] {
+    if (user.consent != commands::Consent::given) user.consent = commands::Consent::no_input;
+  };
+  bind.flag("--no-input", ask_nothing, "never ask; what would have to be asked is refused");
+  const auto be_quiet = [&invocation, &user] {
+    invocation.talk = report::Talk::quiet;
+    user.progress = report::Showing::unwanted;
+  };
+  bind.flag("-q,--quiet", be_quiet, "no summary, notes and progress on stderr");
+  const auto show_frames = [&user] {
+    user.verbosity = commands::Verbosity::frames;
+    user.progress = report::Showing::unwanted;
+  };
+  bind.flag("-v,--verbose", show_frames, "every frame and decision on stderr");
+  bind.option("--trace", "FILE", common.trace_file, "every frame into a pcapng file for Wireshark");
+  bind.option("--color", "WHEN", invocation.color, one_of(color_words), "auto, always or never");
+  bind.flag("-h,--help", draft.help, true, "show this help");
+  bind.flag("--version", draft.version, true, "show the version");
 }
 
 /// The tool that a command was wanted from, as typed; empty where it is none or several.
-template <typename TypedOptions>
-std::string asked_of(const TypedOptions& typed) {
+template <typename Options>
+std::string asked_of(const Options& options) {
   const auto is_group = [](const std::string& target) { return target.starts_with('@'); };
-  if constexpr (requires { typed.options.target.size(); }) {
-    return is_group(typed.options.target) ? std::string() : typed.options.target;
+  if constexpr (requires { options.target.size(); }) {
+    return is_group(options.target) ? std::string() : options.target;
   }
-  if constexpr (requires { typed.options.targets.front().size(); }) {
-    const auto& targets = typed.options.targets;
+  if constexpr (requires { options.targets.front().size(); }) {
+    const auto& targets = options.targets;
     if (targets.size() == 1 && !is_group(targets.front())) return targets.front();
   }
   return {};
 }
 
-/// Adds a command whose options struct CLI11 fills while `make_run` turns it into the deed. The
-/// options are copied into the run, because the grammar is gone when it runs. `add_options` adds
-/// what may stand behind it.
-template <typename Options, typename MakeRun, typename AddOptions>
+std::string path_of(const CLI::App* command) {
+  std::string path = command->get_name();
+  for (const CLI::App* parent = command->get_parent();
+       parent != nullptr && parent->get_parent() != nullptr; parent = parent->get_parent()) {
+    path.insert(0, parent->get_name() + " ");
+  }
+  return path;
+}
+
+/// Adds a command: `bind_options` declares what may stand behind it, and `run` is the command. The
+/// options are copied, because the grammar is gone when it runs; what is wrong with them is told
+/// then, as an error of the command.
+template <typename Options, typename RunCommand, typename BindOptions>
 void add_command(CLI::App& parent, Draft& draft, const Words& words, Options& options,
-                 MakeRun make_run, AddOptions add_options) {
+                 RunCommand run, BindOptions bind_options) {
   CLI::App* command = parent.add_subcommand(std::string(words.name), std::string(words.meaning));
   command->fallthrough();
   command->set_help_flag();
   draft.words[command] = words;
-  command->final_callback([&draft, &options, command, make_run] {
+  command->final_callback([&draft, &options, command, run] {
     if (draft.chosen != nullptr) return;  // a command below this one was named
     draft.chosen = command;
-    draft.run = [typed = options, make_run](Context& context) -> Result<Outcome> {
-      return make_run(typed, context).map_error([&](Error error) {
-        if (error.asked_of.empty()) error.asked_of = asked_of(typed);
+    draft.invocation.run = [options, fault = draft.faults[command].first(),
+                            run](Context& context) -> Result<Outcome> {
+      auto outcome = fault ? Result<Outcome>(tl::unexpected(*fault)) : run(options, context);
+      return std::move(outcome).map_error([&](Error error) {
+        if (error.asked_of.empty()) error.asked_of = asked_of(options);
         return error;
       });
     };
   });
+  const auto bind_all = [&draft, &options, command, bind_options] {
+    Binder bind(*command, path_of(command), draft.faults[command]);
+    bind_options(bind, options);
+  };
   if (draft.extent == Extent::whole) {
-    add_options(command);
+    bind_all();
   } else {
-    command->preparse_callback([command, add_options](std::size_t) { add_options(command); });
+    command->preparse_callback([bind_all](std::size_t) { bind_all(); });
   }
 }
 
-/// The options as typed, command by command; what needs converting is text here.
-struct TypedPing {
-  commands::PingOptions options;
-  std::string jobs;
-  std::string count;
-  std::string interval;
-};
-struct TypedSet {
-  commands::SetOptions options;
-  std::string jobs;
-  bool dry_run = false;
-  bool save = false;
-  bool broadcast = false;
-};
-struct TypedGet {
-  commands::GetOptions options;
-  std::string jobs;
-  bool limits = false;
-};
-struct TypedDo {
-  commands::DoOptions options;
-  std::string jobs;
-  bool accept_unverified = false;
-  bool broadcast = false;
-};
-struct TypedRemoteStart {
-  commands::RemoteStartOptions options;
-  std::string limit;
-  std::string operation;
-  std::string watchdog;
-  std::string stop;
-  bool reverse = false;
-  bool accept_unverified = false;
-};
-struct TypedRemoteStop {
-  commands::RemoteStopOptions options;
-  std::string stop;
-  bool broadcast = false;
-};
-struct TypedAlarms {
-  commands::AlarmsOptions options;
-  std::string jobs;
-  bool reset = false;
-  bool accept_unverified = false;
-};
-struct TypedWatch {
-  commands::WatchOptions options;
-  std::vector<std::string> arguments;
-  std::string interval;
-  std::string count;
-  std::string duration;
-  std::string idle_timeout;
-  bool all = false;
-  bool initial = false;
-  bool no_push = false;
-  bool no_reconnect = false;
-};
-struct TypedTools {
-  bool check = false;
-};
-struct TypedScan {
-  commands::ScanOptions options;
-  std::string units;
-};
-struct TypedIdentify {
-  commands::IdentifyOptions options;
-  std::string jobs;
-};
-struct TypedBackup {
-  commands::BackupOptions options;
-  std::string jobs;
-  bool force = false;
-  bool include_secrets = false;
-};
-struct TypedDiff {
-  commands::DiffOptions options;
-  std::string jobs;
-};
-struct TypedRestore {
-  commands::RestoreOptions options;
-  std::string jobs;
-  bool dry_run = false;
-  bool force = false;
-  bool no_rollback = false;
-  bool save = false;
-};
-struct TypedSimulate {
-  commands::SimulateOptions options;
-  std::string units;
-  std::string baud;
-  bool no_gap = false;
-  std::string identity_bytes;
-  std::string firmware;
-  std::string serial;
-  std::string model;
-  std::string rundown_every;
-  std::string ng_every;
-  std::string burst;
-  std::string busy;
-};
-
-/// Everything that CLI11 writes into; must live as long as the parser.
-struct TypedCommands {
-  TypedIdentify identify;
-  commands::ListOptions list;
-  TypedGet get;
-  TypedSet set;
-  TypedDo perform;
-  TypedPing ping;
-  TypedScan scan;
-  TypedWatch watch;
-  TypedRemoteStart remote_start;
-  TypedRemoteStop remote_stop;
-  TypedAlarms alarms;
-  TypedBackup backup;
-  TypedDiff diff;
-  TypedRestore restore;
-  TypedSimulate simulate;
-  TypedTools tools;
-  commands::ProfileNameOptions profile;
-  commands::ProfileNameOptions profile_list;
-  commands::ProfileNameOptions profile_show;
-  commands::ProfileNameOptions profile_check;
-};
-
 constexpr std::string_view target_words = "tool name, @group or URL";
-constexpr std::string_view jobs_words = "how many tools at a time (default 64)";
 
-Result<void> fill_jobs(const std::string& text, std::size_t& jobs) {
-  if (text.empty()) return {};
-  const auto number = to_number("--jobs", text, 1, 10'000);
-  if (!number) return tl::unexpected(number.error());
-  jobs = *number;
-  return {};
+void bind_jobs(Binder& bind, std::size_t& jobs) {
+  bind.option("--jobs", "N", jobs, NumberFrom{1, 10'000}, "how many tools at a time (default 64)");
 }
 
-void add_identify(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_identify(CLI::App& app, Draft& draft) {
   constexpr Words words = {"identify", "TARGET...",
                            "who is there: maker, model, serial, firmware, profile",
                            "spindle identify sim:doga-bm\n"
                            "spindle identify tcp://192.168.10.23:5000\n"
                            "spindle identify station3 station4 --json"};
-  const auto run = [](TypedIdentify identify, Context& context) -> Result<Outcome> {
-    if (identify.options.targets.empty()) return tl::unexpected(missing("identify", "TARGET"));
-    auto filled = fill_jobs(identify.jobs, identify.options.jobs);
-    if (!filled) return tl::unexpected(std::move(filled.error()));
-    return commands::identify(identify.options, context);
-  };
-  add_command(app, draft, words, typed.identify, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.identify.options.targets, std::string(target_words));
-    option(command, "--jobs", typed.identify.jobs, "N", std::string(jobs_words));
-  });
+  add_command(app, draft, words, draft.options.identify, commands::identify,
+              [](Binder& bind, commands::IdentifyOptions& options) {
+                bind.required("TARGET", options.targets, target_words);
+                bind_jobs(bind, options.jobs);
+              });
 }
 
-void add_list(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_list(CLI::App& app, Draft& draft) {
   constexpr Words words = {"list", "[TARGET] [PATTERN...]",
                            "the parameter catalogue, offline when --profile is given",
                            "spindle list --profile doga-bm\n"
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
-  add_command(app, draft, words, typed.list, commands::list, [&typed](CLI::App* command) {
-    command->add_option("PATTERN", typed.list.arguments,
-                        "names or patterns; a tool name or URL may stand before them");
-  });
+  add_command(app, draft, words, draft.options.list, commands::list,
+              [](Binder& bind, commands::ListOptions& options) {
+                bind.argument("PATTERN", options.arguments,
+                              "names or patterns; a tool name or URL may stand before them");
+              });
 }
 
-void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_get(CLI::App& app, Draft& draft) {
   constexpr Words words = {"get", "TARGET [NAME|PATTERN...]",
                            "read parameters by name, pattern, number (p242) or raw register "
                            "(@holding:2, @input:3204/i16)",
@@ -382,20 +228,14 @@ void add_get(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle get station3 status.ready status.alarm\n"
                            "spindle get @line1 'preset.1.*' --json\n"
                            "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16"};
-  const auto run = [](TypedGet get, Context& context) {
-    if (get.options.target.empty())
-      return Result<Outcome>(tl::unexpected(missing("get", "TARGET")));
-    if (auto filled = fill_jobs(get.jobs, get.options.jobs); !filled)
-      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
-    if (get.limits) get.options.limits = device::Limits::read;
-    return commands::get(get.options, context);
-  };
-  add_command(app, draft, words, typed.get, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.get.options.target, std::string(target_words));
-    command->add_option("NAME", typed.get.options.names, "names, patterns, numbers, raw registers");
-    flag(command, "--limits", typed.get.limits, "also read the tool's own minimum and maximum");
-    option(command, "--jobs", typed.get.jobs, "N", std::string(jobs_words));
-  });
+  add_command(app, draft, words, draft.options.get, commands::get,
+              [](Binder& bind, commands::GetOptions& options) {
+                bind.required("TARGET", options.target, target_words);
+                bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
+                bind.flag("--limits", options.limits, device::Limits::read,
+                          "also read the tool's own minimum and maximum");
+                bind_jobs(bind, options.jobs);
+              });
 }
 
 constexpr std::string_view save_words =
@@ -404,7 +244,7 @@ constexpr std::string_view save_words =
 constexpr std::string_view broadcast_words =
     "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
 
-void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_set(CLI::App& app, Draft& draft) {
   constexpr Words words = {"set", "TARGET NAME=VALUE...",
                            "check everything, show old and new, write only what differs, read back",
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
@@ -412,105 +252,57 @@ void add_set(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle set station3 preset.2.target-torque=3.10 --dry-run\n"
                            "spindle set @line1 preset.1.target-torque=2.80\n"
                            "spindle set sim:orientalmotor-blv operation.2.speed=1200"};
-  const auto run = [](TypedSet set, Context& context) {
-    if (set.options.target.empty())
-      return Result<Outcome>(tl::unexpected(missing("set", "TARGET")));
-    if (set.options.assignments.empty())
-      return Result<Outcome>(tl::unexpected(missing("set", "NAME=VALUE")));
-    if (auto filled = fill_jobs(set.jobs, set.options.jobs); !filled)
-      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
-    if (set.dry_run) set.options.execution = commands::Execution::dry_run;
-    if (set.save) set.options.storing = commands::Storing::yes;
-    if (set.broadcast) set.options.reach = commands::Reach::everybody;
-    return commands::set(set.options, context);
-  };
-  add_command(app, draft, words, typed.set, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.set.options.target, std::string(target_words));
-    command->add_option("NAME=VALUE", typed.set.options.assignments, "what to write");
-    flag(command, "--dry-run", typed.set.dry_run, "check and show everything, write nothing");
-    flag(command, "--save", typed.set.save, std::string(save_words));
-    flag(command, "--broadcast", typed.set.broadcast, std::string(broadcast_words));
-    option(command, "--jobs", typed.set.jobs, "N", std::string(jobs_words));
-  });
+  add_command(app, draft, words, draft.options.set, commands::set,
+              [](Binder& bind, commands::SetOptions& options) {
+                bind.required("TARGET", options.target, target_words);
+                bind.required("NAME=VALUE", options.assignments, "what to write");
+                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+                          "check and show everything, write nothing");
+                bind.flag("--save", options.storing, commands::Storing::yes, save_words);
+                bind.flag("--broadcast", options.reach, commands::Reach::everybody,
+                          broadcast_words);
+                bind_jobs(bind, options.jobs);
+              });
 }
 
-void add_do(CLI::App& app, Draft& draft, TypedCommands& typed) {
+constexpr std::string_view accept_unverified_words =
+    "send what may move or lock the tool although its register is not certain";
+
+void add_do(CLI::App& app, Draft& draft) {
   constexpr Words words = {"do", "TARGET [ACTION[=VALUE]...]",
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
                            "spindle do station3 alarm-reset\n"
                            "spindle do @line1 lock=unlocked"};
-  const auto run = [](TypedDo perform, Context& context) {
-    if (perform.options.target.empty())
-      return Result<Outcome>(tl::unexpected(missing("do", "TARGET")));
-    if (auto filled = fill_jobs(perform.jobs, perform.options.jobs); !filled)
-      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
-    if (perform.broadcast) perform.options.reach = commands::Reach::everybody;
-    if (perform.accept_unverified) perform.options.acceptance = commands::Acceptance::unverified;
-    return commands::perform(perform.options, context);
-  };
-  add_command(app, draft, words, typed.perform, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.perform.options.target, std::string(target_words));
-    command->add_option("ACTION", typed.perform.options.actions,
-                        "actions, with =VALUE where they take one");
-    flag(command, "--accept-unverified", typed.perform.accept_unverified,
-         "send what may move or lock the tool although its register is not certain");
-    flag(command, "--broadcast", typed.perform.broadcast, std::string(broadcast_words));
-    option(command, "--jobs", typed.perform.jobs, "N", std::string(jobs_words));
-  });
+  add_command(
+      app, draft, words, draft.options.perform, commands::perform,
+      [](Binder& bind, commands::DoOptions& options) {
+        bind.required("TARGET", options.target, target_words);
+        bind.argument("ACTION", options.actions, "actions, with =VALUE where they take one");
+        bind.flag("--accept-unverified", options.acceptance, commands::Acceptance::unverified,
+                  accept_unverified_words);
+        bind.flag("--broadcast", options.reach, commands::Reach::everybody, broadcast_words);
+        bind_jobs(bind, options.jobs);
+      });
 }
 
-Result<Outcome> run_ping(TypedPing ping, Context& context) {
-  if (ping.options.target.empty()) return tl::unexpected(missing("ping", "TARGET"));
-  if (auto filled = fill_jobs(ping.jobs, ping.options.jobs); !filled)
-    return tl::unexpected(std::move(filled.error()));
-  if (!ping.count.empty()) {
-    const auto count = to_number("--count", ping.count, 1, 1'000'000);
-    if (!count) return tl::unexpected(count.error());
-    ping.options.count = static_cast<unsigned>(*count);
-  }
-  const auto interval = to_duration("--interval", ping.interval);
-  if (!interval) return tl::unexpected(interval.error());
-  ping.options.interval = interval->value_or(ping.options.interval);
-  return commands::ping(ping.options, context);
-}
-
-void add_ping(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_ping(CLI::App& app, Draft& draft) {
   constexpr Words words = {"ping", "TARGET [-c N]",
                            "round-trip statistics without touching any value",
                            "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
                            "spindle ping station3\n"
                            "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
-  add_command(app, draft, words, typed.ping, run_ping, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.ping.options.target, std::string(target_words));
-    option(command, "-c,--count", typed.ping.count, "N", "how many requests (default 4)");
-    option(command, "--interval", typed.ping.interval, "DURATION",
-           "time between them (default 1s)");
-    option(command, "--jobs", typed.ping.jobs, "N", std::string(jobs_words));
-  });
-}
-
-/// "1-3,7": units of a serial line, each once, in the order given.
-Result<std::vector<modbus::UnitId>> to_units(const std::string& text) {
-  constexpr std::uint64_t last_unit = 247;  // Modbus over Serial Line 1.02, 2.2
-  std::vector<modbus::UnitId> units;
-  for (const std::string_view range : split(text, ',')) {
-    const auto dash = range.find('-');
-    const auto first = parse_unsigned(range.substr(0, dash), last_unit);
-    const auto last =
-        dash == std::string_view::npos ? first : parse_unsigned(range.substr(dash + 1), last_unit);
-    if (!first || !last || *first == 0 || *last < *first) {
-      return tl::unexpected(bad_option("--units", fmt::format("'{}' does not fit", text),
-                                       "it takes units from 1 to 247, such as 1-31 or 1,5"));
-    }
-    for (std::uint64_t unit = *first; unit <= *last; ++unit) {
-      const modbus::UnitId id{static_cast<std::uint8_t>(unit)};
-      if (std::find(units.begin(), units.end(), id) == units.end()) units.push_back(id);
-    }
-  }
-  return units;
+  add_command(app, draft, words, draft.options.ping, commands::ping,
+              [](Binder& bind, commands::PingOptions& options) {
+                bind.required("TARGET", options.target, target_words);
+                bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000},
+                            "how many requests (default 4)");
+                bind.option("--interval", "DURATION", options.interval, to_duration,
+                            "time between them (default 1s)");
+                bind_jobs(bind, options.jobs);
+              });
 }
 
 std::string scan_words() {
@@ -520,15 +312,7 @@ std::string scan_words() {
          "(tcp://) a unit that the gateway can not reach counts as absent.\n";
 }
 
-Result<Outcome> run_scan(TypedScan scan, Context& context) {
-  if (scan.options.bus.empty()) return tl::unexpected(missing("scan", "BUS"));
-  auto units = to_units(scan.units.empty() ? "1-31" : scan.units);
-  if (!units) return tl::unexpected(std::move(units.error()));
-  scan.options.units = std::move(*units);
-  return commands::scan(scan.options, context);
-}
-
-void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_scan(CLI::App& app, Draft& draft) {
   constexpr Words words = {"scan", "BUS [--units 1-31]",
                            "which units answer on a serial line or behind a gateway",
                            "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
@@ -536,73 +320,16 @@ void add_scan(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle scan rtu+tcp://192.168.10.30:4001 --json\n"
                            "spindle scan tcp://192.168.10.31 --units 1-5",
                            scan_words};
-  add_command(app, draft, words, typed.scan, run_scan, [&typed](CLI::App* command) {
-    command->add_option("BUS", typed.scan.options.bus, "URL of the line, or a tool that is on it");
-    option(command, "--units", typed.scan.units, "LIST", "which to ask (default 1-31)");
-  });
-}
-
-/// Leaves it as it is where nothing is given.
-template <typename Number>
-Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
-                         Number& into) {
-  if (text.empty()) return {};
-  return to_number(name, text, 0, maximum).map([&](std::uint64_t number) {
-    into = static_cast<Number>(number);
-  });
-}
-
-template <typename Number>
-Result<void> fill_number(std::string_view name, const std::string& text, std::uint64_t maximum,
-                         std::optional<Number>& into) {
-  if (text.empty()) return {};
-  return fill_number(name, text, maximum, into.emplace());
-}
-
-Result<Outcome> run_simulate(TypedSimulate typed, Context& context) {
-  commands::SimulateOptions& options = typed.options;
-  if (options.profile.empty()) return tl::unexpected(missing("simulate", "PROFILE"));
-  sim::BmOptions& bm = options.tool.bm;
-  auto filled =
-      fill_number("--identity-bytes", typed.identity_bytes, 255, bm.identity_bytes)
-          .and_then([&] { return fill_number("--firmware", typed.firmware, 0xFFFF, bm.firmware); })
-          .and_then([&] { return fill_number("--serial", typed.serial, 0xFFFF'FFFF, bm.serial); })
-          .and_then([&] { return fill_number("--model", typed.model, 0xFFFF, bm.tool_model); })
-          .and_then(
-              [&] { return fill_number("--ng-every", typed.ng_every, 1'000'000, bm.ng_every); })
-          .and_then([&] { return fill_number("--burst", typed.burst, 10'000, bm.burst); });
-  if (!filled) return tl::unexpected(std::move(filled.error()));
-  if (!typed.units.empty()) {
-    auto units = to_units(typed.units);
-    if (!units) return tl::unexpected(std::move(units.error()));
-    options.tool.units = std::move(*units);
-  }
-  if (!typed.baud.empty()) {
-    const auto baud = to_number("--baud", typed.baud, 1, 4'000'000);
-    if (!baud) return tl::unexpected(baud.error());
-    options.tool.baud = static_cast<unsigned>(*baud);
-  }
-  if (typed.no_gap) options.gaps = sim::LineModel::Gaps::ignored;
-  const auto rundown_every = to_duration("--rundown-every", typed.rundown_every);
-  if (!rundown_every) return tl::unexpected(rundown_every.error());
-  bm.rundown_every = *rundown_every;
-  const auto busy = to_duration("--busy", typed.busy);
-  if (!busy) return tl::unexpected(busy.error());
-  constexpr Duration longest_busy = std::chrono::seconds(1);
-  if (*busy && **busy > longest_busy) {
-    return tl::unexpected(bad_option("--busy", fmt::format("'{}' is too long", typed.busy),
-                                     "Configuration takes 1s or less"));
-  }
-  options.tool.busy = *busy;
-  const bool work_is_described = !typed.ng_every.empty() || !typed.burst.empty();
-  if (work_is_described && !bm.rundown_every) {
-    return tl::unexpected(
-        usage("--ng-every and --burst need --rundown-every", "add for example --rundown-every 5s"));
-  }
-  if (bm.burst == 0) {
-    return tl::unexpected(usage("--burst 0 would be no result", "it takes 1 or more"));
-  }
-  return commands::simulate(options, context);
+  add_command(app, draft, words, draft.options.scan, commands::scan,
+              [](Binder& bind, commands::ScanOptions& options) {
+                constexpr std::uint8_t usual_last_unit = 31;
+                for (std::uint8_t unit = 1; unit <= usual_last_unit; ++unit) {
+                  options.units.push_back({unit});
+                }
+                bind.required("BUS", options.bus, "URL of the line, or a tool that is on it");
+                bind.option("--units", "LIST", options.units, to_units,
+                            "which to ask (default 1-31)");
+              });
 }
 
 std::string trouble_words() {
@@ -618,107 +345,83 @@ std::string trouble_words() {
   return text;
 }
 
-/// TARGET... [NAME|PATTERN...]: the first argument is a target, and so is every one behind it that
-/// can be nothing else.
-void part_arguments(const TypedWatch& typed, commands::WatchOptions& options,
-                    const Context& context) {
-  for (const std::string& argument : typed.arguments) {
+/// The first argument is a target, and so is every one behind it that can be nothing else.
+Result<Outcome> run_watch(const WatchArguments& watch, Context& context) {
+  commands::WatchOptions options = watch.options;
+  for (const std::string& argument : watch.arguments) {
     const bool is_target = options.targets.empty() ||
                            (options.names.empty() && commands::is_target(argument, context));
     (is_target ? options.targets : options.names).push_back(argument);
   }
+  return commands::watch(options, context);
 }
 
-Result<void> understand_watch(const TypedWatch& typed, commands::WatchOptions& options) {
-  const auto interval = to_duration("--interval", typed.interval);
-  if (!interval) return tl::unexpected(interval.error());
-  const auto duration = to_duration("--duration", typed.duration);
-  if (!duration) return tl::unexpected(duration.error());
-  const auto idle_timeout = to_duration("--idle-timeout", typed.idle_timeout);
-  if (!idle_timeout) return tl::unexpected(idle_timeout.error());
-  if (!typed.count.empty()) {
-    const auto count = to_number("--count", typed.count, 1, 1'000'000'000);
-    if (!count) return tl::unexpected(count.error());
-    options.count = *count;
-  }
-  options.interval = *interval;
-  options.duration = *duration;
-  options.idle_timeout = *idle_timeout;
-  if (typed.initial) options.samples = device::Samples::changes_and_first;
-  if (typed.all) options.samples = device::Samples::all;
-  if (typed.no_push) options.events = device::EventMode::unarmed;
-  if (typed.no_reconnect) options.reconnection = device::Reconnection::never;
-  return {};
+void bind_watch(Binder& bind, WatchArguments& watch) {
+  commands::WatchOptions& options = watch.options;
+  bind.required("TARGET", watch.arguments, "tools, then names or patterns of values to poll");
+  bind.option("--interval", "DURATION", options.interval, to_duration,
+              "time between two polls (default 200ms)");
+  // --all wins over --initial.
+  bind.flag("--all", options.samples, device::Samples::all,
+            "every polled sample instead of changes");
+  const auto add_first = [&options] {
+    if (options.samples != device::Samples::all) {
+      options.samples = device::Samples::changes_and_first;
+    }
+  };
+  bind.flag("--initial", add_first, "also the first value of everything polled");
+  bind.option("--count", "N", options.count, NumberFrom{1, 1'000'000'000},
+              "end after so many events, changes and samples");
+  bind.option("--duration", "DURATION", options.duration, to_duration, "end after this time");
+  bind.option("--idle-timeout", "DURATION", options.idle_timeout, to_duration,
+              "end when nothing came for this time; status 1 if nothing came at all");
+  bind.flag("--no-push", options.events, device::EventMode::unarmed,
+            "poll the event counter; for tools whose output another client uses");
+  bind.flag("--no-reconnect", options.reconnection, device::Reconnection::never,
+            "end when the link is lost");
 }
 
-Result<Outcome> run_watch(TypedWatch typed, Context& context) {
-  if (typed.arguments.empty()) return tl::unexpected(missing("watch", "TARGET"));
-  part_arguments(typed, typed.options, context);
-  if (auto understood = understand_watch(typed, typed.options); !understood) {
-    return tl::unexpected(std::move(understood.error()));
-  }
-  return commands::watch(typed.options, context);
-}
-
-void add_watch(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_watch(CLI::App& app, Draft& draft) {
   constexpr Words words = {"watch", "TARGET... [NAME|PATTERN...]",
                            "events as they happen and changes of polled values, until stopped",
                            "spindle watch station3\n"
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
-  add_command(app, draft, words, typed.watch, run_watch, [&typed](CLI::App* command) {
-    TypedWatch& watch = typed.watch;
-    command->add_option("TARGET", watch.arguments,
-                        "tools, then names or patterns of values to poll");
-    option(command, "--interval", watch.interval, "DURATION",
-           "time between two polls (default 200ms)");
-    command->add_flag("--all", watch.all, "every polled sample instead of changes");
-    command->add_flag("--initial", watch.initial, "also the first value of everything polled");
-    option(command, "--count", watch.count, "N", "end after so many events, changes and samples");
-    option(command, "--duration", watch.duration, "DURATION", "end after this time");
-    option(command, "--idle-timeout", watch.idle_timeout, "DURATION",
-           "end when nothing came for this time; status 1 if nothing came at all");
-    command->add_flag("--no-push", watch.no_push,
-                      "poll the event counter; for tools whose output another client uses");
-    command->add_flag("--no-reconnect", watch.no_reconnect, "end when the link is lost");
-  });
+  add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
 }
 
-constexpr std::array<std::pair<std::string_view, catalogue::StopMode>, 2> stop_modes = {
-    {{"decelerate", catalogue::StopMode::decelerate}, {"instant", catalogue::StopMode::instant}}};
+constexpr auto stop_modes = enum_table<catalogue::StopMode>(
+    {{"decelerate", catalogue::StopMode::decelerate}, {"instant", catalogue::StopMode::instant}});
 
-Result<std::optional<catalogue::StopMode>> to_stop_mode(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const auto mode = to_choice("--stop", text, stop_modes);
-  if (!mode) return tl::unexpected(mode.error());
-  return *mode;
+void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
+  bind.required("TARGET", options.target, "tool name or URL");
+  bind.option("--for", "DURATION", options.limit, to_duration, "stop after this time");
+  bind.option("--preset", "N", options.preset, "select this preset first")->group(of_start_action);
+  bind.option("--direction", "D", options.direction, "select this direction first")
+      ->group(of_start_action);
+  bind.option("--speed", "SPEED", options.speed,
+              "how fast, in the unit of the profile: 500 (r/min), 25.5 (Hz)")
+      ->group(of_motors);
+  bind.flag("--reverse", options.direction_of_motor, catalogue::Direction::reverse,
+            "turn the motor the other way round")
+      ->group(of_motors);
+  bind.option("--stop", "HOW", options.stop, one_of(stop_modes), "decelerate (default) or instant")
+      ->group(of_motors);
+  bind.option("--operation", "N", options.operation, NumberFrom{0, 0xFFFF},
+              "operation data to set and run (default: those of the profile)")
+      ->group(of_command_word);
+  bind.option("--acceleration", "SECONDS", options.acceleration, "time to reach the speed")
+      ->group(of_command_word);
+  bind.option("--deceleration", "SECONDS", options.deceleration, "time to stand still")
+      ->group(of_command_word);
+  bind.option("--watchdog", "DURATION", options.watchdog, to_duration,
+              "let the driver itself stop when it hears nothing for so long")
+      ->group(of_command_word);
+  bind.flag("--accept-unverified", options.acceptance, commands::Acceptance::unverified,
+            accept_unverified_words);
 }
 
-Result<void> understand_motor(TypedRemoteStart& typed) {
-  const auto watchdog = to_duration("--watchdog", typed.watchdog);
-  if (!watchdog) return tl::unexpected(watchdog.error());
-  const auto stop = to_stop_mode(typed.stop);
-  if (!stop) return tl::unexpected(stop.error());
-  typed.options.watchdog = *watchdog;
-  typed.options.stop = *stop;
-  if (typed.reverse) typed.options.direction_of_motor = catalogue::Direction::reverse;
-  return fill_number("--operation", typed.operation, 0xFFFF, typed.options.operation);
-}
-
-Result<Outcome> run_remote_start(TypedRemoteStart typed, Context& context) {
-  if (typed.options.target.empty()) return tl::unexpected(missing("remote-start", "TARGET"));
-  const auto limit = to_duration("--for", typed.limit);
-  if (!limit) return tl::unexpected(limit.error());
-  typed.options.limit = *limit;
-  if (auto motor = understand_motor(typed); !motor) return tl::unexpected(motor.error());
-  if (typed.accept_unverified) typed.options.acceptance = commands::Acceptance::unverified;
-  return commands::remote_start(typed.options, context);
-}
-
-constexpr std::string_view accept_unverified_words =
-    "send what may move or lock the tool although its register is not certain";
-
-void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_remote_start(CLI::App& app, Draft& draft) {
   constexpr Words words = {
       "remote-start", "TARGET [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
@@ -726,37 +429,11 @@ void add_remote_start(CLI::App& app, Draft& draft, TypedCommands& typed) {
       "spindle remote-start station3 --for 2s --yes --json\n"
       "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
       "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
-  add_command(app, draft, words, typed.remote_start, run_remote_start, [&typed](CLI::App* command) {
-    auto& options = typed.remote_start.options;
-    command->add_option("TARGET", options.target, "tool name or URL");
-    option(command, "--for", typed.remote_start.limit, "DURATION", "stop after this time");
-    option(command, "--preset", options.preset, "N", "select this preset first")
-        ->group(of_start_action);
-    option(command, "--direction", options.direction, "D", "select this direction first")
-        ->group(of_start_action);
-    option(command, "--speed", options.speed, "SPEED",
-           "how fast, in the unit of the profile: 500 (r/min), 25.5 (Hz)")
-        ->group(of_motors);
-    flag(command, "--reverse", typed.remote_start.reverse, "turn the motor the other way round")
-        ->group(of_motors);
-    option(command, "--stop", typed.remote_start.stop, "HOW", "decelerate (default) or instant")
-        ->group(of_motors);
-    option(command, "--operation", typed.remote_start.operation, "N",
-           "operation data to set and run (default: those of the profile)")
-        ->group(of_command_word);
-    option(command, "--acceleration", options.acceleration, "SECONDS", "time to reach the speed")
-        ->group(of_command_word);
-    option(command, "--deceleration", options.deceleration, "SECONDS", "time to stand still")
-        ->group(of_command_word);
-    option(command, "--watchdog", typed.remote_start.watchdog, "DURATION",
-           "let the driver itself stop when it hears nothing for so long")
-        ->group(of_command_word);
-    command->add_flag("--accept-unverified", typed.remote_start.accept_unverified,
-                      std::string(accept_unverified_words));
-  });
+  add_command(app, draft, words, draft.options.remote_start, commands::remote_start,
+              bind_remote_start);
 }
 
-void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_remote_stop(CLI::App& app, Draft& draft) {
   constexpr Words words = {"remote-stop",
                            "TARGET...",
                            "stop now; never asks",
@@ -766,185 +443,189 @@ void add_remote_stop(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "orientalmotor-blv --broadcast",
                            nullptr,
                            Invocation::ToolsFile::salvaged};
-  const auto run = [](TypedRemoteStop stop, Context& context) {
-    if (stop.options.targets.empty()) {
-      return Result<Outcome>(tl::unexpected(missing("remote-stop", "TARGET")));
-    }
-    const auto mode = to_stop_mode(stop.stop);
-    if (!mode) return Result<Outcome>(tl::unexpected(mode.error()));
-    stop.options.stop = *mode;
-    if (stop.broadcast) stop.options.reach = commands::Reach::everybody;
-    return commands::remote_stop(stop.options, context);
-  };
-  add_command(app, draft, words, typed.remote_stop, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.remote_stop.options.targets, std::string(target_words));
-    option(command, "--stop", typed.remote_stop.stop, "HOW",
-           "how a motor stops: decelerate (default) or instant");
-    flag(command, "--broadcast", typed.remote_stop.broadcast,
-         "everybody on the serial line (unit=0): sent, not acknowledged");
-  });
+  add_command(app, draft, words, draft.options.remote_stop, commands::remote_stop,
+              [](Binder& bind, commands::RemoteStopOptions& options) {
+                bind.required("TARGET", options.targets, target_words);
+                bind.option("--stop", "HOW", options.stop, one_of(stop_modes),
+                            "how a motor stops: decelerate (default) or instant");
+                bind.flag("--broadcast", options.reach, commands::Reach::everybody,
+                          "everybody on the serial line (unit=0): sent, not acknowledged");
+              });
 }
 
-void add_alarms(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_alarms(CLI::App& app, Draft& draft) {
   constexpr Words words = {"alarms", "TARGET [--reset]",
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
                            "spindle alarms @line1\n"
                            "spindle alarms station3 --reset"};
-  const auto run = [](TypedAlarms alarms, Context& context) {
-    if (alarms.options.target.empty()) {
-      return Result<Outcome>(tl::unexpected(missing("alarms", "TARGET")));
-    }
-    if (auto filled = fill_jobs(alarms.jobs, alarms.options.jobs); !filled)
-      return Result<Outcome>(tl::unexpected(std::move(filled.error())));
-    if (alarms.reset) alarms.options.reset = commands::AlarmReset::yes;
-    if (alarms.accept_unverified) alarms.options.acceptance = commands::Acceptance::unverified;
-    return commands::alarms(alarms.options, context);
-  };
-  add_command(app, draft, words, typed.alarms, run, [&typed](CLI::App* command) {
-    command->add_option("TARGET", typed.alarms.options.target, std::string(target_words));
-    command->add_flag("--reset", typed.alarms.reset, "also reset the present alarm");
-    command->add_flag("--accept-unverified", typed.alarms.accept_unverified,
-                      std::string(accept_unverified_words));
-    option(command, "--jobs", typed.alarms.jobs, "N", std::string(jobs_words));
-  });
+  add_command(app, draft, words, draft.options.alarms, commands::alarms,
+              [](Binder& bind, commands::AlarmsOptions& options) {
+                bind.required("TARGET", options.target, target_words);
+                bind.flag("--reset", options.reset, commands::AlarmReset::yes,
+                          "also reset the present alarm");
+                bind.flag("--accept-unverified", options.acceptance,
+                          commands::Acceptance::unverified, accept_unverified_words);
+                bind_jobs(bind, options.jobs);
+              });
 }
 
-Result<Outcome> run_backup(TypedBackup typed, Context& context) {
-  if (typed.options.targets.empty()) return tl::unexpected(missing("backup", "TARGET"));
-  if (auto filled = fill_jobs(typed.jobs, typed.options.jobs); !filled) {
-    return tl::unexpected(std::move(filled.error()));
-  }
-  if (typed.force) typed.options.overwrite = Overwrite::allow;
-  if (typed.include_secrets) typed.options.secrets = commands::Secrets::include;
-  return commands::backup(typed.options, context);
-}
-
-void add_backup(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_backup(CLI::App& app, Draft& draft) {
   constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
                            "every stored parameter into a file that people can read and git can "
                            "compare",
                            "spindle backup station3\n"
                            "spindle backup station3 -f before-the-change.yaml\n"
                            "spindle backup @line1 --dir backups --force"};
-  add_command(app, draft, words, typed.backup, run_backup, [&typed, &draft](CLI::App* command) {
-    auto& options = typed.backup.options;
-    command->add_option("TARGET", options.targets, std::string(target_words));
-    option(command, "-f,--file", options.file, "FILE",
-           "where to (default TARGET.yaml in the present folder); - is standard output")
-        ->each([&draft](const std::string& file) {
-          if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
-        });
-    option(command, "--dir", options.folder, "FOLDER",
-           "one file TARGET.yaml a tool in this folder");
-    command->add_flag("--force", typed.backup.force, "replace files that are there");
-    command->add_flag("--include-secrets", typed.backup.include_secrets,
-                      "also what the profile marks as secret");
-    option(command, "--jobs", typed.backup.jobs, "N", std::string(jobs_words));
-  });
+  const auto note_file = [&draft](const std::string& file) {
+    if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
+  };
+  add_command(app, draft, words, draft.options.backup, commands::backup,
+              [note_file](Binder& bind, commands::BackupOptions& options) {
+                bind.required("TARGET", options.targets, target_words);
+                bind.option("-f,--file", "FILE", options.file,
+                            "where to (default TARGET.yaml in the present folder); - is standard "
+                            "output")
+                    ->each(note_file);
+                bind.option("--dir", "FOLDER", options.folder,
+                            "one file TARGET.yaml a tool in this folder");
+                bind.flag("--force", options.overwrite, Overwrite::allow,
+                          "replace files that are there");
+                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                          "also what the profile marks as secret");
+                bind_jobs(bind, options.jobs);
+              });
 }
 
-/// Beside --dir no second side and no FILE is named, so what stands there is the first NAME.
-void make_name_of(std::string& argument, std::vector<std::string>& names) {
-  if (!argument.empty()) names.insert(names.begin(), std::exchange(argument, {}));
-}
-
-Result<Outcome> run_diff(TypedDiff typed, Context& context) {
-  commands::DiffOptions& options = typed.options;
-  if (options.a.empty()) return tl::unexpected(missing("diff", "A"));
-  if (!options.folder.empty()) {
-    make_name_of(options.b, options.patterns);
-  } else if (options.b.empty()) {
-    return tl::unexpected(missing("diff", "B"));
+/// Beside --dir no second side and no FILE is named, so what stands there is the first NAME. Else it
+/// is needed.
+std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
+                                  const std::string& folder, std::vector<std::string>& names,
+                                  std::string_view command) {
+  if (folder.empty()) {
+    return typed.empty() ? std::optional(Binder::missing(command, argument)) : std::nullopt;
   }
-  return fill_jobs(typed.jobs, options.jobs).and_then([&] {
-    return commands::diff(options, context);
-  });
+  if (!typed.empty()) names.insert(names.begin(), std::exchange(typed, {}));
+  return std::nullopt;
 }
 
-void add_diff(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_diff(CLI::App& app, Draft& draft) {
   constexpr Words words = {"diff", "A {B|--dir FOLDER} [NAME|PATTERN...] [--ignore PATTERN]",
                            "compare tools, backup files and defaults by parameter name",
                            "spindle diff station3 station3.yaml\n"
                            "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
                            "spindle diff station3 station4 --ignore 'preset.1.*'\n"
                            "spindle diff @line1 --dir backups"};
-  add_command(app, draft, words, typed.diff, run_diff, [&typed](CLI::App* command) {
-    auto& options = typed.diff.options;
-    command->add_option("A", options.a, "tool, backup file, or 'defaults'; with --dir also @group");
-    command->add_option("B", options.b, "tool, backup file, or 'defaults'");
-    command->add_option("NAME", options.patterns, "compare only these");
-    command->add_option("--ignore", options.ignored, "leave these out, repeatable")
-        ->type_name("PATTERN")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    option(command, "--dir", options.folder, "FOLDER",
-           "compare each tool with its own backup in this folder, as backup --dir writes it");
-    option(command, "--jobs", typed.diff.jobs, "N", std::string(jobs_words));
-  });
+  add_command(app, draft, words, draft.options.diff, commands::diff,
+              [](Binder& bind, commands::DiffOptions& options) {
+                bind.required("A", options.a,
+                              "tool, backup file, or 'defaults'; with --dir also @group");
+                bind.argument("B", options.b, "tool, backup file, or 'defaults'");
+                bind.argument("NAME", options.patterns, "compare only these");
+                bind.repeatable("--ignore", "PATTERN", options.ignored,
+                                "leave these out, repeatable");
+                bind.option("--dir", "FOLDER", options.folder,
+                            "compare each tool with its own backup in this folder, as backup "
+                            "--dir writes it");
+                bind_jobs(bind, options.jobs);
+                bind.check([&options] {
+                  return make_name_of("B", options.b, options.folder, options.patterns, "diff");
+                });
+              });
 }
 
-Result<Outcome> run_restore(TypedRestore typed, Context& context) {
-  commands::RestoreOptions& options = typed.options;
-  if (options.target.empty()) return tl::unexpected(missing("restore", "TARGET"));
-  if (!options.folder.empty()) {
-    make_name_of(options.file, options.patterns);
-  } else if (options.file.empty()) {
-    return tl::unexpected(missing("restore", "FILE"));
-  }
-  if (typed.dry_run) options.execution = commands::Execution::dry_run;
-  if (typed.force) options.model = commands::ModelCheck::off;
-  if (typed.no_rollback) options.on_failure = commands::OnFailure::leave;
-  if (typed.save) options.storing = commands::Storing::yes;
-  return fill_jobs(typed.jobs, options.jobs).and_then([&] {
-    return commands::restore(options, context);
-  });
-}
-
-void add_restore(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_restore(CLI::App& app, Draft& draft) {
   constexpr Words words = {"restore", "TARGET {FILE|--dir FOLDER} [NAME|PATTERN...]",
                            "plan, confirm, write what differs, verify; put back if it fails",
                            "spindle restore station3 station3.yaml --dry-run\n"
                            "spindle restore station3 station3.yaml 'preset.1.*'\n"
                            "spindle restore station3 old-tool.yaml --yes --json\n"
                            "spindle restore @line1 --dir backups"};
-  add_command(app, draft, words, typed.restore, run_restore, [&typed](CLI::App* command) {
-    auto& options = typed.restore.options;
-    command->add_option("TARGET", options.target, "tool name or URL; with --dir also @group");
-    command->add_option("FILE", options.file, "backup file");
-    command->add_option("NAME", options.patterns, "restore only these");
-    option(command, "--dir", options.folder, "FOLDER",
-           "restore each tool from its own backup in this folder, as backup --dir writes it");
-    command->add_flag("--dry-run", typed.restore.dry_run, "show the plan, write nothing");
-    command->add_flag("--force", typed.restore.force, "also to a tool of another model");
-    command->add_flag("--no-rollback", typed.restore.no_rollback,
-                      "leave what was written when something fails");
-    command->add_flag("--save", typed.restore.save, std::string(save_words));
-    option(command, "--jobs", typed.restore.jobs, "N", std::string(jobs_words));
+  add_command(app, draft, words, draft.options.restore, commands::restore,
+              [](Binder& bind, commands::RestoreOptions& options) {
+                bind.required("TARGET", options.target, "tool name or URL; with --dir also @group");
+                bind.argument("FILE", options.file, "backup file");
+                bind.argument("NAME", options.patterns, "restore only these");
+                bind.option("--dir", "FOLDER", options.folder,
+                            "restore each tool from its own backup in this folder, as backup "
+                            "--dir writes it");
+                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+                          "show the plan, write nothing");
+                bind.flag("--force", options.model, commands::ModelCheck::off,
+                          "also to a tool of another model");
+                bind.flag("--no-rollback", options.on_failure, commands::OnFailure::leave,
+                          "leave what was written when something fails");
+                bind.flag("--save", options.storing, commands::Storing::yes, save_words);
+                bind_jobs(bind, options.jobs);
+                bind.check([&options] {
+                  return make_name_of("FILE", options.file, options.folder, options.patterns,
+                                      "restore");
+                });
+              });
+}
+
+/// How long Configuration may take in a simulated driver.
+Result<Duration> to_busy(std::string_view option, const std::string& text) {
+  constexpr Duration longest = std::chrono::seconds(1);
+  const auto busy = to_duration(option, text);
+  if (!busy || *busy <= longest) return busy;
+  return tl::unexpected(
+      bad_option(option, fmt::format("'{}' is too long", text), "Configuration takes 1s or less"));
+}
+
+/// Of the line and the trouble of a simulated tool.
+void bind_simulated_line(Binder& bind, commands::SimulateOptions& options) {
+  bind.option("--units", "LIST", options.tool.units, to_units,
+              "serial tools: which units, such as 1-3");
+  bind.option("--baud", "N", options.tool.baud, NumberFrom{1, 4'000'000},
+              "serial tools: rate of the line");
+  bind.flag("--no-gap", options.gaps, sim::LineModel::Gaps::ignored,
+            "serial tools: also hear clients that keep too short a silence");
+  bind.repeatable("--fault", "FAULT", options.faults,
+                  "make the tool misbehave, repeatable; see below");
+  bind.option("--busy", "DURATION", options.tool.busy, to_busy,
+              "how long Configuration takes (default 200ms, at most 1s)")
+      ->group(of_command_word);
+  bind.repeatable("--alarm", "CODE", options.alarms,
+                  "an alarm that the tool raises, such as 30h, or 30h@5s after a time; repeatable")
+      ->group(of_alarms);
+  bind.repeatable("--warning", "CODE", options.warnings, "a warning in the same form")
+      ->group(of_alarms);
+}
+
+/// Of its identity and its operator.
+void bind_simulated_work(Binder& bind, sim::BmOptions& bm) {
+  bind.option("--identity-bytes", "N", bm.identity_bytes, NumberFrom{0, 255},
+              "length of the identity: 12, 13 or 17")
+      ->group(of_identity);
+  bind.option("--firmware", "N", bm.firmware, NumberFrom{0, 0xFFFF}, "firmware number to report")
+      ->group(of_identity);
+  bind.option("--serial", "N", bm.serial, NumberFrom{0, 0xFFFF'FFFF}, "serial number to report")
+      ->group(of_identity);
+  bind.option("--model", "N", bm.tool_model, NumberFrom{0, 0xFFFF}, "tool model code to report")
+      ->group(of_identity);
+  bind.option("--rundown-every", "DURATION", bm.rundown_every, to_duration,
+              "an operator who drives a screw at this interval (default: nobody)")
+      ->group(of_screwdrivers);
+  const auto* every = bind.option("--ng-every", "N", bm.ng_every, NumberFrom{0, 1'000'000},
+                                  "every so many of the operator's screws end NG")
+                          ->group(of_screwdrivers);
+  const auto* burst =
+      bind.option("--burst", "N", bm.burst, NumberFrom{0, 10'000},
+                  "results that each of the operator's screws brings, all at once (default 1)")
+          ->group(of_screwdrivers);
+  bind.check([every, burst, &bm]() -> std::optional<Error> {
+    const bool work_is_described = every->count() > 0 || burst->count() > 0;
+    if (work_is_described && !bm.rundown_every) {
+      return usage("--ng-every and --burst need --rundown-every",
+                   "add for example --rundown-every 5s");
+    }
+    if (bm.burst == 0) return usage("--burst 0 would be no result", "it takes 1 or more");
+    return std::nullopt;
   });
 }
 
-/// The options about what only some simulated tools have.
-void add_abilities(CLI::App* command, TypedSimulate& typed) {
-  option(command, "--identity-bytes", typed.identity_bytes, "N",
-         "length of the identity: 12, 13 or 17")
-      ->group(of_identity);
-  option(command, "--firmware", typed.firmware, "N", "firmware number to report")
-      ->group(of_identity);
-  option(command, "--serial", typed.serial, "N", "serial number to report")->group(of_identity);
-  option(command, "--model", typed.model, "N", "tool model code to report")->group(of_identity);
-  option(command, "--rundown-every", typed.rundown_every, "DURATION",
-         "an operator who drives a screw at this interval (default: nobody)")
-      ->group(of_screwdrivers);
-  option(command, "--ng-every", typed.ng_every, "N",
-         "every so many of the operator's screws end NG")
-      ->group(of_screwdrivers);
-  option(command, "--burst", typed.burst, "N",
-         "results that each of the operator's screws brings, all at once (default 1)")
-      ->group(of_screwdrivers);
-}
-
-void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_simulate(CLI::App& app, Draft& draft) {
   constexpr Words words = {
       "simulate", "PROFILE [--listen URL]",
       "a simulated tool to learn on, script against and test with",
@@ -955,48 +636,42 @@ void add_simulate(CLI::App& app, Draft& draft, TypedCommands& typed) {
       "spindle simulate doga-bm --rundown-every 2s --outage roam=5s@every:30s\n"
       "spindle simulate doga-bm --firmware 4001",
       trouble_words};
-  add_command(app, draft, words, typed.simulate, run_simulate, [&typed](CLI::App* command) {
-    auto& options = typed.simulate.options;
-    command->add_option("PROFILE", options.profile, "what to simulate, such as doga-bm");
-    option(command, "--listen", options.listen, "URL",
-           "where to listen (default a free port of 127.0.0.1)");
-    option(command, "--pty", options.pty, "PATH",
-           "serial tools: make a pseudo terminal that this path leads to; it has no parity, so a "
-           "wrong one goes unnoticed");
-    option(command, "--units", typed.simulate.units, "LIST",
-           "serial tools: which units, such as 1-3");
-    option(command, "--baud", typed.simulate.baud, "N", "serial tools: rate of the line");
-    flag(command, "--no-gap", typed.simulate.no_gap,
-         "serial tools: also hear clients that keep too short a silence");
-    command->add_option("--fault", options.faults, "make the tool misbehave, repeatable; see below")
-        ->type_name("FAULT")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    option(command, "--busy", typed.simulate.busy, "DURATION",
-           "how long Configuration takes (default 200ms, at most 1s)")
-        ->group(of_command_word);
-    const auto repeatable = [command](const char* name, std::vector<std::string>& into,
-                                      const char* meaning) {
-      command->add_option(name, into, meaning)
-          ->type_name("CODE")
-          ->expected(1)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-          ->group(of_alarms);
-    };
-    repeatable("--alarm", options.alarms,
-               "an alarm that the tool raises, such as 30h, or 30h@5s after a time; repeatable");
-    repeatable("--warning", options.warnings, "a warning in the same form");
-    add_abilities(command, typed.simulate);
-    command
-        ->add_option("--outage", options.outages,
-                     "let the tool be away at times, repeatable; see below")
-        ->type_name("OUTAGE")
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  });
+  add_command(app, draft, words, draft.options.simulate, commands::simulate,
+              [](Binder& bind, commands::SimulateOptions& options) {
+                bind.required("PROFILE", options.profile, "what to simulate, such as doga-bm");
+                bind.option("--listen", "URL", options.listen,
+                            "where to listen (default a free port of 127.0.0.1)");
+                bind.option("--pty", "PATH", options.pty,
+                            "serial tools: make a pseudo terminal that this path leads to; it has "
+                            "no parity, so a wrong one goes unnoticed");
+                bind_simulated_line(bind, options);
+                bind_simulated_work(bind, options.tool.bm);
+                bind.repeatable("--outage", "OUTAGE", options.outages,
+                                "let the tool be away at times, repeatable; see below");
+              });
 }
 
-void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_profile_commands(CLI::App& profile, Draft& draft) {
+  using Options = commands::ProfileNameOptions;
+  const auto list = [](const Options&, Context& context) {
+    return commands::profile_list(context);
+  };
+  const auto bind_name = [](Binder& bind, Options& options) {
+    bind.required("PROFILE", options.profile, "name or file");
+  };
+  add_command(profile, draft,
+              {"list", "", "all profiles that can be named", "spindle profile list"},
+              draft.options.profile_list, list, [](Binder&, Options&) {});
+  add_command(profile, draft,
+              {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
+              draft.options.profile_show, commands::profile_show, bind_name);
+  add_command(profile, draft,
+              {"check", "PROFILE", "every fault of a file, with its place",
+               "spindle profile check ./my-tool.yaml"},
+              draft.options.profile_check, commands::profile_check, bind_name);
+}
+
+void add_profile(CLI::App& app, Draft& draft) {
   using Options = commands::ProfileNameOptions;
   constexpr Words words = {"profile", "list|show|check [PROFILE]",
                            "the catalogue files: which exist, what they say, whether one is valid",
@@ -1004,86 +679,41 @@ void add_profile(CLI::App& app, Draft& draft, TypedCommands& typed) {
                            "spindle profile show doga-bm\n"
                            "spindle profile check ./my-tool.yaml"};
   const auto none = [](const Options&, Context&) -> Result<Outcome> {
-    return tl::unexpected(missing("profile", "list, show or check"));
+    return tl::unexpected(Binder::missing("profile", "list, show or check"));
   };
-  const auto list = [](const Options&, Context& context) {
-    return commands::profile_list(context);
-  };
-  const auto show = [](const Options& options, Context& context) {
-    return options.profile.empty()
-               ? Result<Outcome>(tl::unexpected(missing("profile show", "PROFILE")))
-               : commands::profile_show(options, context);
-  };
-  const auto check = [](const Options& options, Context& context) {
-    return options.profile.empty()
-               ? Result<Outcome>(tl::unexpected(missing("profile check", "PROFILE")))
-               : commands::profile_check(options, context);
-  };
-  add_command(app, draft, words, typed.profile, none, [=, &typed, &draft](CLI::App* command) {
-    add_command(*command, draft,
-                {"list", "", "all profiles that can be named", "spindle profile list"},
-                typed.profile_list, list, [](CLI::App*) {});
-    add_command(
-        *command, draft,
-        {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
-        typed.profile_show, show, [&typed](CLI::App* shown) {
-          shown->add_option("PROFILE", typed.profile_show.profile, "name or file");
-        });
-    add_command(*command, draft,
-                {"check", "PROFILE", "every fault of a file, with its place",
-                 "spindle profile check ./my-tool.yaml"},
-                typed.profile_check, check, [&typed](CLI::App* checked) {
-                  checked->add_option("PROFILE", typed.profile_check.profile, "name or file");
-                });
-  });
+  add_command(app, draft, words, draft.options.profile, none,
+              [&draft](Binder& bind, Options&) { add_profile_commands(bind.command(), draft); });
 }
 
-void add_tools(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void add_tools(CLI::App& app, Draft& draft) {
   constexpr Words words = {"tools", "[--check]",
                            "the named tools of the tools file, with endpoints and profiles",
                            "spindle tools\n"
                            "spindle tools --json\n"
                            "spindle tools --check --tools ./spindle.yaml"};
-  const auto run = [](const TypedTools& tools, Context& context) {
-    return tools.check ? commands::check_tools(context) : commands::tools(context);
+  const auto run = [](bool check, Context& context) {
+    return check ? commands::check_tools(context) : commands::tools(context);
   };
-  add_command(app, draft, words, typed.tools, run, [&typed, &draft](CLI::App* command) {
-    command->add_flag_callback(
-        "--check",
-        [&] {
-          typed.tools.check = true;
-          draft.tools_file = Invocation::ToolsFile::only_found;
-        },
-        "every fault of the file, with its place");
-  });
+  add_command(app, draft, words, draft.options.check_tools, run,
+              [&draft](Binder& bind, bool& check) {
+                const auto check_file = [&draft, &check] {
+                  check = true;
+                  draft.tools_file = Invocation::ToolsFile::only_found;
+                };
+                bind.flag("--check", check_file, "every fault of the file, with its place");
+              });
 }
 
-void add_commands(CLI::App& app, Draft& draft, TypedCommands& typed) {
-  add_identify(app, draft, typed);
-  add_list(app, draft, typed);
-  add_get(app, draft, typed);
-  add_set(app, draft, typed);
-  add_do(app, draft, typed);
-  add_watch(app, draft, typed);
-  add_remote_start(app, draft, typed);
-  add_remote_stop(app, draft, typed);
-  add_alarms(app, draft, typed);
-  add_backup(app, draft, typed);
-  add_diff(app, draft, typed);
-  add_restore(app, draft, typed);
-  add_ping(app, draft, typed);
-  add_scan(app, draft, typed);
-  add_simulate(app, draft, typed);
-  add_profile(app, draft, typed);
-  add_tools(app, draft, typed);
-}
-
-void build(CLI::App& app, Draft& draft, TypedCommands& typed) {
+void build(CLI::App& app, Draft& draft) {
   app.set_help_flag();
   app.allow_extras();
   app.require_subcommand(0, 1);
-  add_common_options(app, draft.typed);
-  add_commands(app, draft, typed);
+  add_common_options(app, draft);
+  for (const auto add : {add_identify, add_list, add_get, add_set, add_do, add_watch,
+                         add_remote_start, add_remote_stop, add_alarms, add_backup, add_diff,
+                         add_restore, add_ping, add_scan, add_simulate, add_profile, add_tools}) {
+    add(app, draft);
+  }
 }
 
 std::vector<std::string> command_names(const CLI::App& app) {
@@ -1102,15 +732,6 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
     }
   }
   return names;
-}
-
-std::string path_of(const CLI::App* command) {
-  std::string path = command->get_name();
-  for (const CLI::App* parent = command->get_parent();
-       parent != nullptr && parent->get_parent() != nullptr; parent = parent->get_parent()) {
-    path.insert(0, parent->get_name() + " ");
-  }
-  return path;
 }
 
 Error unexpected_argument(const CLI::App& app, const Draft& draft, const std::string& extra) {
@@ -1151,34 +772,6 @@ Error parser_error(const std::vector<std::string>& arguments, const CLI::ParseEr
   }
   return usage("an option has no value, or one that it does not take",
                "'spindle --help' lists all options");
-}
-
-Result<void> understand_common(const Typed& typed, Invocation& invocation) {
-  const std::string output = typed.output.empty() ? "table" : typed.output;
-  const auto format = to_choice("--output", output, formats);
-  if (!format) return tl::unexpected(format.error());
-  const auto color = to_choice("--color", typed.color.empty() ? "auto" : typed.color, colors);
-  if (!color) return tl::unexpected(color.error());
-  const auto timeout = to_duration("--timeout", typed.timeout);
-  if (!timeout) return tl::unexpected(timeout.error());
-  const auto connect_timeout = to_duration("--connect-timeout", typed.connect_timeout);
-  if (!connect_timeout) return tl::unexpected(connect_timeout.error());
-  work::CommonOptions& common = invocation.common;
-  auto retries = fill_number("--retries", typed.retries, 100, common.retries);
-  if (!retries) return retries;
-  invocation.format = *format;
-  invocation.color = *color;
-  invocation.talk = typed.quiet ? report::Talk::quiet : report::Talk::normal;
-  common.profile = typed.profile;
-  common.tools_file = typed.tools;
-  common.timeout = *timeout;
-  common.connect_timeout = *connect_timeout;
-  if (typed.no_input) invocation.user.consent = commands::Consent::no_input;
-  if (typed.yes) invocation.user.consent = commands::Consent::given;
-  common.trace_file = typed.trace;
-  if (typed.verbose) invocation.user.verbosity = commands::Verbosity::frames;
-  if (typed.quiet || typed.verbose) invocation.user.progress = report::Showing::unwanted;
-  return {};
 }
 
 OptionDescription description_of(const CLI::Option& known) {
@@ -1270,25 +863,24 @@ bool names_tools(const CLI::App& command) {
 }
 
 Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
-  Invocation invocation;
   const auto extra = first_extra(app);
   // Where a command is misspelt, the program's help would hide it.
   const bool misspelt = extra && draft.chosen == nullptr;
-  if (draft.typed.help && !misspelt) {
-    invocation.text = help_of(app, draft);
-    return invocation;
+  if (draft.help && !misspelt) {
+    Invocation help;
+    help.text = help_of(app, draft);
+    return help;
   }
-  const bool wants_version = draft.typed.version && !misspelt;
+  const bool wants_version = draft.version && !misspelt;
   if (extra && !wants_version) return tl::unexpected(unexpected_argument(app, draft, *extra));
   if (const auto empty = option_without_value(app)) {
     return tl::unexpected(empty_value(*empty));
   }
-  if (auto understood = understand_common(draft.typed, invocation); !understood) {
-    return tl::unexpected(std::move(understood.error()));
-  }
+  if (auto fault = draft.common_faults.first()) return tl::unexpected(std::move(*fault));
+  Invocation& invocation = draft.invocation;
   if (wants_version) {
     invocation.asks = Invocation::Asks::version;
-    return invocation;
+    return std::move(invocation);
   }
   if (!draft.only_as_text.empty() && invocation.format != report::Format::table) {
     return tl::unexpected(
@@ -1300,13 +892,12 @@ Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
   // One that the user names is read all the same, so that a wrong name is told; but no stop waits
   // for it.
-  const bool told =
-      !draft.typed.tools.empty() && invocation.tools_use != Invocation::ToolsFile::salvaged;
+  const bool told = !invocation.common.tools_file.empty() &&
+                    invocation.tools_use != Invocation::ToolsFile::salvaged;
   if (!told && !names_tools(*draft.chosen)) {
     invocation.tools_use = Invocation::ToolsFile::only_found;
   }
-  invocation.run = std::move(draft.run);
-  return invocation;
+  return std::move(invocation);
 }
 
 /// --json is -o json, so that of several the last one wins.
@@ -1322,16 +913,14 @@ Description describe_grammar() {
   CLI::App app;
   Draft draft;
   draft.extent = Extent::whole;
-  TypedCommands typed;
-  build(app, draft, typed);
+  build(app, draft);
   return description_of(app, draft);
 }
 
 Result<Invocation> parse(const std::vector<std::string>& arguments) {
   CLI::App app;
   Draft draft;
-  TypedCommands typed;
-  build(app, draft, typed);
+  build(app, draft);
   try {
     auto words = with_one_output_option(arguments);
     std::reverse(words.begin(), words.end());  // as CLI11 wants them
@@ -1353,9 +942,7 @@ report::Format wanted_format(const std::vector<std::string>& arguments) {
     if (argument.starts_with("-o") && argument.size() > 2) last = argument.substr(2);
     if ((argument == "-o" || argument == "--output") && has_next) last = arguments[index + 1];
   }
-  const auto* const found = std::find_if(formats.begin(), formats.end(),
-                                         [&](const auto& row) { return row.first == last; });
-  return found == formats.end() ? report::Format::table : found->second;
+  return format_words.find(last).value_or(report::Format::table);
 }
 
 }  // namespace spindle::cli

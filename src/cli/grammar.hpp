@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "description.hpp"
+#include "spindle/base/enum_table.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/report/renderer.hpp"
@@ -13,6 +14,14 @@
 namespace spindle::cli {
 
 enum class ColorChoice : std::uint8_t { automatic, always, never };
+
+/// What --color and --output take.
+inline constexpr auto color_words = enum_table<ColorChoice>({{"auto", ColorChoice::automatic},
+                                                             {"always", ColorChoice::always},
+                                                             {"never", ColorChoice::never}});
+inline constexpr auto format_words = enum_table<report::Format>({{"table", report::Format::table},
+                                                                 {"json", report::Format::json},
+                                                                 {"csv", report::Format::csv}});
 
 /// What was typed, understood; nothing has been touched yet.
 struct Invocation {

@@ -1,6 +1,7 @@
 #include "cli/grammar.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
@@ -250,6 +251,17 @@ TEST_CASE("repeated options and flags are no error") {
   CHECK(good("--timeout 1s get t --timeout 2s").common.timeout == std::chrono::seconds(2));
   CHECK(good("get t --profile a --profile b").common.profile == "b");
   CHECK(good("set t a=1 --dry-run --dry-run").run);
+}
+
+TEST_CASE("no flag takes a value") {
+  for (const cli::CommandDescription& command : cli::describe_grammar().commands) {
+    for (const cli::OptionDescription& option : command.options) {
+      if (!option.is_flag()) continue;
+      const std::string& name = option.names.back();
+      CHECK(bad(fmt::format("{} t {}=false", command.name, name)) ==
+            fmt::format("'{}' takes no value; write {} alone", name, name));
+    }
+  }
 }
 
 TEST_CASE("--yes answers also where nobody may be asked") {

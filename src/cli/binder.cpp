@@ -1,0 +1,83 @@
+#include "binder.hpp"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "spindle/base/duration.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::cli {
+
+Error usage(std::string message, std::string hint) {
+  return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
+}
+
+Error bad_option(std::string_view option, std::string message, std::string hint) {
+  Error error = usage(std::move(message), std::move(hint));
+  error.code = Errc::bad_value;
+  error.name = option;
+  return error;
+}
+
+Result<std::uint64_t> NumberFrom::operator()(std::string_view option,
+                                             const std::string& text) const {
+  const auto number = parse_unsigned(text, maximum);
+  if (number && *number >= minimum) return *number;
+  return tl::unexpected(
+      bad_option(option, fmt::format("'{}' does not fit", text),
+                 fmt::format("it takes a number from {} to {}", minimum, maximum)));
+}
+
+Result<Duration> to_duration(std::string_view option, const std::string& text) {
+  auto duration = parse_duration(text);
+  if (duration && *duration > Duration::zero()) return *duration;
+  const std::string_view why = duration ? "is too short" : "is not a duration";
+  return tl::unexpected(
+      bad_option(option, fmt::format("'{}' {}", text, why), "write it like 500ms, 2.5s or 5min"));
+}
+
+Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text) {
+  constexpr std::uint64_t last_unit = 247;  // Modbus over Serial Line 1.02, 2.2
+  std::vector<modbus::UnitId> units;
+  for (const std::string_view range : split(text, ',')) {
+    const auto dash = range.find('-');
+    const auto first = parse_unsigned(range.substr(0, dash), last_unit);
+    const auto last =
+        dash == std::string_view::npos ? first : parse_unsigned(range.substr(dash + 1), last_unit);
+    if (!first || !last || *first == 0 || *last < *first) {
+      return tl::unexpected(bad_option(option, fmt::format("'{}' does not fit", text),
+                                       "it takes units from 1 to 247, such as 1-31 or 1,5"));
+    }
+    for (std::uint64_t unit = *first; unit <= *last; ++unit) {
+      const modbus::UnitId id{static_cast<std::uint8_t>(unit)};
+      if (std::find(units.begin(), units.end(), id) == units.end()) units.push_back(id);
+    }
+  }
+  return units;
+}
+
+Error unknown_choice(std::string_view option, const std::string& text,
+                     const std::vector<std::string>& words) {
+  std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));
+  if (const std::string meant = suggestion(text, words); !meant.empty()) hint += "; " + meant;
+  return bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint));
+}
+
+std::optional<Error> Faults::first() const {
+  for (const Check& check : required) {
+    if (auto error = check()) return error;
+  }
+  if (conversion) return conversion;
+  for (const Check& check : checks) {
+    if (auto error = check()) return error;
+  }
+  return std::nullopt;
+}
+
+Error Binder::missing(std::string_view path, std::string_view argument) {
+  return usage(fmt::format("{}: {} is missing", path, argument),
+               fmt::format("'spindle {} --help' shows examples", path));
+}
+
+}  // namespace spindle::cli
