@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/manual.hpp"
+#include "support/manual.hpp"
 
 /// The JSON Schema of the output as mdoc(7) text.
 namespace spindle::test {
@@ -74,10 +74,9 @@ inline std::string keys_text(const ordered_json& definition, const ordered_json&
   for (const auto& [name, own] : definition.at("properties").items()) {
     const ordered_json key = resolved(own, schema);
     if (!key.contains("description")) continue;
-    text += fmt::format(".It Sy {} Pq {}{}\n", cli::mdoc_argument(name),
-                        cli::mdoc_argument(kind_of(key)),
+    text += fmt::format(".It Sy {} Pq {}{}\n", mdoc_argument(name), mdoc_argument(kind_of(key)),
                         is_named(definition, name) ? "" : " , optional");
-    text += cli::mdoc_prose(key.at("description").get<std::string>() + choices_of(key));
+    text += mdoc_prose(key.at("description").get<std::string>() + choices_of(key));
   }
   return fmt::format(".Bl -tag -width Ds -compact\n{}.El\n", text);
 }
@@ -88,21 +87,21 @@ inline std::string forms_text(const ordered_json& definition) {
   std::string items;
   for (const auto& form : definition.at("anyOf")) {
     const auto keys = form.at("required").get<std::vector<std::string>>();
-    items += fmt::format(".It\n{}",
-                         cli::mdoc_prose(fmt::format("{}: {}", form.at("title").get<std::string>(),
-                                                     joined(keys, "and"))));
+    items +=
+        fmt::format(".It\n{}", mdoc_prose(fmt::format("{}: {}", form.at("title").get<std::string>(),
+                                                      joined(keys, "and"))));
   }
   return ".Pp\nIts forms, and the keys that each always has:\n.Bl -bullet -compact\n" + items +
          ".El\n";
 }
 
 /// The holes COMMON_KEYS and RECORDS.
-inline std::vector<cli::Hole> schema_holes(const ordered_json& schema) {
+inline std::vector<Hole> schema_holes(const ordered_json& schema) {
   std::string records;
   for (const auto& type : schema.at("properties").at("type").at("enum")) {
     const ordered_json& definition = schema.at("$defs").at(type.get<std::string>());
-    records += ".Ss " + cli::mdoc_argument(type.get<std::string>()) + "\n";
-    records += cli::mdoc_prose(definition.at("description").get<std::string>());
+    records += ".Ss " + mdoc_argument(type.get<std::string>()) + "\n";
+    records += mdoc_prose(definition.at("description").get<std::string>());
     records += ".Pp\n" + keys_text(definition, schema) + forms_text(definition);
   }
   return {{"COMMON_KEYS", keys_text(schema, schema)}, {"RECORDS", std::move(records)}};

@@ -1,6 +1,6 @@
 // The manual pages: made from their sources, complete, and true to the code. SPINDLE_UPDATE=1
 // rewrites them.
-#include "cli/manual.hpp"
+#include "support/manual.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -37,17 +37,17 @@ std::string read(const fs::path& path) {
   return text.str();
 }
 
-cli::Hole example(std::string name, const std::string& file) {
+test::Hole example(std::string name, const std::string& file) {
   std::vector<std::string> lines;
   std::istringstream text(read(manual / "examples" / file));
   for (std::string line; std::getline(text, line);) lines.push_back(line);
-  return {std::move(name), cli::mdoc_literal(lines)};
+  return {std::move(name), test::mdoc_literal(lines)};
 }
 
-std::vector<cli::Hole> all_holes() {
-  std::vector<cli::Hole> holes = cli::manual_holes(cli::describe_grammar());
+std::vector<test::Hole> all_holes() {
+  std::vector<test::Hole> holes = test::manual_holes(cli::describe_grammar());
   const auto schema = nlohmann::ordered_json::parse(read(root / "share" / "spindle-1.schema.json"));
-  for (cli::Hole& hole : test::schema_holes(schema)) holes.push_back(std::move(hole));
+  for (test::Hole& hole : test::schema_holes(schema)) holes.push_back(std::move(hole));
   holes.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
   holes.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
   holes.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
@@ -95,10 +95,10 @@ bool explains(const std::string& page, const std::string& word) {
 }  // namespace
 
 TEST_CASE("manual: every page is what its source and the program make of it") {
-  const std::vector<cli::Hole> holes = all_holes();
+  const std::vector<test::Hole> holes = all_holes();
   for (const std::string& name : pages) {
     CAPTURE(name);
-    const auto page = cli::fill_holes(read(manual / (name + ".in")), holes);
+    const auto page = test::fill_holes(read(manual / (name + ".in")), holes);
     REQUIRE_MESSAGE(page.has_value(), page.error().name);
     if (std::getenv("SPINDLE_UPDATE") != nullptr) {
       std::ofstream file(manual / name);
@@ -113,39 +113,40 @@ TEST_CASE("manual: every page is what its source and the program make of it") {
 TEST_CASE("manual: every hole is used, and one that nobody fills is told") {
   std::string all;
   for (const std::string& name : pages) all += read(manual / (name + ".in"));
-  for (const cli::Hole& hole : all_holes()) {
+  for (const test::Hole& hole : all_holes()) {
     CAPTURE(hole.name);
     CHECK(all.find("\n@" + hole.name + "@\n") != std::string::npos);
   }
-  const auto page = cli::fill_holes("before\n@NOBODY@\n", all_holes());
+  const auto page = test::fill_holes("before\n@NOBODY@\n", all_holes());
   REQUIRE_FALSE(page.has_value());
   CHECK(page.error().code == Errc::bad_file);
   CHECK(page.error().name == "NOBODY");
 }
 
 TEST_CASE("manual: a page is filled line by line") {
-  const std::vector<cli::Hole> holes = {{"A", ".Pp\nmore\n"}, {"EMPTY", ""}};
-  CHECK(cli::fill_holes("x\n@A@\ny @A@\n@EMPTY@\n@@\n", holes) == "x\n.Pp\nmore\ny @A@\n@@\n");
+  const std::vector<test::Hole> holes = {{"A", ".Pp\nmore\n"}, {"EMPTY", ""}};
+  CHECK(test::fill_holes("x\n@A@\ny @A@\n@EMPTY@\n@@\n", holes) == "x\n.Pp\nmore\ny @A@\n@@\n");
 }
 
 TEST_CASE("manual: text is neither a request, an escape nor a typographic character") {
-  CHECK(cli::mdoc_escaped(R"(a\b 'c' "d" `e` ^~-)") ==
+  CHECK(test::mdoc_escaped(R"(a\b 'c' "d" `e` ^~-)") ==
         R"(a\eb \(aqc\(aq \(dqd\(dq \(gae\(ga \(ha\(ti\-)");
-  CHECK(cli::mdoc_argument("N") == "N");
-  CHECK(cli::mdoc_argument("Op") == "\\&Op");
-  CHECK(cli::mdoc_argument("end") == "end");
-  CHECK(cli::mdoc_argument("") == "\\&");
-  CHECK(cli::mdoc_argument(".") == "\\&.");
-  CHECK(cli::mdoc_argument("two words") == "\"two words\"");
-  CHECK(cli::mdoc_argument("[NAME|PATTERN...]") == "[NAME|PATTERN...]");
-  CHECK(cli::mdoc_prose("One. Two (2.) three.") == "One.\nTwo (2.)\nthree.\n");
-  CHECK(cli::mdoc_prose(".profile is a file") == "\\&.profile is a file\n");
-  CHECK(cli::mdoc_prose("") == "");
+  CHECK(test::mdoc_argument("N") == "N");
+  CHECK(test::mdoc_argument("Op") == "\\&Op");
+  CHECK(test::mdoc_argument("end") == "end");
+  CHECK(test::mdoc_argument("") == "\\&");
+  CHECK(test::mdoc_argument(".") == "\\&.");
+  CHECK(test::mdoc_argument("two words") == "\"two words\"");
+  CHECK(test::mdoc_argument("[NAME|PATTERN...]") == "[NAME|PATTERN...]");
+  CHECK(test::mdoc_prose("One. Two (2.) three.") == "One.\nTwo (2.)\nthree.\n");
+  CHECK(test::mdoc_prose(".profile is a file") == "\\&.profile is a file\n");
+  CHECK(test::mdoc_prose("") == "");
   const std::vector<std::string> lines = {".x 'y'", "", "  z"};
-  CHECK(cli::mdoc_literal(lines) == ".Bd -literal -offset indent\n\\&.x \\(aqy\\(aq\n\n  z\n.Ed\n");
+  CHECK(test::mdoc_literal(lines) ==
+        ".Bd -literal -offset indent\n\\&.x \\(aqy\\(aq\n\n  z\n.Ed\n");
   std::string words;
   for (int i = 0; i < 60; ++i) words += "word ";
-  std::istringstream wrapped(cli::mdoc_prose(words));
+  std::istringstream wrapped(test::mdoc_prose(words));
   for (std::string line; std::getline(wrapped, line);) CHECK(line.size() <= 78);
 }
 
@@ -154,16 +155,16 @@ TEST_CASE("manual: commands, their options and every exit status are there") {
   const cli::Description description = cli::describe_grammar();
   for (const cli::CommandDescription& command : description.commands) {
     CAPTURE(command.name);
-    CHECK(page.find("\n.Ss " + cli::mdoc_argument(command.name)) != std::string::npos);
+    CHECK(page.find("\n.Ss " + test::mdoc_argument(command.name)) != std::string::npos);
     for (const cli::OptionDescription& option : command.options) {
       CHECK(page.find((option.is_argument() ? "Ar " : "Fl ") +
-                      cli::mdoc_argument(option.names.back().substr(
+                      test::mdoc_argument(option.names.back().substr(
                           option.is_argument() ? 0 : 1))) != std::string::npos);
     }
   }
   for (const StatusInfo& status : status_table()) {
     CHECK(page.find(fmt::format("\n.It Sy {} {}\n", static_cast<int>(status.status),
-                                cli::mdoc_argument(status.name))) != std::string::npos);
+                                test::mdoc_argument(status.name))) != std::string::npos);
   }
 }
 
@@ -178,7 +179,7 @@ TEST_CASE("manual: an appendix is text and terms, a command below another has it
                               "Words (of it):\n  one[=N]   the first\n  two\n\nAnd more.\n");
                         },
                     .commands = {{.name = "a b", .meaning = "below"}}}}};
-  CHECK(cli::manual_holes(description).front().text ==
+  CHECK(test::manual_holes(description).front().text ==
         ".Ss a\n.Dl spindle a X\\&\n.Pp\nDoes it.\n.Pp\nWords (of it):\n.Pp\n.Bl -tag -width Ds "
         "-compact\n.It Cm one[=N]\nthe "
         "first\n.It Cm two\n.El\n.Pp\nAnd more.\n.Ss a b\n.Dl spindle a b\\&\n.Pp\nBelow.\n");

@@ -5,10 +5,10 @@
 #include <string_view>
 #include <vector>
 
-#include "description.hpp"
+#include "cli/description.hpp"
 #include "spindle/base/error.hpp"
 
-namespace spindle::cli {
+namespace spindle::test {
 
 /// A place in the source of a manual page, a line "@NAME@", and the mdoc(7) text that belongs
 /// there: whole lines.
@@ -18,7 +18,7 @@ struct Hole {
 };
 
 /// COMMANDS, COMMON_OPTIONS and EXIT_STATUS: what the program itself knows.
-std::vector<Hole> manual_holes(const Description& description);
+std::vector<Hole> manual_holes(const cli::Description& description);
 
 /// The page. Error `bad_file` for a hole of the source that is none of `holes`.
 Result<std::string> fill_holes(std::string_view source, std::span<const Hole> holes);
@@ -35,4 +35,4 @@ std::string mdoc_prose(std::string_view text);
 /// Lines as they are, such as examples.
 std::string mdoc_literal(std::span<const std::string> lines);
 
-}  // namespace spindle::cli
+}  // namespace spindle::test

@@ -7,7 +7,7 @@
 
 #include "spindle/base/text.hpp"
 
-namespace spindle::cli {
+namespace spindle::test {
 namespace {
 
 constexpr std::size_t longest_line = 78;
@@ -51,7 +51,7 @@ std::string list(std::string_view items) {
 }
 
 /// ".It Fl o , Fl \-output Ar FORMAT"
-std::string term_of(const OptionDescription& option) {
+std::string term_of(const cli::OptionDescription& option) {
   if (option.is_argument()) {
     return fmt::format(".It Ar {}\n", mdoc_argument(option.names.front()));
   }
@@ -63,9 +63,9 @@ std::string term_of(const OptionDescription& option) {
   return term + "\n";
 }
 
-std::string option_list(const std::vector<OptionDescription>& options) {
+std::string option_list(const std::vector<cli::OptionDescription>& options) {
   std::string items;
-  for (const OptionDescription& option : options) {
+  for (const cli::OptionDescription& option : options) {
     const std::string declared =
         option.declared_by.empty() ? "" : fmt::format(" ({})", option.declared_by);
     items += term_of(option) + mdoc_prose(option.meaning + declared);
@@ -109,7 +109,7 @@ std::string appendix_text(std::string_view appendix) {
 }
 
 /// The command's name, and below it how it is typed.
-std::string heading_of(const CommandDescription& command) {
+std::string heading_of(const cli::CommandDescription& command) {
   std::string heading = ".Ss";
   for (const std::string_view word : split(command.name, ' ')) heading += " " + mdoc_argument(word);
   const std::string usage = command.name + " " + command.synopsis;
@@ -120,12 +120,12 @@ std::string heading_of(const CommandDescription& command) {
   return fmt::format("{}\n{}\\&\n.Pp\n", heading, typed);  // "..." at its end is no punctuation
 }
 
-std::string command_text(const CommandDescription& command) {
+std::string command_text(const cli::CommandDescription& command) {
   std::string text = heading_of(command) + mdoc_prose(sentence(command.meaning));
   text += option_list(command.options);
   if (command.appendix != nullptr) text += appendix_text(command.appendix());
   if (!command.examples.empty()) text += ".Pp\nExamples:\n" + mdoc_literal(command.examples);
-  for (const CommandDescription& below : command.commands) text += command_text(below);
+  for (const cli::CommandDescription& below : command.commands) text += command_text(below);
   return text;
 }
 
@@ -204,9 +204,10 @@ std::string mdoc_literal(std::span<const std::string> lines) {
   return text + ".Ed\n";
 }
 
-std::vector<Hole> manual_holes(const Description& description) {
+std::vector<Hole> manual_holes(const cli::Description& description) {
   std::string commands;
-  for (const CommandDescription& command : description.commands) commands += command_text(command);
+  for (const cli::CommandDescription& command : description.commands)
+    commands += command_text(command);
   return {{"COMMANDS", std::move(commands)},
           {"COMMON_OPTIONS", option_list(description.common)},
           {"EXIT_STATUS", exit_status_list()}};
@@ -234,4 +235,4 @@ Result<std::string> fill_holes(std::string_view source, std::span<const Hole> ho
   return page;
 }
 
-}  // namespace spindle::cli
+}  // namespace spindle::test
