@@ -5,6 +5,7 @@
 #include <array>
 
 #include "spindle/base/text.hpp"
+#include "spindle/modbus/types.hpp"
 
 namespace spindle::catalogue {
 namespace {
@@ -13,13 +14,13 @@ namespace {
 struct Numbering {
   std::uint64_t first;
   std::uint64_t last;
-  std::string_view table;
+  modbus::RegisterTable table;
 };
 
-constexpr std::array<Numbering, 4> numberings = {{{40001, 49999, "holding"},
-                                                  {30001, 39999, "input"},
-                                                  {400001, 465536, "holding"},
-                                                  {300001, 365536, "input"}}};
+constexpr std::array<Numbering, 4> numberings = {{{40001, 49999, modbus::RegisterTable::holding},
+                                                  {30001, 39999, modbus::RegisterTable::input},
+                                                  {400001, 465536, modbus::RegisterTable::holding},
+                                                  {300001, 365536, modbus::RegisterTable::input}}};
 
 }  // namespace
 
@@ -27,7 +28,7 @@ std::string hint_for_document_number(std::uint64_t number) {
   for (const Numbering& numbering : numberings) {
     if (number < numbering.first || number > numbering.last) continue;
     return fmt::format("registers count from 0: {} in a document is @{}:{}", number,
-                       numbering.table, number - numbering.first);
+                       to_text(numbering.table), number - numbering.first);
   }
   return {};
 }

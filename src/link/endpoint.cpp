@@ -351,9 +351,10 @@ modbus::SerialSettings serial_settings(const Endpoint& endpoint,
 
 std::string to_url(const Endpoint& endpoint) {
   const bool bracketed = endpoint.host.find(':') != std::string::npos;
+  const auto* const scheme = std::find_if(
+      schemes.begin(), schemes.end(), [&](const Scheme& s) { return s.medium == endpoint.medium; });
   std::string url =
-      fmt::format("{}://{}", endpoint.medium == Medium::rtu_over_tcp ? "rtu+tcp" : "tcp",
-                  bracketed ? "[" + endpoint.host + "]" : endpoint.host);
+      fmt::format("{}://{}", scheme->name, bracketed ? "[" + endpoint.host + "]" : endpoint.host);
   if (endpoint.port) url += fmt::format(":{}", *endpoint.port);
   if (endpoint.unit) url += fmt::format("?unit={}", endpoint.unit->value);
   return url;
