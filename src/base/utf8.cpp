@@ -52,4 +52,15 @@ CodePoint first_code_point(std::string_view text) {
   return {.value = value, .length = row->length};
 }
 
+void append_first(std::string& out, const CodePoint& first, std::string_view text) {
+  constexpr std::string_view replacement_bytes = "\xEF\xBF\xBD";
+  out += first.well_formed ? text.substr(0, first.length) : replacement_bytes;
+}
+
+std::size_t plain_prefix(std::string_view text) {
+  const auto is_plain = [](char c) { return c >= ' ' && c <= '~' && c != '"' && c != '\\'; };
+  const auto* const end = std::find_if_not(text.begin(), text.end(), is_plain);
+  return static_cast<std::size_t>(end - text.begin());
+}
+
 }  // namespace spindle

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <utility>
 
-#include "characters.hpp"
-#include "utf8.hpp"
+#include "spindle/base/characters.hpp"
+#include "spindle/base/utf8.hpp"
 
 namespace spindle::report {
 namespace {

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import unicodedata
 
-PATH = pathlib.Path(__file__).resolve().parents[2] / "src" / "report" / "character_table.hpp"
+PATH = pathlib.Path(__file__).resolve().parents[2] / "src" / "base" / "character_table.hpp"
 # Format characters that are seen, or that join what is around them: numbers' and texts' frames of
 # Arabic, Syriac, Kaithi and Egyptian, and the joiners of Indic scripts and emoji.
 SEEN_FORMATS = {
@@ -25,7 +25,7 @@ HEAD = """#pragma once
 
 #include <array>
 
-namespace spindle::report {{
+namespace spindle {{
 
 /// Code points from the first to the last one; those between that mean nothing yet may be in it.
 struct CodePoints {{
@@ -80,7 +80,7 @@ def table():
         rows = ", ".join(f"{{0x{first:04X}, 0x{last:04X}}}" for first, last in found)
         head = f"inline constexpr std::array<CodePoints, {len(found)}> {name}"
         text += f"\n/// {source}\n{head} = {{{{{rows},}}}};\n"
-    return text + "\n}  // namespace spindle::report\n"
+    return text + "\n}  // namespace spindle\n"
 
 
 def numbers(text):

@@ -5,11 +5,11 @@
 # shellcheck disable=SC2034
 build_packages=(
   g++ cmake ninja-build pkg-config ccache
-  libmodbus-dev libcli11-dev libfmt-dev libyaml-dev libexpected-dev nlohmann-json3-dev
+  libmodbus-dev libcli11-dev libfmt-dev libyaml-dev libexpected-dev
 )
 # shellcheck disable=SC2034
 test_packages=(
-  doctest-dev mold
+  doctest-dev nlohmann-json3-dev mold
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
   python3-jsonschema mandoc dpkg-dev lintian

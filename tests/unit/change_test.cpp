@@ -7,7 +7,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -182,9 +184,11 @@ struct Bench {
   /// "begun 10 55", "written 10 55"
   std::vector<std::string> records() const {
     std::vector<std::string> lines;
-    for (const auto& change : files::read_changes(memory.text("/state/changes.jsonl")).changes) {
-      lines.push_back(change.result + " " + change.old_value->to_string() + " " +
-                      change.new_value->to_string());
+    std::istringstream written(memory.text("/state/changes.jsonl"));
+    for (std::string line; std::getline(written, line);) {
+      const auto change = nlohmann::json::parse(line);
+      lines.push_back(change.at("result").get<std::string>() + " " + change.at("old").dump() + " " +
+                      change.at("new").dump());
     }
     return lines;
   }

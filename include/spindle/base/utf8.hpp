@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace spindle {
@@ -16,5 +17,12 @@ struct CodePoint {
 /// its longest valid beginning, or for one byte (The Unicode Standard 15.0, section 3.9, "U+FFFD
 /// Substitution of Maximal Subparts").
 CodePoint first_code_point(std::string_view text);
+
+/// Appends the first character of `text`, which is `first`, or U+FFFD for what is none.
+void append_first(std::string& out, const CodePoint& first, std::string_view text);
+
+/// The length of the run of printable ASCII characters at the beginning of the text that need no
+/// escape in JSON: neither `"` nor `\`.
+std::size_t plain_prefix(std::string_view text);
 
 }  // namespace spindle

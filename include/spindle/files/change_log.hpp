@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "spindle/base/decimal.hpp"
 
@@ -31,18 +30,5 @@ std::string render_change(const Change& change);
 /// The result of a record that is written before something is sent. Another record with the same
 /// `id` says how it ended; where that is missing, the program ended in between.
 inline constexpr std::string_view begun = "begun";
-
-/// A record of changes as it was read.
-struct ChangeRecords {
-  std::vector<Change> changes = {};      ///< in the order of the file
-  std::vector<std::size_t> broken = {};  ///< lines that are no whole record, counted from 1
-};
-
-/// Reads what render_change() wrote. A line that a crash cut off, or that is something else, is
-/// left out and named in `broken`.
-ChangeRecords read_changes(std::string_view text);
-
-/// What was begun and has no result: nobody recorded what became of it.
-std::vector<Change> without_result(const std::vector<Change>& changes);
 
 }  // namespace spindle::files

@@ -1,11 +1,11 @@
-#include "characters.hpp"
+#include "spindle/base/characters.hpp"
 
 #include <algorithm>
 #include <span>
 
 #include "character_table.hpp"
 
-namespace spindle::report {
+namespace spindle {
 namespace {
 
 bool is_in(char32_t character, std::span<const CodePoints> spans) {
@@ -29,4 +29,4 @@ std::size_t cells_of(char32_t character) {
 
 bool steers(char32_t character) { return is_control(character) || is_in(character, unseen); }
 
-}  // namespace spindle::report
+}  // namespace spindle

@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace spindle::report {
+namespace spindle {
 
 /// Code points from the first to the last one; those between that mean nothing yet may be in it.
 struct CodePoints {
@@ -134,4 +134,4 @@ inline constexpr std::array<CodePoints, 12> unseen = {{
     {0xE0001, 0xE007F},
 }};
 
-}  // namespace spindle::report
+}  // namespace spindle

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-namespace spindle::report {
+namespace spindle {
 
 /// Cells of a terminal that a character takes: none, one or two. The same in every locale.
 std::size_t cells_of(char32_t character);
@@ -11,4 +11,4 @@ std::size_t cells_of(char32_t character);
 /// control characters, and those that turn the direction of writing, break lines or are invisible.
 bool steers(char32_t character);
 
-}  // namespace spindle::report
+}  // namespace spindle
