@@ -55,7 +55,7 @@ struct HomeOfHeader {
 const std::vector<HomeOfHeader> homes = {
     {"CLI/", {"cli"}},
     {"yaml.h", {"files"}},
-    {"nlohmann/", {"report", "files"}},
+    {"nlohmann/", {}},
     {"modbus.h", {"posix"}},
     {"modbus/", {"posix"}},
     {"iostream", {"posix", "main"}},
@@ -102,6 +102,13 @@ const std::vector<BannedWord> banned_words = {
     {"stof", Counts::anywhere, {}},
     {"stold", Counts::anywhere, {}},
     {"wcwidth", Counts::anywhere, {}},
+    // Files are read and written through `Disk`, but for these.
+    {"ifstream", Counts::anywhere, {"src/files/yaml_reader.cpp", "src/posix/port_holder.cpp"}},
+    {"ofstream", Counts::anywhere, {}},
+    {"fopen", Counts::anywhere, {}},
+    {"directory_iterator",
+     Counts::anywhere,
+     {"src/files/profile_store.cpp", "src/posix/port_holder.cpp"}},
 };
 
 // Lines of code in main.cpp; includes, comments and blank lines are free.
@@ -625,6 +632,7 @@ TEST_CASE("a file that breaks the law is found") {
        "src/report/a.cpp: formats by locale: {:.2L}"},
       {{"src/report/a.cpp", "double d = std::strtod(text, nullptr);\n"},
        "src/report/a.cpp: uses strtod"},
+      {{"src/work/a.cpp", "std::ofstream log(path);\n"}, "src/work/a.cpp: uses ofstream"},
       {{"src/report/a.cpp", "std::ostringstream s;\n"}, "src/report/a.cpp: uses ostringstream"},
       {{"src/commands/a.cpp", "bool f() { return profile.run.has_value(); }\n"},
        "src/commands/a.cpp: asks the profile how it is run, instead of the run model"},
