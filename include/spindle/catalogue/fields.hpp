@@ -68,9 +68,14 @@ inline auto fields(const GapRule& v) {
   return std::tie(up_to_baud, gap);
 }
 
+inline auto fields(const modbus::SerialSettings& v) {
+  const auto& [baud, parity, stop_bits] = v;
+  return std::tie(baud, parity, stop_bits);
+}
+
 inline auto fields(const SerialFacts& v) {
-  const auto& [baud, parity, stop_bits, gaps, broadcast_pause] = v;
-  return std::tie(baud, parity, stop_bits, gaps, broadcast_pause);
+  const auto& [line, gaps, broadcast_pause] = v;
+  return std::tie(line, gaps, broadcast_pause);
 }
 
 inline auto fields(const UnitRange& v) {
@@ -222,8 +227,8 @@ inline auto fields(const CommandRegisterFacts& v) {
 }
 
 inline auto fields(const RunFacts& v) {
-  const auto& [model, still_runs, alarm_reset, evidence, source] = v;
-  return std::tie(model, still_runs, alarm_reset, evidence, source);
+  const auto& [model, still_runs, evidence, source, is_derived] = v;
+  return std::tie(model, still_runs, evidence, source, is_derived);
 }
 
 inline auto fields(const Profile& v) {
