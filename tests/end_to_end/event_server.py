@@ -1,6 +1,6 @@
 """A Modbus TCP server with the registers of a BM screwdriver whose operator works without pause.
 
-Events are pushed to whoever armed the output, in segments cut as a seeded chance will have it:
+Events are pushed to the client that armed the output, in segments cut as a seeded chance will have it:
 split anywhere, glued together, repeated at once or later. It can also cut the connection. Everything
 that was asked is kept with its time.
 """
@@ -89,7 +89,7 @@ class EventServer(support.Port):
                 self.cuts += 1
 
     def miss(self, count=1):
-        """Events that happen while nobody is connected."""
+        """Events that happen while no client is connected."""
         with self._lock:
             self.cut()
             for _ in range(count):

@@ -8,6 +8,7 @@ clock that goes as slowly as the machine is busy; `Finished.paced` is how long a
 seconds (`Finished.seconds`) are for lower limits only: nothing ever makes a pause shorter.
 """
 
+import atexit
 import contextlib
 import dataclasses
 import decimal
@@ -17,6 +18,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import select
 import shutil
 import signal
@@ -29,12 +31,14 @@ import threading
 import time
 import tty
 
+import frames
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEADLINE = 20.0  # for what must happen at all; never waited out when things go well
 SOON = 6.0  # for what takes milliseconds where a wrong way takes ten seconds and more
 POLL = 0.001
 
-READ_HOLDING, READ_INPUT, WRITE_SINGLE, REPORT_SERVER_ID = 0x03, 0x04, 0x06, 0x11
+READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE, REPORT_SERVER_ID = 0x03, 0x04, 0x06, 0x10, 0x11
 
 
 def binary():
@@ -213,15 +217,6 @@ class SerialEnd:
             return b""
 
 
-def rtu_requests(data):
-    """The frames in what a bus heard at once: one that the machine kept from listening hears several. Reads,
-    loop-backs and writes of one register have eight bytes, writes of several say their length."""
-    while data:
-        length = 9 + data[6] if data[1] == 0x10 and len(data) > 6 else 8
-        yield data[:length]
-        data = data[length:]
-
-
 # --- the program ------------------------------------------------------------------------------
 
 
@@ -244,22 +239,12 @@ class Home:
         shutil.rmtree(self.path, ignore_errors=True)
 
 
-_home = None
-
-
+@functools.cache
 def home():
-    global _home
-    if _home is None:
-        _home = Home()
-    return _home
-
-
-def remove_home():
-    """To be called by each test file when it ends (tearDownModule)."""
-    global _home
-    if _home is not None:
-        _home.remove()
-        _home = None
+    """The one of this test run; it is removed when the run ends."""
+    made = Home()
+    atexit.register(made.remove)
+    return made
 
 
 def parse_json(line):
@@ -460,6 +445,81 @@ def simulator(profile="doga-bm", *flags, listen="tcp://127.0.0.1:0"):
 # --- the wire ---------------------------------------------------------------------------------
 
 
+class ServedLine:
+    """A program that serves a serial line on a pseudo terminal at `path`, or behind a port, as long as the with
+    statement lasts. `command` says how it is started, by the path of the terminal and that of its log, which
+    also has its standard error."""
+
+    def __init__(self, command):
+        self._folder = tempfile.TemporaryDirectory(prefix="spindle-line-")
+        folder = pathlib.Path(self._folder.name)
+        self.path, self._log = folder / "line", folder / "log"
+        words = [str(word) for word in command(self.path, self._log)]
+        with open(self._log, "wb") as log:
+            self.process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log,
+                                            text=True, env=home().environment(), cwd=home().path)
+        self.url = self.process.stdout.readline().strip()
+        if not self.url:
+            raise AssertionError(f"{words[0]} does not serve: {self.told()}")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.finish()
+        self._folder.cleanup()
+
+    def kill(self):
+        self.process.kill()
+        wait_for_end(self.process)
+
+    def finish(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            wait_for_end(self.process)
+        self.process.stdout.close()
+
+    def told(self):
+        """All that it wrote so far."""
+        return self._log.read_text()
+
+
+class SimulatedLine(ServedLine):
+    """Simulated serial devices of a profile, with what they heard."""
+
+    def __init__(self, profile, *options, where="--pty"):
+        super().__init__(lambda path, _: [
+            binary(), "simulate", profile, *(["--pty", path] if where == "--pty" else ["--listen", where]), "-v",
+            *options])
+
+    def requests(self):
+        """Whole requests in order, without their checksums."""
+        found = re.findall(r" -> ([0-9A-Fa-f ]+)$", self.told(), re.MULTILINE)
+        return [frame[:-2] for text in found for frame in frames.rtu_requests(bytes.fromhex(text))]
+
+    def writes(self):
+        """The registers that were written, in order."""
+        return [write for request in self.requests() for write in writes_of(request)]
+
+
+@dataclasses.dataclass(frozen=True)
+class Write:
+    unit: int
+    register: int
+    value: int
+
+
+def writes_of(request):
+    """The registers that a serial request writes, in order."""
+    unit, function, register = struct.unpack_from(">BBH", request)
+    if function == WRITE_SINGLE:
+        return [Write(unit, register, struct.unpack_from(">H", request, 4)[0])]
+    if function != WRITE_MULTIPLE:
+        return []
+    values = struct.unpack_from(f">{request[6] // 2}H", request, 7)
+    return [Write(unit, register + index, value) for index, value in enumerate(values)]
+
+
 @dataclasses.dataclass(frozen=True)
 class Request:
     """One Modbus TCP request, taken apart by the length of its header."""
@@ -516,7 +576,7 @@ def host_and_port(url):
 
 class Port:
     """A port of this machine whose clients are served, each in a thread of its own, as long as the with
-    statement lasts. Whoever derives from it says in `_serve` what a client gets."""
+    statement lasts. A derived class says in `_serve` what a client gets."""
 
     def __init__(self, port=0):
         self._listening = socket.create_server(("127.0.0.1", port))
@@ -552,7 +612,7 @@ class Port:
                 self._meet(connection)
 
     def _meet(self, connection):
-        """Nobody else is accepted meanwhile."""
+        """No other client is accepted meanwhile."""
         self._begin(self._serve, connection)
 
 
@@ -624,7 +684,7 @@ def unread_bytes(local, remote):
 
 @contextlib.contextmanager
 def full_backlog():
-    """A port that takes no further connection: its queue is full and nobody accepts."""
+    """A port that takes no further connection: its queue is full and no program accepts."""
     with contextlib.ExitStack() as stack:
         listening = stack.enter_context(socket.socket())
         listening.bind(("127.0.0.1", 0))
@@ -648,18 +708,18 @@ def full_backlog():
 
         wait_until(is_full, "the queue of a port fills up")
 
-        def is_somebody_waiting():
+        def is_client_waiting():
             return any(
                 remote == port and state == TCP_SYN_SENT and local not in fillers
                 for local, remote, state, _ in tcp_sockets()
             )
 
-        yield f"tcp://127.0.0.1:{port}", is_somebody_waiting
+        yield f"tcp://127.0.0.1:{port}", is_client_waiting
 
 
 @contextlib.contextmanager
 def refusing_port():
-    """A port that is bound, so that nobody else gets it, and on which nobody listens."""
+    """A port that is bound, so that no other program gets it, and on which none listens."""
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{bound.getsockname()[1]}"

@@ -18,10 +18,6 @@ PROFILE = ("--profile", "doga-bm")
 MEMORY = 200_000_000  # bytes that any file must do with
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 def limited(limit, value, *arguments):
     """Runs spindle with one of its resources limited."""
     with tempfile.TemporaryFile() as stderr:
@@ -308,7 +304,7 @@ class HostileFileTest(BackupTest):
         self.assertEqual(len(self.server.requests), self.asked, "the tool was asked for nothing")
 
     def test_path_tricks_in_names_of_targets(self):
-        """What a URL says can not lead the file anywhere else."""
+        """What a URL says cannot lead the file anywhere else."""
         port = support.host_and_port(self.server.url)[1]
         for url in (f"tcp://127.0.0.1:{port}", f"tcp://localhost:{port}"):
             finished = support.run("backup", url, *PROFILE, "--dir", self.path("out"), "--json")

@@ -20,10 +20,6 @@ parameters:
 """
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class ChangesTest(unittest.TestCase):
     def setUp(self):
         self.home = pathlib.Path(support.home().path)

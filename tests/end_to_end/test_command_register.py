@@ -4,22 +4,14 @@ whatever happens to the program or the line."""
 import contextlib
 import os
 import pathlib
-import re
 import signal
 import struct
-import subprocess
-import tempfile
 import unittest
 
 import support
 
 PROFILES = pathlib.Path(__file__).resolve().parent.parent / "profiles" / "good"
 PLACES = ("--pty", "rtu+tcp://127.0.0.1:0")
-WRITE_SINGLE, WRITE_MULTIPLE = 0x06, 0x10
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 class Vfd:
@@ -54,48 +46,20 @@ class Held:
     shown = ("status", "command-speed")
 
 
-class Line:
+class Line(support.SimulatedLine):
     """A simulated drive, with what the simulator heard."""
 
     def __init__(self, drive, *options, where="--pty"):
         self.drive = drive
         self.profile = PROFILES / f"{drive.name}.yaml"
-        self._folder = tempfile.TemporaryDirectory(prefix="spindle-drive-")
-        folder = pathlib.Path(self._folder.name)
-        self._log = folder / "log"
-        place = ["--pty", folder / "line"] if where == "--pty" else ["--listen", where]
-        arguments = ["simulate", self.profile, *place, "-v", *options]
-        with open(self._log, "wb") as log:
-            self.process = subprocess.Popen(
-                [support.binary(), *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                stderr=log, text=True, env=support.home().environment(), cwd=support.home().path)
-        self.url = self.process.stdout.readline().strip()
-        if not self.url:
-            raise AssertionError(f"the simulator does not serve: {self._log.read_text()}")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.terminate()
-            support.wait_for_end(self.process)
-        self.process.stdout.close()
-        self._folder.cleanup()
+        super().__init__(self.profile, *options, where=where)
 
     def commands(self):
-        """What was written to the command register, in order."""
-        found = []
-        for text in re.findall(r" -> ([0-9A-Fa-f ]+)$", self._log.read_text(), re.MULTILINE):
-            request = bytes.fromhex(text)[:-2]
-            _, function, register = struct.unpack_from(">BBH", request)
-            if register != self.drive.command:
-                continue
-            if function == WRITE_SINGLE:
-                found.append(struct.unpack_from(">H", request, 4)[0])
-            if function == WRITE_MULTIPLE:
-                found.append(int.from_bytes(request[7:7 + 2 * self.drive.width], "big"))
-        return found
+        """What was written to the command register, in order; of two registers the higher word first."""
+        words = [write.value for write in self.writes()
+                 if 0 <= write.register - self.drive.command < self.drive.width]
+        pairs = zip(*[iter(words)] * self.drive.width)
+        return [int.from_bytes(struct.pack(f">{len(pair)}H", *pair), "big") for pair in pairs]
 
     def has_started(self):
         return any(command in self.drive.starts for command in self.commands())

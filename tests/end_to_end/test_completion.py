@@ -6,7 +6,6 @@ import pathlib
 import pty
 import shutil
 import signal
-import subprocess
 import tempfile
 import threading
 import unittest
@@ -42,10 +41,6 @@ CASES = (
     ("spindle profile check my", "some", ["my-tool.yaml"]),
     ("spindle frobnicate ", "some", []),
 )
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 class Zsh:

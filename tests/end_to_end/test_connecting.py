@@ -12,10 +12,6 @@ from register_server import RegisterServer
 TORQUE = "preset.1.target-torque"
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 def has_ipv6():
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET6) as probe:
         probe.bind(("::1", 0))
@@ -43,7 +39,7 @@ class UnreachableTest(unittest.TestCase):
             self.check(url, "200ms", "--connect-timeout", "200ms")
 
     def test_name_that_does_not_exist(self):
-        # RFC 6761: never resolved by anybody.
+        # RFC 6761: no resolver ever resolves it.
         self.check("tcp://tool.invalid", "tool.invalid")
 
 

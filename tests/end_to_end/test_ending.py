@@ -22,12 +22,8 @@ SILENT = {"on": ["identity", "read", "write", "read-back"], "reply": []}
 TORQUE = "preset.1.target-torque"
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 def waiting_bytes(pipe):
-    """How much nobody has read yet."""
+    """How much has not been read yet."""
     return int.from_bytes(fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
@@ -223,7 +219,7 @@ class StreamTest(unittest.TestCase):
                         self.check_full(*arguments, *form)
 
     def test_full_disk_after_a_change(self):
-        """What was done is on record, though nobody could be told."""
+        """What was done is on record, though the reader was gone."""
         profile = ("--profile", "doga-bm")
         with support.simulator() as url:
             for number, form in enumerate(([], ["--json"], ["-o", "csv"])):

@@ -1,7 +1,6 @@
 """What stands in files that decide about tools: whose they are, and that no text can eat the machine."""
 
 import os
-import pathlib
 import resource
 import unittest
 
@@ -28,14 +27,6 @@ extends: doga-bm
 """
 
 
-def tearDownModule():
-    support.remove_home()
-
-
-def is_sanitized():
-    return b"__asan_init" in pathlib.Path(support.binary()).read_bytes()
-
-
 class FilesTest(unittest.TestCase):
     def setUp(self):
         self.folder = support.home().path
@@ -48,7 +39,7 @@ class FilesTest(unittest.TestCase):
                 path.unlink()
 
     def run_bounded(self, *arguments):
-        limit = None if is_sanitized() else (lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)))
+        limit = None if support.is_sanitized() else (lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)))
         return support.completed(
             [support.binary(), *arguments],
             capture_output=True,

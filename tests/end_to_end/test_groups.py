@@ -14,10 +14,6 @@ SILENT_ON_WRITES = {"on": ["write"], "reply": []}
 BM, BMT = "doga-bm", "doga-bmt"
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class GroupTest(unittest.TestCase):
     def setUp(self):
         self.changes = pathlib.Path(support.home().path) / ".local/state/spindle/changes.jsonl"
@@ -207,7 +203,7 @@ class SettingTest(GroupTest):
 
 class InterruptionTest(GroupTest):
     def test_in_the_middle(self):
-        """What was written, what nobody knows, and what was not begun: all of it is told."""
+        """What was written, what is not known, and what was not begun: all of it is told."""
         silent = self.enterContext(hostile_server.HostileServer(SILENT_ON_WRITES))
         one, last = self.enter_simulators(BM, BM)
         self.group(one=one, silent=silent.url, last=last)
@@ -255,7 +251,7 @@ class InterruptionTest(GroupTest):
 
 
 class QuestionTest(GroupTest):
-    """What happens while somebody thinks about the question."""
+    """What happens while the user thinks about the question."""
 
     def setUp(self):
         super().setUp()

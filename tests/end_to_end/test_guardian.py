@@ -11,17 +11,13 @@ import time
 import unittest
 
 import support
-import test_blv
+import blv
 import test_remote_start
 
 SLOW = test_remote_start.SLOW
 FORWARD_OR_REVERSE = 0x18
 NET_IN = 0x1161  # lower half of the function of NET-IN0
 FWD, STOP_MODE = 1, 19
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 def children_of(pid):
@@ -96,17 +92,17 @@ class KilledTest(unittest.TestCase):
                 support.wait_until(lambda: not station.tool.running, "the guardian stops the tool")
 
     def test_a_motor(self):
-        for where in test_blv.PLACES:
+        for where in blv.PLACES:
             for options in ([], ["--watchdog", "10s"]):  # that the driver does not stop first
-                with self.subTest(where, options=options), test_blv.Bus(where=where) as bus:
-                    words = [bus.url, *test_blv.PROFILE, "--speed", "500", "--accept-unverified", "--yes"]
+                with self.subTest(where, options=options), blv.Bus(where=where) as bus:
+                    words = [bus.url, *blv.PROFILE, "--speed", "500", "--accept-unverified", "--yes"]
                     with support.Running("remote-start", *words, *options) as run:
                         support.wait_until(bus.turns, "the motor turns")
                         guardian = self.assert_guarded(run.pid)
                         os.kill(run.pid, signal.SIGKILL)
                         support.wait_until(lambda g=guardian: not is_alive(g), "the guardian ends")
                     self.assertFalse(bus.commands()[-1] & FORWARD_OR_REVERSE, bus.commands())
-                    values = support.run("get", bus.url, *test_blv.PROFILE, "monitor.feedback-speed",
+                    values = support.run("get", bus.url, *blv.PROFILE, "monitor.feedback-speed",
                                          "alarm.present", "--json").records("value")
                     self.assertEqual(values[0]["value"], 0)
                     self.assertEqual(int(str(values[1]["value"]).rstrip("h"), 16), 0)
@@ -217,10 +213,10 @@ class StopTest(unittest.TestCase):
     def test_lines_that_lose_much(self):
         for lost in ((1, 2, 3), (2, 3, 5, 7, 8), (1, 3, 4, 6, 9, 10)):
             faults = [word for at in lost for word in ("--fault", f"lost@{at + 1}")]  # behind the start below
-            with self.subTest(lost), test_blv.Bus(*faults) as bus:
-                with test_blv.OtherMaster(bus) as other:
-                    other.write(1, test_blv.COMMAND, test_blv.FORWARD)
-                finished = self.stop(bus.url, *test_blv.PROFILE, "--timeout", "200ms")
+            with self.subTest(lost), blv.Bus(*faults) as bus:
+                with blv.OtherMaster(bus) as other:
+                    other.write(1, blv.COMMAND, blv.FORWARD)
+                finished = self.stop(bus.url, *blv.PROFILE, "--timeout", "200ms")
                 self.assertEqual(finished.status, 0, finished)
                 self.assertFalse(bus.commands()[-1] & FORWARD_OR_REVERSE)
 
@@ -231,34 +227,34 @@ class AssignedInputsTest(unittest.TestCase):
     def test_a_stop_starts_nothing(self):
         for inputs in ({5: FWD}, {5: 2}, {5: 77}, {0: FWD, 1: 2}):
             for runs in (False, True):
-                with self.subTest(inputs, runs=runs), test_blv.Bus() as bus:
-                    with test_blv.OtherMaster(bus) as other:
+                with self.subTest(inputs, runs=runs), blv.Bus() as bus:
+                    with blv.OtherMaster(bus) as other:
                         for number, function in inputs.items():
                             other.write(1, NET_IN + 2 * number, function)
                         if runs:
-                            other.write(1, test_blv.COMMAND, 0x08)
+                            other.write(1, blv.COMMAND, 0x08)
                     before = len(bus.commands())
-                    finished = support.run("remote-stop", bus.url, *test_blv.PROFILE, "--json")
+                    finished = support.run("remote-stop", bus.url, *blv.PROFILE, "--json")
                     self.assertEqual(finished.status, 0, finished)
                     starting = sum(1 << n for n, function in inputs.items() if function in (1, 2, 77)) | 0x18
                     for word in bus.commands()[before:]:
                         self.assertFalse(word & starting, hex(word))
 
     def test_a_start_uses_the_inputs_of_its_driver(self):
-        with test_blv.Bus() as bus:
-            with test_blv.OtherMaster(bus) as other:
+        with blv.Bus() as bus:
+            with blv.OtherMaster(bus) as other:
                 other.write(1, NET_IN + 2 * 3, STOP_MODE)
                 other.write(1, NET_IN + 2 * 5, FWD)
-            finished = support.run("remote-start", bus.url, *test_blv.PROFILE, "--speed", "500", "--for", "500ms",
+            finished = support.run("remote-start", bus.url, *blv.PROFILE, "--speed", "500", "--for", "500ms",
                                    "--accept-unverified", "--yes", "--json")
             self.assertEqual(finished.status, 0, finished)
             self.assertEqual(bus.commands(), [0x2A, 0x0A])  # FWD is bit 5, STOP-MODE is bit 3
 
     def test_a_start_that_can_not_be_made(self):
-        with test_blv.Bus() as bus:
-            with test_blv.OtherMaster(bus) as other:
+        with blv.Bus() as bus:
+            with blv.OtherMaster(bus) as other:
                 other.write(1, NET_IN + 2 * 3, 0)
-            finished = support.run("remote-start", bus.url, *test_blv.PROFILE, "--speed", "500",
+            finished = support.run("remote-start", bus.url, *blv.PROFILE, "--speed", "500",
                                    "--accept-unverified", "--yes")
             self.assertEqual(finished.status, 1, finished)
             self.assertIn("no input of this driver has function 1", finished.stderr)

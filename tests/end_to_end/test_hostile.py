@@ -323,7 +323,6 @@ class HostileTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls):
         cls.pool.shutdown(cancel_futures=True)
-        support.remove_home()
 
     def judged(self, row, command, statuses):
         """An ordeal, and what is wrong with it. An answer that a busy machine holds up past its timeout is none

@@ -4,7 +4,6 @@ import os
 import pathlib
 import re
 import shutil
-import subprocess
 import tempfile
 import unittest
 
@@ -35,10 +34,6 @@ COMMAS = (
     (["remote-start", "sim:orientalmotor-blv", "--speed", "500", "--for", "2,5s"], "2.5s"),
     (["simulate", "doga-bm", "--fault", "late=0,5s"], "500ms"),
 )
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 def without_times(text):

@@ -16,6 +16,7 @@ import time
 import tty
 import unittest
 
+import frames
 import support
 
 CHARACTER = 11 / 9600  # seconds on the line
@@ -42,20 +43,7 @@ while True:
 """
 
 
-def tearDownModule():
-    support.remove_home()
-
-
-def framed(frame):
-    crc = 0xFFFF
-    for byte in frame:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
-    return frame + struct.pack("<H", crc)
-
-
-QUERY = framed(struct.pack(">BBHH", 1, 3, SPEED, 2))
+QUERY = frames.with_checksum(struct.pack(">BBHH", 1, 3, SPEED, 2))
 
 
 def number_at(register):
@@ -90,7 +78,7 @@ class Device:
         """Requests of 8 bytes; there are no others here."""
         while len(buffer) >= 8:
             frame = bytes(buffer[:8])
-            if framed(frame[:-2]) == frame:
+            if frames.with_checksum(frame[:-2]) == frame:
                 self.hear(frame)
                 del buffer[:8]
             else:
@@ -103,8 +91,8 @@ class Device:
             return b""
         if function == 3:
             values = [number_at(register) for register in range(first, first + count)]
-            return framed(struct.pack(f">BBB{count}H", unit, function, 2 * count, *values))
-        return frame if function == 8 else framed(bytes([unit, function | 0x80, 1]))
+            return frames.with_checksum(struct.pack(f">BBB{count}H", unit, function, 2 * count, *values))
+        return frame if function == 8 else frames.with_checksum(bytes([unit, function | 0x80, 1]))
 
     def _serve(self):
         while True:

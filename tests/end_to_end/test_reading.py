@@ -9,10 +9,6 @@ import support
 HOLES = range(564, 569)
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class ReadingTest(unittest.TestCase):
     def read(self, *arguments, flags=(), expected=0):
         with support.simulator("doga-bm", *flags) as url, support.Recorder(url) as recorder:

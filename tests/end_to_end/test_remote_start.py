@@ -20,10 +20,6 @@ OK, NG, ERROR, OTHER = 1, 2, 6, 0
 GO = ["--profile", "doga-bm", "--accept-unverified", "--yes"]
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class MovingTool(hostile_server.Tool):
     """A tool that turns, written from its description and not from the program's simulation."""
 
@@ -353,7 +349,7 @@ class EndingTest(RemoteStartTest):
                 enter(self.running(unread, "-o", "csv", stdout=writing)),
             ]
             os.close(writing)
-            os.close(reading)  # nobody reads the last one's records any more
+            os.close(reading)  # the last one's records are not read any more
             dead.cut(for_good=True)
             finished = [run.finish() for run in runs]
         for one in finished:
@@ -372,7 +368,7 @@ class EndingTest(RemoteStartTest):
             self.assertGreaterEqual(station.writes().count(0), 4)
 
     def test_one_client_at_a_time(self):
-        """A tool that serves nobody else until the silent connection is ended."""
+        """A tool that serves no other client until the silent connection is ended."""
         with Station(**SLOW) as station, Single(station.url) as single:
             with support.Running("remote-start", single.url, *GO, "--json") as run:
                 support.wait_until(station.has_started, "the tool runs")
@@ -534,7 +530,7 @@ class RemoteStopTest(RemoteStartTest):
             self.assert_stopped(station, finished)
 
     def test_side_by_side(self):
-        """A tool that nobody can reach keeps the others waiting for nothing."""
+        """A tool that cannot be reached does not keep the others waiting."""
         with contextlib.ExitStack() as stack:
             stations = [stack.enter_context(Station(**SLOW)) for _ in range(3)]
             url, somebody_waits = stack.enter_context(support.full_backlog())

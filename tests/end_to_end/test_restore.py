@@ -14,10 +14,6 @@ from test_backup import PROFILE, BackupTest
 PLAN = range(300, 320)  # the registers of a plan of twenty writes
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class TrappedServer(hostile_server.HostileServer):
     """Does something when a given write has reached the tool and its answer is still to come."""
 

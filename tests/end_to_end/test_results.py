@@ -16,12 +16,8 @@ OK, PROGRAM, TORQUE, SECOND = 303, 304, 318, 351
 PARAMETERS = {7371: 1, 7372: 3}
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class FlagServer(support.Port):
-    """Results stand in registers until the next one; the flag is cleared by whoever reads it."""
+    """Results stand in registers until the next one; each reading clears the flag."""
 
     def __init__(self):
         super().__init__()

@@ -8,14 +8,12 @@ import re
 import select
 import signal
 import struct
-import subprocess
-import tempfile
 import threading
 import time
 import unittest
 
+import frames
 import support
-import test_blv
 
 PROGRAMS = pathlib.Path(os.environ.get("SPINDLE_PEER_PROGRAMS", support.ROOT / "build/dev/tests"))
 BANK = PROGRAMS / "spindle_peer_serial_bank"
@@ -25,51 +23,22 @@ DRIVE = pathlib.Path(__file__).resolve().parent / "drive.yaml"
 BITS = 11  # start, eight data, parity, stop
 
 
-def tearDownModule():
-    support.remove_home()
-
-
-class Bus:
+class Bus(support.ServedLine):
     """Units on a pseudo terminal (or a port), with a log of all that went over the line. They want silence
     before a frame only where the test is about that: a bus that the machine keeps from listening hears none
     where there was enough."""
 
     def __init__(self, *options, where="--pty", silence=False):
-        self._folder = tempfile.TemporaryDirectory(prefix="spindle-line-")
-        folder = pathlib.Path(self._folder.name)
-        self.path = folder / "line"
-        self._log = folder / "log"
-        place = ["--pty", str(self.path)] if where == "--pty" else [where]
-        self.process = subprocess.Popen(
-            [str(BANK), *place, "--log", str(self._log), *([] if silence else ["--no-gap"]), *map(str, options)],
-            stdout=subprocess.PIPE, text=True)
-        self.url = self.process.stdout.readline().strip()
-        if not self.url:
-            raise RuntimeError(f"{BANK} does not say where it serves")
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.finish()
-        self._folder.cleanup()
-
-    def kill(self):
-        self.process.kill()
-        support.wait_for_end(self.process)
-
-    def finish(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-            support.wait_for_end(self.process)
-        self.process.stdout.close()
+        super().__init__(lambda path, log: [
+            BANK, *(["--pty", path] if where == "--pty" else [where]), "--log", log,
+            *([] if silence else ["--no-gap"]), *options])
 
     def heard(self):
         """Once it has ended: (nanoseconds, '>' or '<', bytes) in order."""
-        found = re.findall(r"^(\d+) ([<>]) (.*)$", self._log.read_text(), re.MULTILINE)
+        found = re.findall(r"^(\d+) ([<>]) (.*)$", self.told(), re.MULTILINE)
         heard = [(int(at), way, bytes.fromhex(text)) for at, way, text in found]
         return [(at, way, frame) for at, way, data in heard
-                for frame in (support.rtu_requests(data) if way == ">" else [data])]
+                for frame in (frames.rtu_requests(data) if way == ">" else [data])]
 
     def is_open_in(self, pid):
         line = os.path.realpath(self.path)
@@ -78,7 +47,7 @@ class Bus:
         return False
 
     def bad_frames(self):
-        return int(re.search(r"^bad (\d+)$", self._log.read_text(), re.MULTILINE)[1])
+        return int(re.search(r"^bad (\d+)$", self.told(), re.MULTILINE)[1])
 
 
 def mean_of_quickest(times):
@@ -128,7 +97,7 @@ class SlowUnit(support.SerialEnd):
             return frame
         first, count = struct.unpack_from(">HH", frame, 2)
         values = struct.pack(f">{count}H", *range(first, first + count))
-        return test_blv.with_checksum(bytes([frame[0], frame[1], 2 * count]) + values)
+        return frames.with_checksum(bytes([frame[0], frame[1], 2 * count]) + values)
 
 
 class DialogueTest(unittest.TestCase):

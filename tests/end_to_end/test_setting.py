@@ -8,10 +8,6 @@ import support
 TORQUE = "preset.1.target-torque"
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class SettingTest(unittest.TestCase):
     def setUp(self):
         self.url = self.enterContext(support.simulator())

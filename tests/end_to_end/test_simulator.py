@@ -9,7 +9,8 @@ import tempfile
 import unittest
 
 import support
-from test_blv import Bus, with_checksum
+from frames import with_checksum
+from blv import Bus
 
 PROFILE = ["--profile", "orientalmotor-blv"]
 READ_SPEED = with_checksum(struct.pack(">BBHH", 1, 3, 0x0484, 2))
@@ -25,10 +26,6 @@ parameters:
 part: simulation
 values: {"far.*": 1234567890}
 """
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 def answer_from(line, patience=support.DEADLINE):

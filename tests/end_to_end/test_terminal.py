@@ -1,7 +1,6 @@
 """On a terminal: progress of long work, and colour that helps and switches off."""
 
 import contextlib
-import os
 import re
 import unittest
 
@@ -10,10 +9,6 @@ import support
 WIPE = "\r\x1b[K"
 SLOW = ("doga-bm", "--fault", "latency=60ms")
 COLUMNS = 50
-
-
-def tearDownModule():
-    support.remove_home()
 
 
 def screen(text):

@@ -101,10 +101,6 @@ WRONG = [
 ]
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class UsageTest(unittest.TestCase):
     def check_sentence(self, finished, named, suggested):
         lines = finished.stderr.splitlines()

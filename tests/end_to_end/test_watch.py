@@ -30,10 +30,6 @@ NOT_DELAYED = 1.0  # seconds until an event is told, at least of every other one
 QUICK = 0.75  # seconds that an end may take, farewell included; the quickest of several on a busy machine
 
 
-def tearDownModule():
-    support.remove_home()
-
-
 class Watching(support.Running):
     """A watch whose records are read as they come, so that it never waits for its reader."""
 
@@ -377,7 +373,7 @@ class EndingTest(unittest.TestCase):
 
 
 class Unread(Watching):
-    """A watch whose output nobody reads for a while."""
+    """A watch whose output is not read for a while."""
 
     def __init__(self, *arguments):
         self.reading = threading.Event()
@@ -430,7 +426,7 @@ class UnreadOutputTest(unittest.TestCase):
                     stderr = running.process.stderr.read().decode()
                 self.assertEqual(status, expected)
                 self.assertIn("could not be written", stderr)
-                told = text.split("\n")[:-1]  # the last line may be cut off: nobody took its end
+                told = text.split("\n")[:-1]  # the last line may be cut off: its end was not taken
                 self.assertGreater(len([support.parse_json(line) for line in told]), 50)
                 assert_disarmed(server)
 
@@ -487,7 +483,7 @@ class ReconnectingTest(unittest.TestCase):
                 self.assertEqual(attempts, list(range(1, len(attempts) + 1)))
 
     def test_outages(self):
-        """A tool that sleeps, roams, restarts or serves somebody else at times, and works on."""
+        """A tool that sleeps, roams, restarts or serves another client at times, and works on."""
         for outage, states, gap in (
             ("sleep=500ms@every:2s", ["connected"], None),
             ("roam=700ms@every:2s", ["lost", "connected"], None),
@@ -535,7 +531,7 @@ class ReconnectingTest(unittest.TestCase):
             self.assertEqual(watching.numbers(), [8])
 
     def test_connection_that_never_serves_is_not_hammered(self):
-        """A server that hangs up on everybody is asked ever more seldom."""
+        """A server that hangs up on every client is asked ever more seldom."""
         accepted = []
 
         class HangingUp(support.Port):

@@ -136,14 +136,6 @@ class Pymodbus(DriversTest):
             self.assertEqual(self.client.read_holding_registers(1158, 2, slave=unit).registers, [0, 900])
 
 
-def requests_in(data):
-    """Broadcasts follow each other without answers, so the relay may read several at once."""
-    while data:
-        length = 8 if data[1] == 6 else 9 + data[6]
-        yield data[:length]
-        data = data[length:]
-
-
 class Wireshark(support.PeerTest):
     """Both directions of a session with drivers that insist on their silence."""
 
@@ -167,7 +159,7 @@ class Wireshark(support.PeerTest):
         cls.segments = drivers.segments()
         # Wireshark takes a frame for unit 0 for anything but Modbus RTU, so those are judged apart.
         dialogue = [segment for segment in cls.segments if segment[1][0] != 0]
-        cls.broadcasts = [request for _, data in cls.segments if data[0] == 0 for request in requests_in(data)]
+        cls.broadcasts = [request for _, data in cls.segments if data[0] == 0 for request in support.rtu_requests(data)]
         capture = tshark_test.rtu_capture(dialogue)
         cls.complaints = capture.complaints()
         cls.rows = capture.rows(tshark_test.RTU_FIELDS)

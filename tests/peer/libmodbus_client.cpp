@@ -48,19 +48,19 @@ void check_reads(modbus_t* tool, Report& report) {
   report.expect(read(tool, modbus_read_registers, 2002, 1) == Words{600},
                 "the maximum of parameter 2 is not 600");
   report.expect(read(tool, modbus_read_registers, 1, 100).size() == 100,
-                "100 registers can not be read at once");
+                "100 registers cannot be read at once");
   report.expect(read(tool, modbus_read_input_registers, 3200, 14).size() == 14,
-                "the last event can not be read");
+                "the last event cannot be read");
   const Words status = read(tool, modbus_read_input_registers, 3300, 14);
   report.expect(status.size() == 14 && status[7] == 0 && status[8] == 0,
                 "the live status does not show a tool at rest");
 }
 
 void check_writes(modbus_t* tool, Report& report) {
-  report.expect(modbus_write_register(tool, 2, 310) == 1, "holding 2 can not be written");
+  report.expect(modbus_write_register(tool, 2, 310) == 1, "holding 2 cannot be written");
   report.expect(read(tool, modbus_read_registers, 2, 1) == Words{310},
                 "holding 2 does not hold what was written");
-  report.expect(modbus_write_register(tool, 4002, 0) == 1, "auto output can not be switched off");
+  report.expect(modbus_write_register(tool, 4002, 0) == 1, "auto output cannot be switched off");
 }
 
 void check_identity(modbus_t* tool, Report& report) {

@@ -70,7 +70,7 @@ void serve(modbus_t* context, modbus_mapping_t* mapping, bool as_doga) {
   }
 }
 
-/// Port that the system chose; 0 when it can not be told.
+/// Port that the system chose; 0 when it cannot be told.
 int port_of(int socket) {
   sockaddr_in address = {};
   socklen_t size = sizeof address;

@@ -1,5 +1,5 @@
 // Prints frames that spindle builds for a serial line, one a line: direction (O to the server, I
-// from it) and its bytes. Somebody else's program judges them.
+// from it) and its bytes. Another program judges them.
 #include <array>
 #include <cstdio>
 #include <utility>

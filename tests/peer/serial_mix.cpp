@@ -20,7 +20,7 @@ using modbus::RegisterTable;
 
 constexpr unsigned kinds = 10;
 
-/// The request of this turn. No broadcasts: on a pseudo terminal their sender can not know when
+/// The request of this turn. No broadcasts: on a pseudo terminal their sender cannot know when
 /// they were heard.
 modbus::Pdu request_of(std::uint16_t turn) {
   const auto value = static_cast<std::uint16_t>(turn * 7);

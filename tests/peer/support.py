@@ -15,6 +15,9 @@ import tempfile
 import threading
 import unittest
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "end_to_end"))
+from frames import rtu_requests  # noqa: E402, F401  shared with the end-to-end tests
+
 # ctest sets these (tests/CMakeLists.txt).
 SPINDLE = os.environ["SPINDLE"]
 PROGRAMS = pathlib.Path(os.environ["SPINDLE_PEER_PROGRAMS"])
@@ -185,7 +188,7 @@ class Recorder:
 
 
 def modbus_request(port, pdu, unit=0):
-    """One request on a connection of its own; the PDU of the answer. Bytes only, nobody's library."""
+    """One request on a connection of its own; the PDU of the answer. Bytes only, without a library."""
     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as line:
         line.sendall(struct.pack(">HHHB", 0x4711, 0, len(pdu) + 1, unit) + pdu)
         header = _exactly(line, 7)

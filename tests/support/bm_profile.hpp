@@ -102,6 +102,7 @@ inline catalogue::Profile bm_profile() {
   Action start = action("start", 4003);
   start.value = 1;
   start.stop_value = 0;
+  start.confirm = "status.running";
   Action preset = action("select-preset", 4004);
   preset.minimum = 1;
   preset.maximum = 3;

@@ -9,7 +9,7 @@
 
 namespace spindle::test {
 
-/// A clock that moves only when somebody sleeps on it or a test advances it. Wall time starts at
+/// A clock that moves only when the program sleeps on it or a test advances it. Wall time starts at
 /// 2026-11-22T10:15:30.123Z and moves along.
 class FakeClock final : public Clock {
  public:
@@ -34,7 +34,7 @@ class FakeClock final : public Clock {
     return {};
   }
 
-  /// Moves time on without anybody sleeping; hooks on the way run, interrupts do not matter.
+  /// Moves time on without a sleep; hooks on the way run, interrupts do not matter.
   void advance(Duration by) {
     const TimePoint target = now_ + by;
     while (has_hook(target)) run_next_hook();
@@ -61,6 +61,21 @@ class FakeClock final : public Clock {
   const Interrupt* interrupt_ = nullptr;
   TimePoint now_ = start;
   std::multimap<TimePoint, std::function<void()>> hooks_ = {};
+};
+
+/// A clock whose sleeps no interrupt ends, beside the fake one.
+class UninterruptibleClock final : public Clock {
+ public:
+  explicit UninterruptibleClock(FakeClock& clock) : clock_(&clock) {}
+  [[nodiscard]] TimePoint now() const override { return clock_->now(); }
+  [[nodiscard]] WallTime wall() const override { return clock_->wall(); }
+  Result<void> sleep_until(TimePoint deadline) override {
+    clock_->advance(deadline - clock_->now());
+    return {};
+  }
+
+ private:
+  FakeClock* clock_;
 };
 
 }  // namespace spindle::test

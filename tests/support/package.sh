@@ -42,7 +42,7 @@ for field in 'Package: spindle$' 'Section: utils$' 'Priority: optional$' 'Mainta
 done
 if command -v apt-get >/dev/null; then
   simulated=$(apt-get install --simulate --no-install-recommends "$package" 2>&1) ||
-    fail "its dependencies can not be satisfied: $simulated"
+    fail "its dependencies cannot be satisfied: $simulated"
   expect apt-get '^Inst spindle ' "$simulated"
 fi
 if command -v lintian >/dev/null; then

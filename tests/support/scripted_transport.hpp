@@ -82,7 +82,7 @@ class ScriptedTransport final : public link::Transport {
   }
 
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
-    // Time stands still unless somebody waits, so a loop without end would never be noticed.
+    // Time stands still unless the client waits, so a loop without end would never be noticed.
     if (++script_->receives > 1'000'000) throw std::runtime_error("receives without end");
     while (true) {
       if (interrupted()) return tl::unexpected(script_->interrupt->error());
@@ -152,6 +152,15 @@ class ScriptedTransport final : public link::Transport {
 inline std::unique_ptr<link::Transport> transport_to(Script& script) {
   return std::make_unique<ScriptedTransport>(script);
 }
+
+/// A script with the clock and the interrupt that both ends go by.
+struct ScriptedPeer {
+  ScriptedPeer() { script.interrupt = &interrupt; }
+
+  Interrupt interrupt = Interrupt();
+  FakeClock clock = FakeClock(interrupt);
+  Script script = Script(clock);
+};
 
 /// The request as its receiver understands it; an RTU request has no id.
 inline modbus::Adu request_of(modbus::Framing framing, ByteView bytes) {

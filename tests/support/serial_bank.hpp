@@ -14,7 +14,7 @@ namespace spindle::test {
 
 /// A bus of units with nothing but holding registers, as strict about its line as a motor driver:
 /// 2000h registers, each of which reads as its own address at first; FC 03, 06, 08 and 10h with at
-/// most 16 registers; broadcasts are carried out by all and answered by nobody.
+/// most 16 registers; broadcasts are carried out by all and answered by none.
 class SerialBank final : public sim::Server {
  public:
   struct Options {

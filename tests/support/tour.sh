@@ -138,7 +138,7 @@ shown '2 written'
 run 0 diff before.yaml "$url" --profile doga-bm
 shown '0 different'
 
-say "somebody watches, and the tool is started: under a guard that always ends in a stop"
+say "the user watches, and the tool is started: under a guard that always ends in a stop"
 typed watch "$url" --profile doga-bm --count 1 --duration 20s
 "$program" watch "$url" --profile doga-bm --count 1 --duration 20s >watched 2>&1 &
 watcher=$!

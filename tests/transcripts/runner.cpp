@@ -15,7 +15,7 @@
 //                         switches one off and on; %setter URL UNIT DURATION keeps it busy
 //   %wait DURATION        time passes
 //   %later DURATION URL UNIT REGISTER VALUE
-//                         so long from now somebody else writes a register
+//                         so long from now another master writes a register
 //   %later DURATION alarm URL UNIT CODE
 //                         the same of an alarm
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
@@ -62,6 +62,7 @@
 #include "spindle/work/connect.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
+#include "support/rig.hpp"
 #include "support/serial_bank.hpp"
 
 namespace {
@@ -206,9 +207,7 @@ class Stage {
       }
     }
     const auto start = profiles_.load_simulation(words.at(1)).value();
-    const bool has_word = tool->profile.run && tool->profile.run->word() != nullptr;
-    auto bus = has_word ? sim::make_blv_bus(tool->profile, start, options)
-                        : sim::make_profile_bus(tool->profile, start, options, {});
+    auto bus = test::simulated({tool->profile, start}, options);
     tool->bus = bus.get();
     tool->server = std::move(bus);
     tools_[commands::shared_line(link::parse_endpoint(words.at(0)).value())] = std::move(tool);
@@ -277,7 +276,7 @@ class Stage {
         .interrupt = interrupt_.emplace(),
         .open = [this](const auto& endpoint, const auto& facts,
                        Duration) { return open(endpoint, facts); },
-        // Enough of a server: it is listening, and nobody comes.
+        // Enough of a server: it is listening, and no client comes.
         .uninterruptible = {clock_, calm_,
                             [this](const auto& endpoint, const auto& facts, Duration) {
                               return open(endpoint, facts);

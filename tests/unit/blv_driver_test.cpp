@@ -3,13 +3,11 @@
 #include <doctest/doctest.h>
 
 #include <chrono>
-#include <memory>
 #include <string>
 
 #include "spindle/catalogue/value.hpp"
-#include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/adu.hpp"
-#include "spindle/modbus/pdu.hpp"
+#include "support/rig.hpp"
 #include "unit/hex.hpp"
 
 namespace {
@@ -20,7 +18,7 @@ using modbus::Pdu;
 using modbus::RegisterTable;
 
 /// Drivers on a bus, and a master that talks to them in PDUs. The addresses are those of the notes.
-struct Bus {
+struct Bus : test::BlvRig {
   static constexpr std::uint16_t command = 0x007D;
   static constexpr std::uint16_t status = 0x007F;
   static constexpr std::uint16_t alarm = 0x0081;
@@ -30,48 +28,17 @@ struct Bus {
   static constexpr unsigned at_speed = 1U << 14;
   static constexpr unsigned busy = 1U << 8;
 
-  explicit Bus(const sim::BlvOptions& options = {}) {
-    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
-    profile = store.load("orientalmotor-blv").value();
-    bus = sim::make_blv_bus(profile, store.load_simulation("orientalmotor-blv").value(), options);
-  }
+  using BlvRig::BlvRig;
 
-  std::optional<Pdu> ask(const Pdu& request, std::uint8_t unit = 1) {
-    return bus->answer({1}, {unit}, request, now);
-  }
-  std::uint16_t read(std::uint16_t address, std::uint8_t unit = 1) {
-    return modbus::registers_of(
-               ask(modbus::read_request(RegisterTable::holding, {address}, 1), unit).value())
-        .front();
-  }
   std::int32_t pair(std::uint16_t even, std::uint8_t unit = 1) {
-    const auto words = modbus::registers_of(
-        ask(modbus::read_request(RegisterTable::holding, {even}, 2), unit).value());
-    return static_cast<std::int32_t>((std::uint32_t{words[0]} << 16U) | words[1]);
-  }
-  /// The exception of a single write; 0: none.
-  int write(std::uint16_t address, std::uint16_t value, std::uint8_t unit = 1) {
-    const auto answer = ask(modbus::write_request({address}, value), unit);
-    return modbus::exception_of(answer.value()).value_or(0);
-  }
-  int write(std::uint16_t first, const Registers& values, std::uint8_t unit = 1) {
-    const auto answer = ask(modbus::write_request({first}, RegisterView(values)), unit);
-    return modbus::exception_of(answer.value()).value_or(0);
+    return static_cast<std::int32_t>(read_pair(even, unit));
   }
   void pulse(std::uint16_t address) {
     CHECK(write(address, 1) == 0);
     wait(1100ms);
     CHECK(write(address, 0) == 0);
   }
-  void wait(Duration time) {
-    now += time;
-    bus->advance(now);
-  }
   bool shows(unsigned bit, std::uint8_t unit = 1) { return (read(status, unit) & bit) != 0; }
-
-  catalogue::Profile profile;
-  std::unique_ptr<sim::BlvBus> bus;
-  TimePoint now = TimePoint(1h);
 };
 
 }  // namespace
@@ -251,7 +218,7 @@ TEST_CASE(
     "blv driver: Configuration takes 200 ms unless told otherwise, and parameters wait for it") {
   Bus bus;
   bus.write(0x018D, 1);
-  CHECK(bus.bus->next_change() == bus.now + 200ms);
+  CHECK(bus.tool->next_change() == bus.clock.now() + 200ms);
   CHECK(bus.write(0x1041, 1) == 4);
   CHECK(bus.read(Bus::last_error) == 0x8A);
   bus.wait(199ms);
@@ -270,7 +237,7 @@ TEST_CASE("blv driver: alarms and warnings come by themselves, each at its time"
            .alarms = {{.code = 0x30, .after = 2s}},
            .warnings = {{.code = 0x25}, {.code = 0x30, .after = 1s}}});
   CHECK(bus.read(0x0097) == 0x25);
-  CHECK(bus.bus->next_change() == bus.now + 1s);
+  CHECK(bus.tool->next_change() == bus.clock.now() + 1s);
   CHECK(bus.write(Bus::command, 0x2A) == 0);
   bus.wait(1s);
   CHECK(bus.read(0x0097) == 0x30);
@@ -293,8 +260,8 @@ TEST_CASE("blv bus: a reboot is a power cycle of every driver") {
     CHECK(bus.write(0x0193, 1, unit) == 0);
   }
   bus.wait(1s);
-  bus.bus->raise_alarm(1, 0x30, bus.now);
-  bus.bus->raise_warning(1, 0x25, bus.now);
+  bus.tool->raise_alarm(1, 0x30, bus.clock.now());
+  bus.tool->raise_warning(1, 0x25, bus.clock.now());
   bus.write(0x0485, 1300);
   bus.write(0x1201, 5000);
   bus.write(0x0030, {0, 2});
@@ -302,7 +269,7 @@ TEST_CASE("blv bus: a reboot is a power cycle of every driver") {
   bus.wait(1s);
   CHECK(bus.shows(Bus::move, 2));
   bus.ask(modbus::report_server_id_request());
-  bus.bus->reboot(bus.now);
+  bus.tool->reboot(bus.clock.now());
   CHECK(bus.pair(0x0484) == 1100);  // what was saved
   CHECK(bus.pair(0x1200) == 0);     // what was not
   CHECK(bus.pair(0x0030) == -1);
@@ -337,10 +304,10 @@ TEST_CASE("blv driver: data 0 and 1 follow the analog value until digital is con
 
 TEST_CASE("blv driver: maintenance commands act on the edge only") {
   Bus bus;
-  bus.bus->raise_alarm(1, 0x30, bus.now);
+  bus.tool->raise_alarm(1, 0x30, bus.clock.now());
   CHECK(bus.write(0x0181, 1) == 0);
   CHECK(bus.read(Bus::alarm) == 0);
-  bus.bus->raise_alarm(1, 0x30, bus.now);
+  bus.tool->raise_alarm(1, 0x30, bus.clock.now());
   CHECK(bus.write(0x0181, 1) == 0);
   CHECK(bus.read(Bus::alarm) == 0x30);  // it stayed at 1
   CHECK(bus.write(0x0181, 2) == 4);
@@ -355,7 +322,7 @@ TEST_CASE("blv driver: an alarm lets the motor coast, and after the reset the wo
   Bus bus;
   bus.write(Bus::command, 0x2A);
   bus.wait(1s);
-  bus.bus->raise_alarm(1, 0x30, bus.now);
+  bus.tool->raise_alarm(1, 0x30, bus.clock.now());
   CHECK(bus.shows(Bus::move));
   bus.wait(1s);
   CHECK_FALSE(bus.shows(Bus::move));
@@ -376,20 +343,20 @@ TEST_CASE("blv driver: three alarms end only with the power") {
   for (const std::uint8_t code : {std::uint8_t{0x20}, std::uint8_t{0x41}, std::uint8_t{0x83}}) {
     CAPTURE(code);
     Bus bus;
-    bus.bus->raise_alarm(1, code, bus.now);
+    bus.tool->raise_alarm(1, code, bus.clock.now());
     bus.pulse(0x0181);
     CHECK(bus.read(Bus::alarm) == code);
-    bus.bus->power_cycle(1, bus.now);
+    bus.tool->power_cycle(1, bus.clock.now());
     CHECK(bus.read(Bus::alarm) == 0);
     CHECK(bus.read(0x0083) == code);
   }
   Bus bus;
-  bus.bus->raise_alarm(1, 0x41, bus.now);
+  bus.tool->raise_alarm(1, 0x41, bus.clock.now());
   CHECK(bus.write(0x0193, 1) == 4);
   CHECK(bus.read(Bus::last_error) == 0x8A);
 }
 
-TEST_CASE("blv driver: the watchdog stops a motor that nobody asks for") {
+TEST_CASE("blv driver: the watchdog stops a motor when no master asks any more") {
   Bus bus;
   bus.write(0x1201, 500);
   bus.write(Bus::command, 0x2A);
@@ -397,7 +364,7 @@ TEST_CASE("blv driver: the watchdog stops a motor that nobody asks for") {
     bus.wait(400ms);
     CHECK(bus.shows(Bus::move));
   }
-  REQUIRE(bus.bus->next_change() == bus.now + 500ms);
+  REQUIRE(bus.tool->next_change() == bus.clock.now() + 500ms);
   bus.wait(3s);
   CHECK_FALSE(bus.shows(Bus::move));
   CHECK(bus.read(Bus::alarm) == 0x85);
@@ -416,12 +383,12 @@ TEST_CASE("blv driver: without a watchdog the motor runs for ever") {
 TEST_CASE("blv driver: bad frames warn, then stop the motor") {
   Bus bus;
   bus.write(Bus::command, 0x2A);
-  bus.bus->bad_frame(bus.now);
-  bus.bus->bad_frame(bus.now);
+  bus.tool->bad_frame(bus.clock.now());
+  bus.tool->bad_frame(bus.clock.now());
   CHECK(bus.read(0x0099) == 0x84);  // warning history; the good frame ended the warning itself
   CHECK(bus.read(0x0097) == 0);
   CHECK(bus.read(Bus::alarm) == 0);
-  for (int i = 0; i < 3; ++i) bus.bus->bad_frame(bus.now);
+  for (int i = 0; i < 3; ++i) bus.tool->bad_frame(bus.clock.now());
   bus.wait(2s);
   CHECK(bus.read(Bus::alarm) == 0x84);
   CHECK_FALSE(bus.shows(Bus::move));
@@ -439,7 +406,7 @@ TEST_CASE("blv driver: only what was saved outlives the power") {
   bus.write(0x0193, 0);
   bus.write(0x0030, {0, 2});
   bus.write(0x1201, 800);
-  bus.bus->power_cycle(1, bus.now);
+  bus.tool->power_cycle(1, bus.clock.now());
   CHECK(bus.pair(0x0484) == 1100);
   CHECK(bus.pair(0x0486) == 0);
   CHECK(bus.pair(0x0030) == -1);
@@ -466,9 +433,9 @@ TEST_CASE("blv driver: load and initialize take the memory's and the factory's v
   CHECK(bus.pair(0x1406) == 1);
 }
 
-TEST_CASE("blv driver: the setter keeps everybody else from writing") {
+TEST_CASE("blv driver: the setter keeps all masters from writing") {
   Bus bus;
-  bus.bus->use_setter(1, bus.now + 2s);
+  bus.tool->use_setter(1, bus.clock.now() + 2s);
   CHECK(bus.write(0x0485, 1100) == 4);
   CHECK(bus.read(Bus::last_error) == 0x89);
   bus.wait(2s);
@@ -478,8 +445,8 @@ TEST_CASE("blv driver: the setter keeps everybody else from writing") {
 TEST_CASE("blv bus: other units are silent, a broadcast is done by all and answered by none") {
   Bus bus({.units = {1, 2, 5}});
   CHECK_FALSE(bus.ask(modbus::loopback_request(1), 3));
-  CHECK(bus.bus->answers_to({5}));
-  CHECK_FALSE(bus.bus->answers_to({0}));
+  CHECK(bus.tool->answers_to({5}));
+  CHECK_FALSE(bus.tool->answers_to({0}));
   CHECK_FALSE(bus.ask(modbus::write_request({0x0485}, 1300), 0));
   for (const std::uint8_t unit : {std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{5}}) {
     CHECK(bus.pair(0x0484, unit) == 1300);
@@ -506,17 +473,17 @@ TEST_CASE("blv bus: children do what is written to their parent with function 10
 
 TEST_CASE("blv bus: it wants silence before a query, and takes its time to answer") {
   Bus bus;
-  CHECK(bus.bus->required_gap() == 5500us);
-  CHECK(bus.bus->answer_delay({1}) == 10ms);
-  CHECK(Bus({.baud = 19200}).bus->required_gap() == 5500us);
-  CHECK(Bus({.baud = 115200}).bus->required_gap() == 3500us);
-  CHECK(Bus({.gaps = sim::Gaps::ignored}).bus->required_gap() == 0ms);
+  CHECK(bus.tool->required_gap() == 5500us);
+  CHECK(bus.tool->answer_delay({1}) == 10ms);
+  CHECK(Bus({.baud = 19200}).tool->required_gap() == 5500us);
+  CHECK(Bus({.baud = 115200}).tool->required_gap() == 3500us);
+  CHECK(Bus({.gaps = sim::Gaps::ignored}).tool->required_gap() == 0ms);
   bus.write(0x140B, 5);
   bus.pulse(0x018D);
-  CHECK(bus.bus->answer_delay({1}) == 10ms);
+  CHECK(bus.tool->answer_delay({1}) == 10ms);
   bus.pulse(0x0193);
-  bus.bus->power_cycle(1, bus.now);
-  CHECK(bus.bus->answer_delay({1}) == 500us);
+  bus.tool->power_cycle(1, bus.clock.now());
+  CHECK(bus.tool->answer_delay({1}) == 500us);
 }
 
 // Protocol notes, section 2.1: frames as computed there, asked of the simulated driver.

@@ -9,8 +9,8 @@
 #include "hex.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
-#include "support/bm_profile.hpp"
 #include "support/edit_list.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace spindle::sim;
@@ -50,15 +50,16 @@ struct Status {
 };
 
 // A tool, a client and the time.
-struct Bench {
-  explicit Bench(BmOptions options = {}, catalogue::SimulationFacts facts = test::bm_start())
-      : tool(make_bm_tool(test::bm_profile(), facts, options)) {
+struct Bench : test::BmRig {
+  explicit Bench(const BmOptions& how = {},
+                 const catalogue::SimulationFacts& facts = test::bm_start())
+      : BmRig({test::bm_profile(), facts}, how) {
     tool->connected(client);
     tool->connected(other_client);
   }
 
   Pdu ask(const Pdu& request, ConnectionId from = client) {
-    const auto response = tool->answer(from, {0}, request, now);
+    const auto response = tool->answer(from, {0}, request, clock.now());
     REQUIRE(response.has_value());
     return *response;
   }
@@ -89,11 +90,6 @@ struct Bench {
     return {r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], r[9]};
   }
 
-  void pass(Duration time) {
-    now += time;
-    tool->advance(now);
-  }
-
   std::vector<Event> pushed(ConnectionId to = client) {
     std::vector<Event> events;
     for (const Push& push : tool->take_pushes(to)) {
@@ -103,9 +99,6 @@ struct Bench {
     }
     return events;
   }
-
-  TimePoint now = start_time;
-  std::unique_ptr<BmTool> tool;
 };
 
 }  // namespace
@@ -228,18 +221,18 @@ TEST_CASE("a run-down that reaches its target") {
   CHECK(bench.status().ready == 0);
   CHECK(bench.tool->next_change() == start_time + 1200ms);
 
-  bench.pass(50ms);  // half of the soft start
+  bench.wait(50ms);  // half of the soft start
   CHECK(bench.status().speed == 117);
   CHECK(bench.status().torque == 0);
-  bench.pass(600ms);
+  bench.wait(600ms);
   CHECK(bench.status().speed == 235);
   CHECK(bench.status().torque == 0);
-  bench.pass(450ms);  // the torque rises
+  bench.wait(450ms);  // the torque rises
   CHECK(bench.status().torque > 100);
   CHECK(bench.status().torque < 271);
   CHECK(bench.pushed().empty());
 
-  bench.pass(100ms);
+  bench.wait(100ms);
   const Status after = bench.status();
   CHECK(after.running == 0);
   CHECK(after.torque_up == 1);
@@ -269,11 +262,11 @@ TEST_CASE("a run-down that reaches its target") {
   CHECK(bench.pushed(other_client).empty());
 }
 
-TEST_CASE("a run-down happens at its time however late somebody looks") {
+TEST_CASE("a run-down happens at its time however late it is looked at") {
   Bench bench;
   bench.write(auto_output, 1);
   bench.write(start, 1);
-  bench.pass(1h);
+  bench.wait(1h);
   CHECK(bench.event().fastening_time == 1200);
   CHECK(bench.pushed().size() == 1);  // the output was armed when it happened
 }
@@ -281,7 +274,7 @@ TEST_CASE("a run-down happens at its time however late somebody looks") {
 TEST_CASE("stopped before its target") {
   Bench bench;
   bench.write(start, 1);
-  bench.pass(600ms);
+  bench.wait(600ms);
   bench.write(start, 0);
   const Event event = bench.event();
   CHECK(event.status == 2);
@@ -293,7 +286,7 @@ TEST_CASE("stopped before its target") {
   CHECK(after.running == 0);
   CHECK(after.torque_up == 0);
   CHECK(after.fastening_ok == 0);
-  bench.pass(10s);
+  bench.wait(10s);
   CHECK(bench.event().number == event.number);
 }
 
@@ -306,20 +299,20 @@ TEST_CASE("a stop without a run is nothing") {
 TEST_CASE("a start is echoed and ignored while running, locked or in alarm") {
   Bench bench;
   bench.write(start, 1);
-  bench.pass(600ms);
+  bench.wait(600ms);
   bench.write(start, 1);
-  bench.pass(600ms);
+  bench.wait(600ms);
   CHECK(bench.event().number == 1962);
 
   bench.write(lock, 1);
   CHECK(bench.status().ready == 0);
   bench.write(start, 1);
   CHECK(bench.status().running == 0);
-  bench.tool->operator_rundown(Rundown::ok, bench.now);
+  bench.tool->operator_rundown(Rundown::ok, bench.clock.now());
   CHECK(bench.status().running == 0);
   bench.write(lock, 0);
 
-  bench.tool->raise_alarm(110, bench.now);
+  bench.tool->raise_alarm(110, bench.clock.now());
   bench.write(start, 1);
   CHECK(bench.status().running == 0);
   bench.write(alarm_reset, 1);
@@ -330,14 +323,14 @@ TEST_CASE("a start is echoed and ignored while running, locked or in alarm") {
 TEST_CASE("an alarm ends a run, is an event, and is reset by one") {
   Bench bench;
   bench.write(start, 1);
-  bench.pass(100ms);
-  bench.tool->raise_alarm(110, bench.now);
+  bench.wait(100ms);
+  bench.tool->raise_alarm(110, bench.clock.now());
   CHECK(bench.status().running == 0);
   CHECK(bench.status().alarm == 110);
   CHECK(bench.read(RegisterTable::input, 3100, 2) == Registers{110, 0});
   CHECK(bench.event().status == 6);
   CHECK(bench.event().error == 110);
-  bench.pass(5s);
+  bench.wait(5s);
   CHECK(bench.event().number == 1962);
 
   bench.write(alarm_reset, 1);
@@ -362,7 +355,7 @@ TEST_CASE("preset and direction") {
 
   bench.write(start, 1);
   bench.write(select_preset, 1);  // not while it runs
-  bench.pass(1200ms);
+  bench.wait(1200ms);
   event = bench.event();
   CHECK(event.preset == 2);
   CHECK(event.status == 1);
@@ -374,7 +367,7 @@ TEST_CASE("preset and direction") {
   CHECK(bench.event().status == 3);
   CHECK(bench.event().direction == 1);
   bench.write(start, 1);
-  bench.pass(1000ms);
+  bench.wait(1000ms);
   event = bench.event();
   CHECK(event.status == 0);
   CHECK(event.error == 0);
@@ -399,7 +392,7 @@ TEST_CASE("screws are counted down, and a new batch follows") {
   std::vector<std::uint16_t> left;
   for (int i = 0; i < 3; ++i) {
     bench.write(start, 1);
-    bench.pass(1200ms);
+    bench.wait(1200ms);
     left.push_back(bench.event().screw_count);
   }
   CHECK(left == std::vector<std::uint16_t>{1, 2, 1});
@@ -422,10 +415,10 @@ TEST_CASE("auto output expires unless it is armed again, for each client alone")
     CAPTURE(row.name);
     Bench bench;
     bench.write(auto_output, 1);
-    bench.pass(row.rearmed_after);
+    bench.wait(row.rearmed_after);
     bench.write(auto_output, 1);
-    bench.pass(row.event_after - row.rearmed_after);
-    bench.tool->raise_alarm(7, bench.now);
+    bench.wait(row.event_after - row.rearmed_after);
+    bench.tool->raise_alarm(7, bench.clock.now());
     CHECK(bench.pushed(other_client).empty());
     CHECK(bench.pushed().size() == row.pushed);
   }
@@ -452,26 +445,26 @@ TEST_CASE("who is told: armed, disarmed, gone, and those who were not asked for"
 
 TEST_CASE("operators") {
   Bench bench;
-  bench.tool->operator_rundown(Rundown::ng, bench.now);
+  bench.tool->operator_rundown(Rundown::ng, bench.clock.now());
   CHECK(bench.tool->next_change() == start_time + 1100ms);  // while the torque rises
-  bench.pass(1200ms);
+  bench.wait(1200ms);
   CHECK(bench.event().status == 2);
   CHECK(bench.event().error == 333);
   CHECK(bench.event().torque > 0);
   CHECK(bench.event().torque < 271);
-  bench.tool->operator_rundown(Rundown::ok, bench.now);
-  bench.pass(1200ms);
+  bench.tool->operator_rundown(Rundown::ok, bench.clock.now());
+  bench.wait(1200ms);
   CHECK(bench.event().status == 1);
 }
 
 TEST_CASE("an operator at work pulls the trigger regularly") {
   Bench bench({.rundown_every = 5s, .ng_every = 3});
-  bench.tool->advance(bench.now);
+  bench.tool->advance(bench.clock.now());
   CHECK(bench.tool->next_change() == start_time + 5s);
   std::vector<std::uint16_t> results;
-  bench.pass(2s);
+  bench.wait(2s);
   for (int i = 0; i < 4; ++i) {
-    bench.pass(5s);
+    bench.wait(5s);
     CHECK(bench.event().number == 1962 + i);
     results.push_back(bench.event().status);
   }
@@ -480,9 +473,9 @@ TEST_CASE("an operator at work pulls the trigger regularly") {
 
 TEST_CASE("a burst brings several results at once, each with its number") {
   Bench bench({.rundown_every = 5s, .burst = 3});
-  bench.tool->advance(bench.now);
+  bench.tool->advance(bench.clock.now());
   bench.write(auto_output, 1);
-  bench.pass(7s);
+  bench.wait(7s);
   CHECK(bench.event().number == 1961 + 3);
   const auto pushes = bench.tool->take_pushes();
   REQUIRE(pushes.size() == 3);
@@ -496,8 +489,8 @@ TEST_CASE("a reboot forgets motion, alarm, lock and output, and keeps parameters
   bench.write(2, 300);
   bench.write(auto_output, 1);
   bench.write(lock, 1);
-  bench.tool->raise_alarm(110, bench.now);
-  bench.tool->reboot(bench.now);
+  bench.tool->raise_alarm(110, bench.clock.now());
+  bench.tool->reboot(bench.clock.now());
   CHECK(bench.event().number == 0);
   CHECK(bench.status().alarm == 0);
   CHECK(bench.status().ready == 1);

@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -14,11 +13,9 @@
 #include <utility>
 #include <vector>
 
-#include "spindle/modbus/pdu.hpp"
 #include "support/edit_list.hpp"
-#include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
-#include "support/scripted_transport.hpp"
+#include "support/rig.hpp"
 
 namespace {
 
@@ -40,58 +37,40 @@ struct Reply {
 };
 
 /// A device that acknowledges, refuses, keeps silent and acts late as it is told.
-struct Bank {
-  Bank() {
-    profile.id = "bank";
-    profile.link.answer = 300ms;
-    profile.link.retries = 0;
-    profile.link.max_write = 16;
-    Parameter a;
-    a.name = "a";
-    a.access = catalogue::Access::read_write;
-    test::append(profile.parameters, a);
-    Parameter wide = a;
-    wide.name = "wide";
-    wide.address = {10};
-    wide.encoding.kind = catalogue::Kind::u32;
-    test::append(profile.parameters, wide);
-    script.otherwise = [this](ByteView request) { return answer(request); };
-  }
-
-  Result<Device> open() {
-    ++opened;
-    return Device::open(
-        {.text = "tcp://bank"}, profile, {},
-        [this](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
-          return test::transport_to(script);
-        },
-        clock);
-  }
-
-  std::uint16_t value_of(std::uint16_t address) {
-    take_effect();
-    return registers[address];
-  }
-  std::size_t count(modbus::FunctionCode function) const {
-    std::size_t found = 0;
-    for (const Pdu& request : requests) {
-      if (request.function == static_cast<std::uint8_t>(function)) ++found;
+class Bank final : public sim::Server {
+ public:
+  std::optional<Pdu> answer(sim::ConnectionId /*connection*/, modbus::UnitId /*unit*/,
+                            const Pdu& request, TimePoint now) override {
+    advance(now);
+    const auto parsed = modbus::parse_request(request).value();
+    if (const auto* read = std::get_if<modbus::ReadRequest>(&parsed)) {
+      Registers words;
+      for (std::uint16_t at = 0; at < read->count; ++at) {
+        words.push_back(registers[static_cast<std::uint16_t>(read->first.value + at)]);
+      }
+      return modbus::read_response(read->table, words);
     }
-    return found;
+    if (const auto* one = std::get_if<modbus::WriteSingleRequest>(&parsed)) {
+      return written(request, one->address, {one->value}, request, now);
+    }
+    const auto& many = std::get<modbus::WriteMultipleRequest>(parsed);
+    const auto count = static_cast<std::uint16_t>(many.values.size());
+    return written(request, many.first, many.values,
+                   modbus::write_multiple_response(many.first, count), now);
   }
-  std::size_t writes() const {
-    return count(modbus::FunctionCode::write_single_register) +
-           count(modbus::FunctionCode::write_multiple_registers);
+  void advance(TimePoint now) override {
+    std::erase_if(pending_, [&](const Late& late) {
+      if (late.when <= now) registers[late.address] = late.value;
+      return late.when <= now;
+    });
   }
-  const Parameter& parameter(std::size_t at = 0) const { return profile.parameters[at]; }
+  [[nodiscard]] std::optional<TimePoint> next_change() const override { return std::nullopt; }
+  std::vector<sim::Push> take_pushes() override { return {}; }
+  void connected(sim::ConnectionId /*connection*/) override {}
+  void disconnected(sim::ConnectionId /*connection*/) override {}
 
-  test::FakeClock clock;
-  test::Script script = test::Script(clock);
-  catalogue::Profile profile;
   std::deque<Reply> replies = {};  ///< to the next writes; then all are acknowledged
-  std::vector<Pdu> requests = {};
   std::map<std::uint16_t, std::uint16_t> registers = {{0, 10}};
-  unsigned opened = 0;
 
  private:
   struct Late {
@@ -100,86 +79,63 @@ struct Bank {
     std::uint16_t value;
   };
 
-  void take_effect() {
-    for (auto late = pending_.begin(); late != pending_.end();) {
-      if (late->when > clock.now()) {
-        ++late;
-        continue;
-      }
-      registers[late->address] = late->value;
-      late = pending_.erase(late);
-    }
-  }
-
-  std::vector<test::Arrival> answer(ByteView request) {
-    constexpr auto framing = modbus::Framing::tcp;
-    const Pdu pdu = test::request_of(framing, request).pdu;
-    requests.push_back(pdu);
-    take_effect();
-    const auto answered = [&](Pdu response) {
-      return std::vector<test::Arrival>{{1ms, test::response_to(framing, request, response)}};
-    };
-    const auto parsed = modbus::parse_request(pdu);
-    if (const auto* read = std::get_if<modbus::ReadRequest>(&*parsed)) {
-      Registers words;
-      for (std::uint16_t at = 0; at < read->count; ++at) {
-        words.push_back(registers[static_cast<std::uint16_t>(read->first.value + at)]);
-      }
-      return answered(modbus::read_response(read->table, words));
-    }
+  std::optional<Pdu> written(const Pdu& request, modbus::RegisterAddress first,
+                             const Registers& words, Pdu acknowledged, TimePoint now) {
     Reply reply;
     if (!replies.empty()) {
       reply = replies.front();
       replies.pop_front();
     }
-    Registers words;
-    modbus::RegisterAddress first;
-    if (const auto* one = std::get_if<modbus::WriteSingleRequest>(&*parsed)) {
-      first = one->address;
-      words = {one->value};
-    } else if (const auto* many = std::get_if<modbus::WriteMultipleRequest>(&*parsed)) {
-      first = many->first;
-      words = many->values;
-    }
     for (std::size_t at = 0; at < words.size() && reply.acts; ++at) {
       pending_.push_back(
-          {clock.now() + *reply.acts, static_cast<std::uint16_t>(first.value + at), words[at]});
+          {now + *reply.acts, static_cast<std::uint16_t>(first.value + at), words[at]});
     }
-    take_effect();
-    if (reply.silent) return {};
-    if (reply.exception) {
-      return answered(
-          modbus::exception_response(pdu.function, static_cast<std::uint8_t>(*reply.exception)));
-    }
-    const bool pair = words.size() > 1;
-    return answered(
-        pair ? modbus::write_multiple_response(first, static_cast<std::uint16_t>(words.size()))
-             : pdu);
+    advance(now);
+    if (reply.silent) return std::nullopt;
+    if (!reply.exception) return acknowledged;
+    return modbus::exception_response(request.function,
+                                      static_cast<std::uint8_t>(*reply.exception));
   }
 
   std::vector<Late> pending_ = {};
 };
 
+catalogue::Profile bank_profile() {
+  catalogue::Profile profile;
+  profile.id = "bank";
+  profile.link.answer = 300ms;
+  profile.link.retries = 0;
+  profile.link.max_write = 16;
+  Parameter a;
+  a.name = "a";
+  a.access = catalogue::Access::read_write;
+  profile.parameters.push_back(a);
+  Parameter wide = a;
+  wide.name = "wide";
+  wide.address = {10};
+  wide.encoding.kind = catalogue::Kind::u32;
+  profile.parameters.push_back(wide);
+  return profile;
+}
+
 /// One command that changes the bank.
-struct Bench {
-  Bank bank = {};
-  test::MemoryDisk memory = {};
-  Disk disk = memory.functions();
-  Device device = bank.open().value();
-  work::ChangeLog log = work::ChangeLog({.command = "set", .target = "bank", .folder = "/state"},
-                                        disk, bank.clock, [](const std::string&) {});
-  work::Changer changer = work::Changer(device, log);
+struct Bench : test::Rig<Bank> {
+  Bench() : Rig({bank_profile()}, std::make_unique<Bank>()) {}
 
   device::Written set(int value, std::size_t at = 0) {
-    const auto before = device.read_each({bank.parameter(at)}, device::Limits::skip).value();
-    bank.requests.clear();
-    return changer.make(bank.parameter(at), before.front().value.value(),
-                        Value{Decimal(value), {}});
+    const Parameter& parameter = profile.parameters[at];
+    const auto before = device.read_each({parameter}, device::Limits::skip).value();
+    wire.requests.clear();
+    return changer.make(parameter, before.front().value.value(), Value{Decimal(value), {}});
   }
   std::vector<device::PutBackReport> put_back() {
     device::Rollback rollback(
-        device, [this](Duration) { return bank.open(); }, bank.clock);
+        device, [this](Duration) { return connect(); }, clock);
     return changer.put_back(rollback);
+  }
+  [[nodiscard]] std::size_t writes() const {
+    return wire.count(modbus::FunctionCode::write_single_register) +
+           wire.count(modbus::FunctionCode::write_multiple_registers);
   }
   /// "begun 10 55", "written 10 55"
   std::vector<std::string> records() const {
@@ -192,6 +148,13 @@ struct Bench {
     }
     return lines;
   }
+
+  test::MemoryDisk memory = {};
+  Disk disk = memory.functions();
+  Device device = open();
+  work::ChangeLog log = work::ChangeLog({.command = "set", .target = "bank", .folder = "/state"},
+                                        disk, clock, [](const std::string&) {});
+  work::Changer changer = work::Changer(device, log);
 };
 
 using Lines = std::vector<std::string>;
@@ -297,10 +260,10 @@ TEST_CASE("what became of a write is what the device holds, whatever it answered
   for (const Row& row : rows) {
     CAPTURE(row.what);
     Bench bench;
-    bench.bank.replies = row.replies;
+    bench.tool->replies = row.replies;
     const auto written = bench.set(55);
     CHECK(written.result == row.result);
-    CHECK(bench.bank.writes() == row.writes);
+    CHECK(bench.writes() == row.writes);
     CHECK(bench.records() == Lines{"begun 10 55", row.record});
     const std::string text = written.error ? describe(*written.error) : std::string();
     CAPTURE(text);
@@ -328,53 +291,53 @@ TEST_CASE("a value that reads right is not waited for, and one that acts late is
   for (const Row& row : rows) {
     CAPTURE(row.acts.count());
     Bench bench;
-    if (row.link) bench.bank.profile.link.settle = *row.link;
-    test::edit(bench.bank.profile.parameters, 0,
+    if (row.link) bench.profile.link.settle = *row.link;
+    test::edit(bench.profile.parameters, 0,
                [&](Parameter& parameter) { parameter.settle = row.own; });
-    bench.bank.replies = {{.acts = row.acts}};
-    const TimePoint began = bench.bank.clock.now();
+    bench.tool->replies = {{.acts = row.acts}};
+    const TimePoint began = bench.clock.now();
     CHECK(bench.set(55).result == row.result);
-    CHECK(bench.bank.clock.now() - began <= row.longest);
+    CHECK(bench.clock.now() - began <= row.longest);
   }
 }
 
 TEST_CASE("a write that acts after it was given up is put back all the same") {
   Bench bench;
-  bench.bank.replies = {{.acts = 700ms}, {.acts = 700ms}};
-  bench.bank.profile.link.settle = 500ms;
+  bench.tool->replies = {{.acts = 700ms}, {.acts = 700ms}};
+  bench.profile.link.settle = 500ms;
   REQUIRE(bench.set(55).result == WriteResult::mismatch);
   REQUIRE(bench.changer.sent().size() == 1);
   bench.put_back();
-  bench.bank.clock.advance(2s);
-  CHECK(bench.bank.value_of(0) == 10);
+  bench.clock.advance(2s);
+  CHECK(bench.read(0) == 10);
   CHECK(bench.changer.sent().empty());
 }
 
 TEST_CASE("a write that acts behind its put-back is put back once more") {
   Bench bench;
-  bench.bank.replies = {{.acts = 800ms}, {.acts = 0ms}};
+  bench.tool->replies = {{.acts = 800ms}, {.acts = 0ms}};
   REQUIRE(bench.set(55).result == WriteResult::mismatch);
   const auto reports = bench.put_back();
   CHECK(reports.front().result == PutBack::done);
-  CHECK(bench.bank.value_of(0) == 10);
-  CHECK(bench.bank.writes() == 3);
+  CHECK(bench.read(0) == 10);
+  CHECK(bench.writes() == 3);
 }
 
 TEST_CASE("what is put back is proven after the settling time, and recorded") {
   Bench bench;
-  bench.bank.replies = {{.acts = 300ms}, {.acts = 300ms}};
+  bench.tool->replies = {{.acts = 300ms}, {.acts = 300ms}};
   REQUIRE(bench.set(55).result == WriteResult::written);
   const auto reports = bench.put_back();
   REQUIRE(reports.size() == 1);
   CHECK(reports[0].result == PutBack::done);
-  CHECK(bench.bank.value_of(0) == 10);
+  CHECK(bench.read(0) == 10);
   CHECK(bench.records() ==
         Lines{"begun 10 55", "written 10 55", "begun 55 10", "rolled-back 55 10"});
 }
 
 TEST_CASE("what cannot be put back is recorded with what the tool holds") {
   Bench bench;
-  bench.bank.replies = {{}, {.exception = ExceptionCode::illegal_data_value, .acts = {}}};
+  bench.tool->replies = {{}, {.exception = ExceptionCode::illegal_data_value, .acts = {}}};
   bench.set(55);
   CHECK(bench.put_back().front().result == PutBack::refused);
   CHECK(bench.records() ==
@@ -386,7 +349,7 @@ TEST_CASE("a refused write leaves nothing to be put back, and one in doubt does"
                                     {ExceptionCode::acknowledge, 1U},
                                     {ExceptionCode::gateway_path_unavailable, 1U}}) {
     Bench bench;
-    bench.bank.replies = {{.exception = code, .acts = std::nullopt}};
+    bench.tool->replies = {{.exception = code, .acts = std::nullopt}};
     bench.set(55);
     CHECK(bench.changer.sent().size() == count);
   }
@@ -394,18 +357,18 @@ TEST_CASE("a refused write leaves nothing to be put back, and one in doubt does"
 
 TEST_CASE("a product that takes one register a request gets two words in their order") {
   Bench bench;
-  bench.bank.profile.link.max_write = 1;
+  bench.profile.link.max_write = 1;
   REQUIRE(bench.set(70000, 1).result == WriteResult::written);
-  REQUIRE(bench.bank.requests.size() == 3);
-  CHECK(bench.bank.requests[0] == modbus::write_request({10}, std::uint16_t{1}));
-  CHECK(bench.bank.requests[1] == modbus::write_request({11}, std::uint16_t{4464}));
-  CHECK(bench.bank.count(modbus::FunctionCode::write_multiple_registers) == 0);
+  REQUIRE(bench.wire.requests.size() == 3);
+  CHECK(bench.wire.requests[0].pdu == modbus::write_request({10}, std::uint16_t{1}));
+  CHECK(bench.wire.requests[1].pdu == modbus::write_request({11}, std::uint16_t{4464}));
+  CHECK(bench.wire.count(modbus::FunctionCode::write_multiple_registers) == 0);
 }
 
 TEST_CASE("half a pair that was written is told") {
   Bench bench;
-  bench.bank.profile.link.max_write = 1;
-  bench.bank.replies = {{}, {.exception = ExceptionCode::illegal_data_value, .acts = {}}};
+  bench.profile.link.max_write = 1;
+  bench.tool->replies = {{}, {.exception = ExceptionCode::illegal_data_value, .acts = {}}};
   const auto written = bench.set(70000, 1);
   CHECK(written.result == WriteResult::coerced);
   CHECK(written.now->to_string() == "65536");
@@ -414,11 +377,11 @@ TEST_CASE("half a pair that was written is told") {
 
 TEST_CASE("a pair that is never split is not written by a product that takes one register") {
   Bench bench;
-  bench.bank.profile.link.max_write = 1;
-  bench.bank.profile.link.even_pairs = true;
+  bench.profile.link.max_write = 1;
+  bench.profile.link.even_pairs = true;
   const auto written = bench.set(70000, 1);
   CHECK(written.result == WriteResult::refused);
   CHECK(written.error->status() == ExitStatus::usage);
-  CHECK(bench.bank.requests.empty());
+  CHECK(bench.wire.requests.empty());
   CHECK(bench.changer.sent().empty());
 }

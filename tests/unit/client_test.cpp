@@ -90,14 +90,12 @@ struct Server {
   Ranges reads = {};
 };
 
-struct Bench {
+struct Bench : test::ScriptedPeer {
   explicit Bench(ReadLimits limits = {}, unsigned retries = 0)
       : session(transport_to(script), clock, {.unit = {0}}), client(session, limits, retries) {
     script.otherwise = [this](ByteView bytes) { return server(bytes); };
   }
 
-  FakeClock clock;
-  Script script{clock};
   Server server;
   Session session;
   Client client;
@@ -145,7 +143,7 @@ TEST_CASE("the fewest requests") {
       {"overlapping", {{holding, 7, 3}, {holding, 9, 3}}, plain, {{holding, 7, 5}}},
       {"one inside another", {{holding, 7, 9}, {holding, 9, 2}}, plain, {{holding, 7, 9}}},
       {"tables apart", {{holding, 7, 1}, {input, 8, 1}}, plain, {{holding, 7, 1}, {input, 8, 1}}},
-      {"a gap that nobody may read",
+      {"a gap that may not be read",
        {{holding, 7, 1}, {holding, 9, 1}},
        plain,
        {{holding, 7, 1}, {holding, 9, 1}}},
@@ -286,7 +284,7 @@ TEST_CASE("a plan covers what is wanted, whatever is wanted") {
       if (!limits.forbidden_shapes.empty() && limits.forbidden_shapes[0].table == range.table) {
         REQUIRE(range.count != limits.forbidden_shapes[0].count);
       }
-      // Nobody asks for a register without reason.
+      // No register is asked for without reason.
       REQUIRE(wanted_keys.count(register_key(range.table, range.first)) == 1);
       for (std::uint32_t at = 0; at < range.count; ++at) {
         const std::uint32_t key = register_key(range.table, range.first) + at;

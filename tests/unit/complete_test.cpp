@@ -88,7 +88,7 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
       {{"set", "@line1", "preset.1.mode="}, {"preset.1.mode=TC/AM", "preset.1.mode=AC/TM"}},
       {{"do", "@line1", "dir"}, {"direction="}},
       {{"get", "@single", "event.num"}, {}},
-      {{"get", "@nobody", "event.num"}, {}},
+      {{"get", "@elsewhere", "event.num"}, {}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.words.back());

@@ -4,18 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <functional>
-#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "spindle/files/profile_store.hpp"
-#include "spindle/sim/bm_tool.hpp"
-#include "spindle/sim/sim_transport.hpp"
-#include "support/fake_clock.hpp"
-#include "support/fault_plan.hpp"
-#include "support/scripted_transport.hpp"
+#include "support/rig.hpp"
+#include "support/scripted_device.hpp"
 
 using namespace spindle;
 using namespace spindle::device;
@@ -28,96 +22,45 @@ using modbus::Pdu;
 
 namespace {
 
-const files::ProfileStore& store() {
-  static const files::ProfileStore profiles({SPINDLE_SOURCE_DIR "/profiles"});
-  return profiles;
+const test::Product& bm_product() {
+  static const test::Product product = test::product("doga-bm");
+  return product;
 }
 
-const Profile& bm() {
-  static const Profile profile = store().load("doga-bm").value();
-  return profile;
-}
-
-/// Decides about one write before the tool sees it: the number counts writes from 1.
-using Swallow = std::function<bool(std::size_t write)>;
-
-/// A simulated tool to which some writes never come.
-class Deaf final : public sim::Server {
- public:
-  Deaf(std::unique_ptr<sim::Server> tool, Swallow swallow)
-      : tool_(std::move(tool)), swallow_(std::move(swallow)) {}
-
-  std::optional<Pdu> answer(sim::ConnectionId connection, modbus::UnitId unit, const Pdu& request,
-                            TimePoint now) override {
-    const bool is_write =
-        request.function == static_cast<std::uint8_t>(FunctionCode::write_single_register);
-    if (is_write && swallow_ && swallow_(++writes_)) return std::nullopt;
-    return tool_->answer(connection, unit, request, now);
-  }
-  void advance(TimePoint now) override { tool_->advance(now); }
-  [[nodiscard]] std::optional<TimePoint> next_change() const override {
-    return tool_->next_change();
-  }
-  std::vector<sim::Push> take_pushes() override { return tool_->take_pushes(); }
-  std::vector<sim::Push> take_pushes(sim::ConnectionId connection) override {
-    return tool_->take_pushes(connection);
-  }
-  [[nodiscard]] std::optional<Pdu> event_frame() const override { return tool_->event_frame(); }
-  void connected(sim::ConnectionId connection) override { tool_->connected(connection); }
-  void disconnected(sim::ConnectionId connection) override { tool_->disconnected(connection); }
-
- private:
-  std::unique_ptr<sim::Server> tool_;
-  Swallow swallow_;
-  std::size_t writes_ = 0;
-};
+const Profile& bm() { return bm_product().profile; }
 
 struct Setup {
   std::vector<std::string> faults = {};
   sim::BmOptions tool = {};
-  Swallow swallow = {};
+  unsigned lost_writes = 0;  ///< the first so many never come to the tool
   std::string shown = {};
 };
 
-/// A device before a simulated tool, with no retries of reads; what it sends is written down.
-struct Bench {
-  explicit Bench(Setup setup = {}, const Profile& profile = bm()) {
+/// A device before a simulated tool, with no retries of reads.
+struct Bench : test::BmRig {
+  explicit Bench(const Setup& setup = {}, const Profile& seen_as = bm())
+      : BmRig(bm_product(), with_faults(setup)) {
+    profile = seen_as;
     faults = test::plan_of(setup.faults);
-    setup.tool.faults = faults;
-    auto tool = sim::make_bm_tool(bm(), store().load_simulation("doga-bm").value(), setup.tool);
-    auto server = std::make_unique<Deaf>(std::move(tool), std::move(setup.swallow));
-    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts& facts,
-                                   Duration) -> Result<std::unique_ptr<link::Transport>> {
-      return sim::make_sim_transport(std::move(server), facts.framing, faults, clock, interrupt);
-    };
-    const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
-    const link::Trace trace{.bytes = [this](auto way, ByteView bytes) { note(way, bytes); },
-                            .decision = {}};
-    const LinkOptions options{.retries = 0, .trace = trace, .shown = setup.shown};
-    opened = Device::open(*endpoint, profile, options, open, clock);
+    endpoint = link::parse_endpoint("tcp://192.168.10.23:5000").value();
+    options = {.retries = 0, .shown = setup.shown};
+    wire.fate = test::next_meet(test::Fate::is_lost, setup.lost_writes, [](const Pdu& request) {
+      return request.function == static_cast<std::uint8_t>(FunctionCode::write_single_register);
+    });
+    opened = connect();
     REQUIRE(opened.has_value());
   }
 
-  void note(link::Direction direction, ByteView bytes) {
-    if (direction == link::Direction::received) return;
-    const auto request = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, bytes);
-    requests.push_back(std::get<modbus::Deframed>(request).adu.pdu);
+  static sim::BmOptions with_faults(const Setup& setup) {
+    sim::BmOptions how = setup.tool;
+    how.faults = test::plan_of(setup.faults);
+    return how;
   }
 
   Device& device() { return *opened; }
-
-  [[nodiscard]] std::size_t count(FunctionCode function) const {
-    return static_cast<std::size_t>(
-        std::count_if(requests.begin(), requests.end(), [&](const Pdu& request) {
-          return request.function == static_cast<std::uint8_t>(function);
-        }));
-  }
+  [[nodiscard]] std::size_t count(FunctionCode function) const { return wire.count(function); }
   [[nodiscard]] std::size_t writes() const { return count(FunctionCode::write_single_register); }
 
-  Interrupt interrupt;
-  test::FakeClock clock{interrupt};
-  sim::FaultPlan faults;
-  std::vector<Pdu> requests;
   Result<Device> opened = tl::unexpected(Error());
 };
 
@@ -159,7 +102,7 @@ TEST_CASE("a tool is of the profile only when it says so itself") {
     const auto known = bench.device().require_known_registers();
     CHECK(known.has_value() == !row.refused.has_value());
     if (!known) CHECK(known.error().code == row.refused);
-    CHECK(bench.requests.size() == 1);
+    CHECK(bench.wire.requests.size() == 1);
   }
 }
 
@@ -173,7 +116,7 @@ TEST_CASE("a tool is asked what it is once, and not at all where the profile has
   anonymous.identity.reset();
   Bench unasked({}, anonymous);
   CHECK(unasked.device().require_known_registers().has_value());
-  CHECK(unasked.requests.empty());
+  CHECK(unasked.wire.requests.empty());
 }
 
 TEST_CASE("a refusal names firmware and profile, and what can still be done") {
@@ -192,7 +135,7 @@ TEST_CASE("all presets are read in at most four requests") {
   const auto readings = bench.device().read_each(*presets, Limits::skip);
   REQUIRE(readings.has_value());
   CHECK(readings->size() == 225);
-  CHECK(bench.requests.size() <= 4);
+  CHECK(bench.wire.requests.size() <= 4);
   CHECK((*readings)[1].value->to_string() == "2.71");
 }
 
@@ -210,7 +153,7 @@ TEST_CASE("a hole stands in its own reading, and the limits of a parameter besid
   REQUIRE_FALSE(hole.value.has_value());
   CHECK(hole.value.error().code == Errc::exception_response);
   CHECK(hole.value.error().name == "p564");
-  CHECK_FALSE(hole.limits_error.has_value());  // nobody asks for the limits of nothing
+  CHECK_FALSE(hole.limits_error.has_value());  // what is not there has no limits
 
   for (const std::size_t without : {2U, 3U}) {
     CAPTURE(without);
@@ -228,7 +171,6 @@ TEST_CASE("a write is sent once and proven by reading back") {
     std::string now;
     std::size_t writes;
   };
-  const auto first = [](std::size_t write) { return write == 1; };
   const std::vector<Case> cases = {
       {"acknowledged", {}, WriteResult::written, "3.00", 1},
       {"acknowledged with a wrong echo",
@@ -237,7 +179,7 @@ TEST_CASE("a write is sent once and proven by reading back") {
        "3.00",
        1},
       {"taken, but the answer was lost", {.faults = {"lost@1"}}, WriteResult::written, "3.00", 1},
-      {"never arrived: repeated", {.swallow = first}, WriteResult::written, "3.00", 2},
+      {"never arrived: repeated", {.lost_writes = 1}, WriteResult::written, "3.00", 2},
       {"acknowledged, not stored", {.faults = {"ignore-write"}}, WriteResult::mismatch, "2.71", 1},
       {"stored as something else", {.faults = {"store-other=5"}}, WriteResult::coerced, "3.05", 1},
   };
@@ -262,7 +204,6 @@ TEST_CASE("a write that fails says what is known, and is not repeated blindly") 
     std::size_t writes;
     std::size_t reads;
   };
-  const auto always = [](std::size_t) { return true; };
   const std::vector<Case> cases = {
       {"refused",
        {.faults = {"exception=14@1"}},
@@ -275,9 +216,9 @@ TEST_CASE("a write that fails says what is known, and is not repeated blindly") 
        Errc::closed,
        "whether it was written is not known: it holds 2.71 or 3.00",
        1,
-       1},
+       0},  // the reading finds the connection closed
       {"never arrives, twice",
-       {.swallow = always},
+       {.lost_writes = 99},
        Errc::no_answer,
        "no answer to 'write register 2' within 1s; it still holds 2.71",
        2,
@@ -362,7 +303,7 @@ TEST_CASE("an action that fails was sent once all the same") {
     Errc code;
   };
   const std::vector<Case> cases = {
-      {"the request is lost", {.swallow = [](std::size_t) { return true; }}, Errc::no_answer},
+      {"the request is lost", {.lost_writes = 99}, Errc::no_answer},
       {"it is refused", {.faults = {"exception=2@1"}}, Errc::exception_response},
       {"the connection ends", {.faults = {"close@1"}}, Errc::closed},
       {"the proof is refused", {.faults = {"exception=2@2"}}, Errc::mismatch},
@@ -410,14 +351,10 @@ TEST_CASE("errors name the tool, its address, and the maker's words for an excep
         "tool's limits)");
 }
 
-TEST_CASE("a line that can not be opened is told with the tool's name and address") {
-  test::FakeClock clock;
-  const OpenTransport open = [](const link::Endpoint&, const catalogue::LinkFacts&,
-                                Duration) -> Result<std::unique_ptr<link::Transport>> {
-    return tl::unexpected(Error{.code = Errc::no_route});
-  };
-  const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
-  const auto device = Device::open(*endpoint, bm(), {.shown = "station3"}, open, clock);
+TEST_CASE("a line that cannot be opened is told with the tool's name and address") {
+  test::ScriptedDevice peer;
+  peer.refusal = Errc::no_route;
+  const auto device = peer.open("tcp://192.168.10.23:5000", bm(), {.shown = "station3"});
   REQUIRE_FALSE(device.has_value());
   CHECK(device.error().target == "station3");
   CHECK(device.error().endpoint == "tcp://192.168.10.23:5000");
@@ -426,24 +363,13 @@ TEST_CASE("a line that can not be opened is told with the tool's name and addres
 TEST_CASE("timeouts come from the user, else from the profile") {
   for (const auto& [given, expected] :
        {std::pair<std::optional<Duration>, Duration>{std::nullopt, 1s}, {250ms, 250ms}}) {
-    test::FakeClock clock;
-    Interrupt interrupt;
-    Duration connecting = {};
-    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts& facts,
-                                   Duration timeout) -> Result<std::unique_ptr<link::Transport>> {
-      connecting = timeout;
-      auto tool = sim::make_bm_tool(bm(), store().load_simulation("doga-bm").value(), {});
-      return sim::make_sim_transport(std::move(tool), facts.framing, {*sim::parse_fault("lost")},
-                                     clock, interrupt);
-    };
-    const auto endpoint = link::parse_endpoint("tcp://192.168.10.23:5000");
-    auto device = Device::open(*endpoint, bm(),
-                               {.answer_timeout = given, .connect_timeout = given, .retries = 0},
-                               open, clock);
+    test::ScriptedDevice peer;
+    auto device = peer.open("tcp://192.168.10.23:5000", bm(),
+                            {.answer_timeout = given, .connect_timeout = given, .retries = 0});
     REQUIRE(device.has_value());
-    CHECK(connecting == given.value_or(bm().link.connect));
+    CHECK(peer.connect_timeout == given.value_or(bm().link.connect));
     CHECK_FALSE(device->report_server_id().has_value());
-    CHECK(clock.now() - test::FakeClock::start == expected);
+    CHECK(peer.clock.now() - test::FakeClock::start == expected);
   }
 }
 
@@ -452,7 +378,7 @@ TEST_CASE("a ping touches no value, and an exception answers it, too") {
        {std::vector<std::string>{}, std::vector<std::string>{"exception=1"}}) {
     Bench bench({.faults = faults});
     CHECK(bench.device().ping() == 100us);
-    CHECK(bench.requests.size() == 1);
+    CHECK(bench.wire.requests.size() == 1);
     CHECK(bench.count(FunctionCode::report_server_id) == 1);
   }
   Bench silent({.faults = {"lost"}});
@@ -467,7 +393,7 @@ TEST_CASE("the whole last event is read without a frame that looks like a pushed
   CHECK((*event)->size() == 14);
   CHECK((*event)->front() == 1961);
   CHECK((*event)->back() == 402);
-  for (const Pdu& request : bench.requests) CHECK(get_u16(request.data, 2) != 14);
+  for (const auto& [at, request] : bench.wire.requests) CHECK(get_u16(request.data, 2) != 14);
 }
 
 // ---- what a connection believes ----
@@ -475,7 +401,7 @@ TEST_CASE("the whole last event is read without a frame that looks like a pushed
 namespace {
 
 /// A device of holding and input registers in which N has the value N, on any profile.
-struct Opened {
+struct Opened : test::ScriptedDevice {
   explicit Opened(const Profile& profile, const LinkOptions& options = {}) {
     script.otherwise = [](ByteView request) {
       const Pdu pdu = test::request_of(modbus::Framing::tcp, request).pdu;
@@ -489,16 +415,10 @@ struct Opened {
           {Duration(1ms), test::response_to(modbus::Framing::tcp, request,
                                             modbus::read_response(read.table, registers))}};
     };
-    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
-      return Result<std::unique_ptr<link::Transport>>(transport_to(script));
-    };
-    device = Device::open(link::parse_endpoint("tcp://192.168.10.23").value(), profile, options,
-                          open, clock);
+    device = open("tcp://192.168.10.23", profile, options);
     REQUIRE(device.has_value());
   }
 
-  test::FakeClock clock;
-  test::Script script{clock};
   Result<Device> device = tl::unexpected(Error());
 };
 
@@ -533,14 +453,9 @@ TEST_CASE("without a profile nothing is asked whose answer could be a frame that
 TEST_CASE("the first id of a connection is not known before, and never small") {
   std::set<std::uint16_t> ids;
   for (const Duration later : {Duration(0), Duration(1), Duration(4711), Duration(1s + 17ns)}) {
-    test::FakeClock clock;
-    clock.advance(later);
-    test::Script script(clock);
-    const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
-      return Result<std::unique_ptr<link::Transport>>(transport_to(script));
-    };
-    auto device =
-        Device::open(link::parse_endpoint("tcp://192.168.10.23").value(), bm(), {}, open, clock);
+    test::ScriptedDevice peer;
+    peer.clock.advance(later);
+    auto device = peer.open("tcp://192.168.10.23", bm());
     ids.insert(device->session().options().first_transaction);
   }
   CHECK(ids.size() == 4);
@@ -571,13 +486,8 @@ Profile drive() {
 }
 
 link::SessionOptions options_for(const std::string& url, const Profile& profile) {
-  test::FakeClock clock;
-  test::Script script(clock);
-  const OpenTransport open = [&](const link::Endpoint&, const catalogue::LinkFacts&, Duration) {
-    return Result<std::unique_ptr<link::Transport>>(transport_to(script));
-  };
-  const auto endpoint = link::parse_endpoint(url).value();
-  auto device = Device::open(endpoint, profile, {}, open, clock).value();
+  test::ScriptedDevice peer;
+  auto device = peer.open(url, profile).value();
   device.use(profile, {});  // as after an identification: it must not change the framing
   return device.session().options();
 }

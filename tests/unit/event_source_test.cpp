@@ -2,15 +2,12 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <memory>
-#include <optional>
-#include <utility>
+#include <string>
 #include <vector>
 
-#include "spindle/files/profile_store.hpp"
-#include "spindle/sim/plain_tool.hpp"
-#include "spindle/sim/sim_transport.hpp"
-#include "support/fake_clock.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace std::chrono_literals;
@@ -26,93 +23,51 @@ namespace {
 constexpr std::uint16_t flag_register = 294;
 constexpr std::uint16_t block_register = 295;
 
-/// Loses answers to reads of one register, and remembers what was asked.
-class Forgetful final : public sim::Server {
- public:
-  explicit Forgetful(sim::PlainTool& tool) : tool_(&tool) {}
-
-  std::optional<modbus::Pdu> answer(sim::ConnectionId connection, modbus::UnitId unit,
-                                    const modbus::Pdu& request, TimePoint now) override {
-    const std::uint16_t first = get_u16(request.data, 0);
-    asked.push_back(first);
-    auto answered = tool_->answer(connection, unit, request, now);
-    if (behind_flag && first == flag_register) tool_->happen(*std::exchange(behind_flag, {}), now);
-    if (interrupt != nullptr && first == interrupted_at) {
-      std::exchange(interrupt, nullptr)->raise(2);
-      return std::nullopt;
-    }
-    if (lost > 0 && first == lost_at) {
-      --lost;
-      return std::nullopt;
-    }
-    return answered;
-  }
-  void advance(TimePoint now) override { tool_->advance(now); }
-  [[nodiscard]] std::optional<TimePoint> next_change() const override {
-    return tool_->next_change();
-  }
-  std::vector<sim::Push> take_pushes() override { return tool_->take_pushes(); }
-  std::vector<sim::Push> take_pushes(sim::ConnectionId connection) override {
-    return tool_->take_pushes(connection);
-  }
-  void connected(sim::ConnectionId connection) override { tool_->connected(connection); }
-  void disconnected(sim::ConnectionId connection) override { tool_->disconnected(connection); }
-
-  std::vector<std::uint16_t> asked = {};
-  std::uint16_t lost_at = 0;
-  int lost = 0;
-  std::optional<EventKind> behind_flag = std::nullopt;
-  std::uint16_t interrupted_at = 0;
-  Interrupt* interrupt = nullptr;  ///< comes instead of the answer, once
-
- private:
-  sim::PlainTool* tool_;
-};
+std::uint16_t first_of(const modbus::Pdu& request) { return get_u16(request.data, 0); }
 
 /// A tool by a profile of its own, and what its source of events tells.
-class Bench {
- public:
-  explicit Bench(const std::string& name, void (*change)(catalogue::EventFacts&) = nullptr) {
-    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"});
-    profile = store.load(name).value();
-    if (change != nullptr) change(*profile.events);
-    tool = sim::make_plain_tool(profile, store.load_simulation(name).value(), {});
-    server = std::make_unique<Forgetful>(*tool);
+struct Bench : test::PlainRig {
+  explicit Bench(const std::string& name, void (*change)(catalogue::EventFacts&) = nullptr)
+      : Rig(changed(name, change), sim::PlainOptions{}) {
     source = EventSource::make(profile, EventMode::declared, clock, [this](const auto& news) {
       if (const auto* event = std::get_if<EventNews>(&news)) events.push_back(*event);
       if (const auto* gap = std::get_if<GapNews>(&news)) gaps.push_back(*gap);
     });
   }
+  static test::Product changed(const std::string& name, void (*change)(catalogue::EventFacts&)) {
+    test::Product made = test::product(name);
+    if (change != nullptr) change(*made.profile.events);
+    return made;
+  }
 
-  Result<void> connect() {
-    const auto open = [this](const auto&, const auto&,
-                             Duration) -> Result<std::unique_ptr<link::Transport>> {
-      return sim::make_sim_transport(*server, {++connections}, modbus::Framing::tcp, {}, answers,
-                                     clock, interrupt);
-    };
-    auto opened =
-        device::Device::open(link::parse_endpoint("tcp://tool").value(), profile, {}, open, clock);
-    REQUIRE(opened.has_value());
-    device = std::make_unique<device::Device>(std::move(*opened));
+  Result<void> attach() {
+    device = std::make_unique<device::Device>(open());
     return source->attach(*device, 1s);
   }
   void happen(EventKind kind = EventKind::fastening_ok) { tool->happen(kind, clock.now()); }
-  void lose(std::uint16_t first, int count) {
-    server->lost_at = first;
-    server->lost = count;
+  /// The answers to the next so many readings that begin at this register are lost.
+  void lose(std::uint16_t first, unsigned count) {
+    wire.fate =
+        test::next_meet(test::Fate::has_no_answer, count,
+                        [first](const modbus::Pdu& request) { return first_of(request) == first; });
+  }
+  /// An interrupt comes instead of the answer to the next reading there.
+  void interrupt_reading(std::uint16_t first) {
+    lose(first, 1);
+    wire.behind = [this, first](const modbus::Pdu& request) {
+      if (first_of(request) == first) interrupt.raise(2);
+    };
+  }
+  [[nodiscard]] std::vector<std::uint16_t> asked() const {
+    std::vector<std::uint16_t> all;
+    for (const auto& [at, request] : wire.requests) all.push_back(first_of(request));
+    return all;
   }
 
-  Interrupt interrupt;
-  test::FakeClock clock{interrupt};
-  sim::AnswerCounter answers;
-  std::uint32_t connections = 0;
-  catalogue::Profile profile;
-  std::unique_ptr<sim::PlainTool> tool;
-  std::unique_ptr<Forgetful> server;
-  std::unique_ptr<device::Device> device;
-  std::vector<EventNews> events;
-  std::vector<GapNews> gaps;
-  std::unique_ptr<EventSource> source;
+  std::unique_ptr<device::Device> device = nullptr;
+  std::vector<EventNews> events = {};
+  std::vector<GapNews> gaps = {};
+  std::unique_ptr<EventSource> source = nullptr;
 };
 
 }  // namespace
@@ -129,7 +84,7 @@ TEST_CASE("flag: each result is told once, and nothing where there is none") {
   Bench bench("kducer");
   CHECK(bench.source->polls());
   CHECK(!bench.source->caveat().empty());
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   REQUIRE(bench.source->poll());
   CHECK(bench.events.empty());
   for (int i = 0; i < 3; ++i) {
@@ -145,7 +100,7 @@ TEST_CASE("flag: each result is told once, and nothing where there is none") {
 TEST_CASE("flag: what waits when the watch begins is told") {
   Bench bench("kducer");
   bench.happen(EventKind::fastening_ng);
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   REQUIRE(bench.events.size() == 1);
   CHECK(bench.events.front().source == EventOrigin::catch_up);
   CHECK(bench.gaps.empty());
@@ -153,19 +108,19 @@ TEST_CASE("flag: what waits when the watch begins is told") {
 
 TEST_CASE("flag: the lost answer to its reading is never asked for again, the block is looked at") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
-  bench.server->asked.clear();
+  REQUIRE(bench.attach());
+  bench.wire.requests.clear();
   bench.happen();
   bench.lose(flag_register, 1);
   REQUIRE(bench.source->poll());
-  CHECK(bench.server->asked == std::vector<std::uint16_t>{flag_register, block_register});
+  CHECK(bench.asked() == std::vector<std::uint16_t>{flag_register, block_register});
   CHECK(bench.events.size() == 1);
   CHECK(bench.gaps.empty());
 }
 
 TEST_CASE("flag: where the block is the one before, a lost answer is a gap") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.lose(flag_register, 1);
   REQUIRE(bench.source->poll());
   CHECK(bench.events.empty());
@@ -173,28 +128,32 @@ TEST_CASE("flag: where the block is the one before, a lost answer is a gap") {
   CHECK(bench.gaps.front().missed == std::nullopt);
 }
 
-TEST_CASE("flag: a result that can not be read is a gap, and is fetched on the next connection") {
+TEST_CASE("flag: a result that cannot be read is a gap, and is fetched on the next connection") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.happen();
   bench.lose(block_register, 2);  // once more for the repetition
   CHECK(!bench.source->poll().has_value());
   REQUIRE(bench.gaps.size() == 1);
   CHECK(bench.gaps.front().reason.find("could not be read") != std::string::npos);
   CHECK(bench.events.empty());
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   CHECK(bench.gaps.size() == 2);  // what else happened meanwhile is not known
   REQUIRE(bench.events.size() == 1);
   CHECK(bench.events.front().source == EventOrigin::catch_up);
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   CHECK(bench.events.size() == 1);
 }
 
 TEST_CASE("flag: a result that comes before the one before it was read is one that is missed") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.happen();
-  bench.server->behind_flag = EventKind::fastening_ng;
+  bench.wire.behind = [&bench](const modbus::Pdu& request) {
+    if (first_of(request) != flag_register) return;
+    bench.wire.behind = {};
+    bench.happen(EventKind::fastening_ng);
+  };
   REQUIRE(bench.source->poll());
   CHECK(bench.events.size() == 1);
   CHECK(bench.gaps.empty());
@@ -206,22 +165,23 @@ TEST_CASE("flag: a result that comes before the one before it was read is one th
 
 TEST_CASE("flag: another tool is not compared with the one before") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.source->forget();
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   CHECK(bench.gaps.empty());
 }
 
 TEST_CASE("flag: no device reads it but for its source") {
   Bench bench("kducer");
   bench.happen();
-  REQUIRE(bench.connect());
-  bench.server->asked.clear();
+  REQUIRE(bench.attach());
+  bench.wire.requests.clear();
   bench.happen();
   const auto all = bench.profile.select({});
   REQUIRE(all.has_value());
   REQUIRE(bench.device->read_each(*all, device::Limits::skip).has_value());
-  CHECK(std::count(bench.server->asked.begin(), bench.server->asked.end(), flag_register) == 0);
+  const auto asked = bench.asked();
+  CHECK(std::count(asked.begin(), asked.end(), flag_register) == 0);
   REQUIRE(bench.source->poll());
   CHECK(bench.events.size() == 2);
 }
@@ -231,7 +191,7 @@ TEST_CASE("counter: what was missed is counted, and nothing is armed") {
   CHECK(bench.source->polls());
   CHECK(bench.source->caveat().empty());
   CHECK(bench.source->next_due() == TimePoint::max());
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.happen();
   REQUIRE(bench.source->poll());
   bench.happen();
@@ -245,7 +205,7 @@ TEST_CASE("counter: what was missed is counted, and nothing is armed") {
 
 TEST_CASE("counter: a block that is longer than a request is read in pieces") {
   Bench bench("countermatic");
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   bench.happen();
   REQUIRE(bench.source->poll());
   REQUIRE(bench.events.size() == 1);
@@ -257,9 +217,9 @@ TEST_CASE("push without arming: frames come by themselves, and nothing is switch
   Bench bench("countermatic",
               [](catalogue::EventFacts& events) { events.model = catalogue::EventModel::push; });
   CHECK(!bench.source->polls());
-  REQUIRE(bench.connect());
+  REQUIRE(bench.attach());
   CHECK(bench.source->next_due() == TimePoint::max());
-  const std::size_t asked = bench.server->asked.size();
+  const std::size_t asked = bench.wire.requests.size();
   bench.happen();
   bench.happen(EventKind::fastening_ng);
   const auto frame = bench.device->session().next_spontaneous(bench.clock.now() + 10ms);
@@ -270,7 +230,7 @@ TEST_CASE("push without arming: frames come by themselves, and nothing is switch
   CHECK(bench.events.front().source == EventOrigin::push);
   REQUIRE(bench.source->run_due([](const auto& request) { return request(); }));
   bench.source->disarm();
-  CHECK(bench.server->asked.size() == asked);
+  CHECK(bench.wire.requests.size() == asked);
   CHECK(bench.gaps.empty());
 }
 
@@ -278,10 +238,9 @@ TEST_CASE("flag: an interrupt takes no result with it") {
   for (const std::uint16_t asked : {flag_register, block_register}) {
     CAPTURE(asked);
     Bench bench("kducer");
-    REQUIRE(bench.connect());
+    REQUIRE(bench.attach());
     bench.happen();
-    bench.server->interrupted_at = asked;
-    bench.server->interrupt = &bench.interrupt;
+    bench.interrupt_reading(asked);
     const auto polled = bench.source->poll();
     REQUIRE(!polled.has_value());
     CHECK(polled.error().code == Errc::interrupted);
@@ -292,9 +251,8 @@ TEST_CASE("flag: an interrupt takes no result with it") {
 
 TEST_CASE("flag: an interrupt is no gap where nothing happened") {
   Bench bench("kducer");
-  REQUIRE(bench.connect());
-  bench.server->interrupted_at = flag_register;
-  bench.server->interrupt = &bench.interrupt;
+  REQUIRE(bench.attach());
+  bench.interrupt_reading(flag_register);
   CHECK(!bench.source->poll().has_value());
   CHECK(bench.events.empty());
   CHECK(bench.gaps.empty());

@@ -115,7 +115,7 @@ TEST_CASE("the last number with other registers is another event: the tool count
   CHECK(track(tracker, 1963, 9).novelty == Novelty::next);
 }
 
-TEST_CASE("a number that a tool can have counted anew to while nobody looked is doubtful") {
+TEST_CASE("a number that a tool can have counted anew to while it was not read is doubtful") {
   struct Unseen {
     const char* what;
     std::uint16_t last;

@@ -12,7 +12,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// The name alone, or with an argument where the kind can not do without.
+// The name alone, or with an argument where the kind cannot do without.
 std::string plainest(const FaultHelp& help) {
   std::string text(to_text(help.kind));
   if (help.syntax.ends_with("=DURATION")) text += "=20ms";
@@ -98,7 +98,7 @@ TEST_CASE("a number that is not given is the kind's own") {
   }
 }
 
-TEST_CASE("what can not be meant is refused") {
+TEST_CASE("what cannot be meant is refused") {
   struct Row {
     std::string text;
     std::string says;

@@ -1,5 +1,5 @@
-// Profiles that nobody wrote: whatever passes the checks can be simulated, and every verb ends in a
-// result or an error of its own. A trial that fails names its seed; SPINDLE_TRIALS makes more.
+// Profiles that no person wrote: whatever passes the checks can be simulated, and every verb ends
+// in a result or an error of its own. A trial that fails names its seed; SPINDLE_TRIALS makes more.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -336,8 +336,8 @@ class Program {
                .read_line = [] { return std::optional<std::string>(); }},
         .clock = clock_,
         .interrupt = interrupt_.emplace(),
-        .open = nobody,
-        .uninterruptible = {clock_, never_, nobody},
+        .open = unreachable,
+        .uninterruptible = {clock_, never_, unreachable},
         .serve = [](sim::Server&,
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },
@@ -353,8 +353,9 @@ class Program {
   [[nodiscard]] const std::string& errors() const { return errors_; }
 
  private:
-  static Result<std::unique_ptr<link::Transport>> nobody(const link::Endpoint&,
-                                                         const catalogue::LinkFacts&, Duration) {
+  static Result<std::unique_ptr<link::Transport>> unreachable(const link::Endpoint&,
+                                                              const catalogue::LinkFacts&,
+                                                              Duration) {
     return tl::unexpected(Error{.code = Errc::connection_refused});
   }
 

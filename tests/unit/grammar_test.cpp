@@ -264,7 +264,7 @@ TEST_CASE("no flag takes a value") {
   }
 }
 
-TEST_CASE("--yes answers also where nobody may be asked") {
+TEST_CASE("--yes answers also where no user may be asked") {
   CHECK(good("do t x --no-input").user.consent == commands::Consent::no_input);
   CHECK(good("do t x --no-input --yes").user.consent == commands::Consent::given);
   CHECK(good("do t x --yes --no-input").user.consent == commands::Consent::given);

@@ -1,4 +1,4 @@
-// The rules of the house: which layer may see which, where a library is at home, and what nobody
+// The rules of the house: which layer may see which, where a library is at home, and what no source
 // uses. The tables below are the law; the rest enforces it.
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -66,7 +66,7 @@ const std::vector<HomeOfHeader> homes = {
 enum class Counts { anywhere, when_called };
 
 /// Words of code that appear in these files only. A call through an object (`app.exit(…)`) is
-/// somebody else's function of the same name.
+/// a function of the same name elsewhere.
 struct BannedWord {
   std::string_view word;
   Counts counts;

@@ -110,17 +110,17 @@ TEST_CASE("manual: every page is what its source and the program make of it") {
   }
 }
 
-TEST_CASE("manual: every hole is used, and one that nobody fills is told") {
+TEST_CASE("manual: every hole is used, and one that is left empty is told") {
   std::string all;
   for (const std::string& name : pages) all += read(manual / (name + ".in"));
   for (const test::Hole& hole : all_holes()) {
     CAPTURE(hole.name);
     CHECK(all.find("\n@" + hole.name + "@\n") != std::string::npos);
   }
-  const auto page = test::fill_holes("before\n@NOBODY@\n", all_holes());
+  const auto page = test::fill_holes("before\n@UNKNOWN@\n", all_holes());
   REQUIRE_FALSE(page.has_value());
   CHECK(page.error().code == Errc::bad_file);
-  CHECK(page.error().name == "NOBODY");
+  CHECK(page.error().name == "UNKNOWN");
 }
 
 TEST_CASE("manual: a page is filled line by line") {

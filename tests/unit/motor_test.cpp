@@ -5,7 +5,7 @@
 
 #include "spindle/device/command_word.hpp"
 #include "spindle/device/motor_follower.hpp"
-#include "support/blv_bench.hpp"
+#include "support/rig.hpp"
 
 namespace {
 
@@ -17,7 +17,7 @@ using device::CommandWordStopper;
 using device::MotorEvent;
 using device::MotorState;
 using device::StopResult;
-using test::BlvBench;
+using test::BlvRig;
 
 constexpr std::uint16_t command = 0x007D;
 
@@ -53,19 +53,19 @@ TEST_CASE("only products that are run by a command word have a motor") {
 }
 
 TEST_CASE("a look shows the state, the speeds and the codes") {
-  BlvBench bench;
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
-  bench.write(command, 0x32);
-  bench.clock.advance(1s);
+  BlvRig rig;
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
+  rig.write(command, 0x32);
+  rig.clock.advance(1s);
   auto state = motor.monitor()->look(device).value();
   CHECK(state.running);
   CHECK(state.at_speed);
   CHECK(state.feedback_speed == Decimal(-1000));
   CHECK(state.load == Decimal(18));
-  bench.bus->raise_warning(1, 0x21, bench.clock.now());
-  bench.bus->raise_alarm(1, 0x30, bench.clock.now());
-  bench.clock.advance(1s);
+  rig.tool->raise_warning(1, 0x21, rig.clock.now());
+  rig.tool->raise_alarm(1, 0x30, rig.clock.now());
+  rig.clock.advance(1s);
   state = motor.monitor()->look(device).value();
   CHECK_FALSE(state.running);
   CHECK(state.alarm == 0x30);
@@ -93,19 +93,19 @@ TEST_CASE("a motor is stopped by the word of its input mode") {
   };
   for (const Stop& stop : stops) {
     CAPTURE(stop.word);
-    BlvBench bench;
-    if (stop.input_mode == 1) bench.configure(0x1040, 1);
-    bench.write(command, stop.word);
-    bench.clock.advance(1s);
-    REQUIRE(bench.moves());
-    auto device = bench.open().value();
-    const CommandWord motor = CommandWord::of(bench.profile).value();
+    BlvRig rig;
+    if (stop.input_mode == 1) rig.configure(0x1040, 1);
+    rig.write(command, stop.word);
+    rig.clock.advance(1s);
+    REQUIRE(rig.moves());
+    auto device = rig.open();
+    const CommandWord motor = CommandWord::of(rig.profile).value();
     CommandWordStopper stopper(motor, stop.how);
     stopper.observe(device);
-    CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+    CHECK(stopper.stop(device, rig.clock) == StopResult::confirmed);
     if (stop.how == StopMode::decelerate) CHECK(stopper.stopping() == 500ms);
-    CHECK(bench.read(command) == stop.expected);
-    CHECK_FALSE(bench.moves());
+    CHECK(rig.read(command) == stop.expected);
+    CHECK_FALSE(rig.moves());
   }
 }
 
@@ -114,58 +114,58 @@ TEST_CASE("a motor is stopped by the word of its input mode") {
 TEST_CASE("a mode that was written and not configured never turns a stop into a start") {
   for (const std::uint16_t word : {std::uint16_t{0x00}, std::uint16_t{0x2A}, std::uint16_t{0x32}}) {
     CAPTURE(word);
-    BlvBench bench;
-    bench.write(0x1041, 1);
-    bench.write(command, word);
-    bench.clock.advance(1s);
-    auto device = bench.open().value();
-    const CommandWord motor = CommandWord::of(bench.profile).value();
+    BlvRig rig;
+    rig.write(0x1041, 1);
+    rig.write(command, word);
+    rig.clock.advance(1s);
+    auto device = rig.open();
+    const CommandWord motor = CommandWord::of(rig.profile).value();
     CommandWordStopper stopper(motor, StopMode::decelerate);
     stopper.observe(device);
-    auto stopped = stopper.stop(device, bench.clock);
-    if (stopped == StopResult::unconfirmed) stopped = stopper.stop(device, bench.clock);
+    auto stopped = stopper.stop(device, rig.clock);
+    if (stopped == StopResult::unconfirmed) stopped = stopper.stop(device, rig.clock);
     CHECK(stopped == StopResult::confirmed);
-    CHECK((bench.read(command) & 0x18U) == 0);
-    CHECK_FALSE(bench.moves());
+    CHECK((rig.read(command) & 0x18U) == 0);
+    CHECK_FALSE(rig.moves());
   }
 }
 
 TEST_CASE("a gentle stop that does not help becomes a hard one") {
-  BlvBench bench;
-  bench.write(0x0685, 150);  // fifteen seconds, which the stopper is told nothing of
-  bench.write(command, 0x2A);
-  bench.clock.advance(1s);
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+  BlvRig rig;
+  rig.write(0x0685, 150);  // fifteen seconds, which the stopper is told nothing of
+  rig.write(command, 0x2A);
+  rig.clock.advance(1s);
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 300ms);
   stopper.seen_running();
-  CHECK(stopper.stop(device, bench.clock) == StopResult::unconfirmed);
-  CHECK(bench.read(command) == 0x22);
-  CHECK(bench.moves());
-  CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
-  CHECK(bench.read(command) == 0x00);
+  CHECK(stopper.stop(device, rig.clock) == StopResult::unconfirmed);
+  CHECK(rig.read(command) == 0x22);
+  CHECK(rig.moves());
+  CHECK(stopper.stop(device, rig.clock) == StopResult::confirmed);
+  CHECK(rig.read(command) == 0x00);
 }
 
 TEST_CASE("without anything known a motor is stopped by the word that no assignment starts by") {
   for (const StopMode how : {StopMode::decelerate, StopMode::instant}) {
-    BlvBench bench;
-    bench.configure(0x1040, 1);
-    bench.write(command, 0x1A);
-    bench.clock.advance(1s);
-    auto device = bench.open().value();
-    const CommandWord motor = CommandWord::of(bench.profile).value();
+    BlvRig rig;
+    rig.configure(0x1040, 1);
+    rig.write(command, 0x1A);
+    rig.clock.advance(1s);
+    auto device = rig.open();
+    const CommandWord motor = CommandWord::of(rig.profile).value();
     CommandWordStopper stopper(motor, how);
-    CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
-    CHECK(bench.read(command) == 0x00);
+    CHECK(stopper.stop(device, rig.clock) == StopResult::confirmed);
+    CHECK(rig.read(command) == 0x00);
   }
 }
 
 namespace {
 
 /// Puts a function on an input of the simulated driver.
-void assign(BlvBench& bench, unsigned input, std::uint16_t function) {
-  bench.write(static_cast<std::uint16_t>(0x1161 + 2 * input), function);
+void assign(BlvRig& rig, unsigned input, std::uint16_t function) {
+  rig.write(static_cast<std::uint16_t>(0x1161 + 2 * input), function);
 }
 
 struct Assignment {
@@ -191,134 +191,133 @@ TEST_CASE("no assignment of the inputs makes a stop start a motor") {
     for (const StopMode how : {StopMode::decelerate, StopMode::instant}) {
       for (const std::uint16_t word : words) {
         CAPTURE(word);
-        BlvBench bench;
-        bench.write(0x0481, 1000);
-        for (const auto& [input, function] : assignment.inputs) assign(bench, input, function);
-        bench.write(command, word);
-        bench.clock.advance(1s);
-        const bool ran = bench.moves();
-        auto device = bench.open().value();
-        const CommandWord motor = CommandWord::of(bench.profile).value();
+        BlvRig rig;
+        rig.write(0x0481, 1000);
+        for (const auto& [input, function] : assignment.inputs) assign(rig, input, function);
+        rig.write(command, word);
+        rig.clock.advance(1s);
+        const bool ran = rig.moves();
+        auto device = rig.open();
+        const CommandWord motor = CommandWord::of(rig.profile).value();
         CommandWordStopper stopper(motor, how);
         stopper.observe(device);
         REQUIRE(stopper.send(device));
-        bench.clock.advance(1ms);
-        if (!ran) CHECK_FALSE(bench.moves());
-        bench.clock.advance(1s);
-        CHECK_FALSE(bench.moves());
+        rig.clock.advance(1ms);
+        if (!ran) CHECK_FALSE(rig.moves());
+        rig.clock.advance(1s);
+        CHECK_FALSE(rig.moves());
       }
     }
   }
 }
 
 TEST_CASE("a motor is stopped gently by the inputs that its driver has for it") {
-  BlvBench bench;
-  assign(bench, 3, 19);
-  assign(bench, 5, 1);
-  bench.write(command, 0x2A);
-  bench.clock.advance(1s);
-  REQUIRE(bench.moves());
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+  BlvRig rig;
+  assign(rig, 3, 19);
+  assign(rig, 5, 1);
+  rig.write(command, 0x2A);
+  rig.clock.advance(1s);
+  REQUIRE(rig.moves());
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.observe(device);
   REQUIRE(stopper.send(device));
-  CHECK(bench.read(command) == 0x0A);
-  bench.clock.advance(100ms);
-  CHECK(bench.moves());  // it decelerates
-  CHECK(stopper.stop(device, bench.clock) == StopResult::confirmed);
+  CHECK(rig.read(command) == 0x0A);
+  rig.clock.advance(100ms);
+  CHECK(rig.moves());  // it decelerates
+  CHECK(stopper.stop(device, rig.clock) == StopResult::confirmed);
   CHECK(stopper.stopping() == 500ms);
 }
 
-TEST_CASE("a stop does not wait for what can not be read") {
-  BlvBench bench;
-  bench.write(command, 0x2A);
-  bench.clock.advance(1s);
-  bench.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
-  auto device = bench.open().value();
+TEST_CASE("a stop does not wait for what cannot be read") {
+  BlvRig rig;
+  rig.write(command, 0x2A);
+  rig.clock.advance(1s);
+  rig.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
+  auto device = rig.open();
   device.set_retries(0);
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
-  const TimePoint began = bench.clock.now();
+  const TimePoint began = rig.clock.now();
   stopper.observe(device);
-  CHECK(bench.clock.now() - began < 400ms);
-  CHECK(device.session().options().answer_timeout == bench.profile.link.answer);
+  CHECK(rig.clock.now() - began < 400ms);
+  CHECK(device.session().options().answer_timeout == rig.profile.link.answer);
   static_cast<void>(stopper.send(device));
-  CHECK(bench.read(command) == 0x00);
-  CHECK_FALSE(bench.moves());
+  CHECK(rig.read(command) == 0x00);
+  CHECK_FALSE(rig.moves());
 }
 
-TEST_CASE("a guard stops a motor, also when nobody calls it") {
-  BlvBench bench;
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+TEST_CASE("a guard stops a motor, also when it is not called") {
+  BlvRig rig;
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
   stopper.started(0x2A, 0, motor.read_bits(device, 0xFFFF).value(), 500ms);
   const device::GuardedMotion motion{
       .start = [&](device::Device& on) { return motor.command(on, 0x2A); },
       .stop = [&](device::Device& on, Clock& clock) { return stopper.stop(on, clock); },
       .stopping = 500ms};
-  const auto reopen = [&](Duration) { return bench.open(); };
+  const auto reopen = [&](Duration) { return rig.open(); };
   SUBCASE("at the end of a scope") {
-    device::RunGuard guard(device, motion, reopen, bench.clock);
+    device::RunGuard guard(device, motion, reopen, rig.clock);
     REQUIRE(guard.start());
-    bench.clock.advance(1s);
-    CHECK(bench.moves());
+    rig.clock.advance(1s);
+    CHECK(rig.moves());
   }
   SUBCASE("on a line that loses answers") {
-    bench.faults = {{.kind = sim::FaultKind::lost, .every = 4}};
-    device = bench.open().value();
-    device::RunGuard guard(device, motion, reopen, bench.clock);
+    rig.faults = {{.kind = sim::FaultKind::lost, .every = 4}};
+    device = rig.open();
+    device::RunGuard guard(device, motion, reopen, rig.clock);
     static_cast<void>(guard.start());
-    bench.clock.advance(1s);
+    rig.clock.advance(1s);
     CHECK(guard.stop().result == StopResult::confirmed);
   }
   SUBCASE("in an alarm") {
-    device::RunGuard guard(device, motion, reopen, bench.clock);
+    device::RunGuard guard(device, motion, reopen, rig.clock);
     REQUIRE(guard.start());
-    bench.clock.advance(1s);
-    bench.bus->raise_alarm(1, 0x30, bench.clock.now());
+    rig.clock.advance(1s);
+    rig.tool->raise_alarm(1, 0x30, rig.clock.now());
     CHECK(guard.stop().result == StopResult::confirmed);
   }
-  CHECK_FALSE(bench.moves());
-  CHECK((bench.read(command) & 0x18U) == 0);
+  CHECK_FALSE(rig.moves());
+  CHECK((rig.read(command) & 0x18U) == 0);
 }
 
 TEST_CASE("following tells what happens, and why it is over") {
-  BlvBench bench;
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+  BlvRig rig;
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
   std::vector<device::MotorNews> news;
-  device::MotorFollowOptions options{.deadline = bench.clock.now() + 3s, .fastest = Decimal(1000)};
+  device::MotorFollowOptions options{.deadline = rig.clock.now() + 3s, .fastest = Decimal(1000)};
   options.hear = [&](const device::MotorNews& one) { news.push_back(one); };
   SUBCASE("elapsed") {
-    bench.write(command, 0x2A);
+    rig.write(command, 0x2A);
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::elapsed);
     REQUIRE(news.size() == 2);
     CHECK(news[0].event == MotorEvent::started);
     CHECK(news[1].event == MotorEvent::at_speed);
   }
   SUBCASE("alarm") {
-    bench.write(command, 0x2A);
-    bench.clock.at(bench.clock.now() + 1s,
-                   [&] { bench.bus->raise_alarm(1, 0x30, bench.clock.now()); });
+    rig.write(command, 0x2A);
+    rig.clock.at(rig.clock.now() + 1s, [&] { rig.tool->raise_alarm(1, 0x30, rig.clock.now()); });
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::alarm);
     CHECK(news.back().event == MotorEvent::alarm);
   }
-  SUBCASE("stopped by somebody else") {
-    bench.write(command, 0x2A);
-    bench.clock.at(bench.clock.now() + 1s, [&] { bench.write(command, 0); });
+  SUBCASE("stopped by another master") {
+    rig.write(command, 0x2A);
+    rig.clock.at(rig.clock.now() + 1s, [&] { rig.write(command, 0); });
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::stopped);
   }
   SUBCASE("ignored") {
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::ignored);
-    options.deadline = bench.clock.now() + 200ms;
+    options.deadline = rig.clock.now() + 200ms;
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::ignored);
   }
   SUBCASE("over before it could be looked at") {
-    bench.write(command, 0x2A);
-    options.deadline = bench.clock.now();
+    rig.write(command, 0x2A);
+    options.deadline = rig.clock.now();
     const auto followed = follow_motor(device, *motor.monitor(), stopper, options);
     REQUIRE_FALSE(followed);
     CHECK(followed.error().code == Errc::negative);
@@ -326,27 +325,26 @@ TEST_CASE("following tells what happens, and why it is over") {
   }
   SUBCASE("too fast") {
     options.fastest = Decimal(900);
-    bench.write(command, 0x32);
+    rig.write(command, 0x32);
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) ==
           device::MotorEnding::too_fast);
   }
 }
 
 TEST_CASE("a driver that falls silent is hardly waited for beyond the time allowed") {
-  sim::FaultPlan faults;
+  BlvRig rig;
   for (std::uint32_t at = 20; at < 200; ++at) {
-    faults.push_back({.kind = sim::FaultKind::lost, .at = at});
+    rig.faults.push_back({.kind = sim::FaultKind::lost, .at = at});
   }
-  BlvBench bench({}, faults);
-  auto device = bench.open().value();
-  const CommandWord motor = CommandWord::of(bench.profile).value();
+  auto device = rig.open();
+  const CommandWord motor = CommandWord::of(rig.profile).value();
   CommandWordStopper stopper(motor, StopMode::decelerate);
   device.session().set_answer_timeout(60s);  // a patient user
   device.set_retries(9);
-  bench.write(command, 0x2A);
-  const TimePoint began = bench.clock.now();
+  rig.write(command, 0x2A);
+  const TimePoint began = rig.clock.now();
   device::MotorFollowOptions options{.deadline = began + 3s, .fastest = Decimal(1000)};
   const auto followed = follow_motor(device, *motor.monitor(), stopper, options);
-  CHECK(bench.clock.now() - began < 4s);
-  CHECK(bench.moves());
+  CHECK(rig.clock.now() - began < 4s);
+  CHECK(rig.moves());
 }

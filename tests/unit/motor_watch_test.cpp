@@ -3,12 +3,11 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "spindle/device/command_word.hpp"
 #include "spindle/device/watcher.hpp"
-#include "support/blv_bench.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace std::chrono_literals;
@@ -31,36 +30,30 @@ constexpr std::uint16_t run_forward = 0x002A;
 constexpr std::uint16_t status_register = 0x007E;
 constexpr std::uint16_t warning_register = 150;
 
-/// A watch of unit 1, with every request counted by its first register.
-struct Line {
-  Result<Watcher::Link> open() {
-    const device::OpenTransport transport =
-        [this](const link::Endpoint&, const catalogue::LinkFacts&,
-               Duration) -> Result<std::unique_ptr<link::Transport>> {
-      return sim::make_sim_transport(*bench.bus, {++bench.connections}, modbus::Framing::rtu,
-                                     bench.faults, bench.answers, bench.clock, bench.never,
-                                     {.character_time = 1146us});
-    };
-    device::LinkOptions options;
-    options.trace.bytes = [this](link::Direction direction, ByteView bytes) {
-      if (direction == link::Direction::sent && bytes.size() > 3) ++asked[get_u16(bytes, 2)];
-    };
-    auto device = device::Device::open(
-        {.text = "rtu:///dev/line", .medium = link::Medium::serial, .unit = modbus::UnitId{1}},
-        bench.profile, options, transport, bench.clock);
+/// A watch of a motor.
+struct Line : test::BlvRig {
+  Line() {
+    line.character_time = 1146us;
+    plan = {.events = EventMode::none,
+            .motor = *CommandWord::of(profile).value().monitor(),
+            .samples = Samples::all};
+  }
+
+  Result<Watcher::Link> link() {
+    auto device = connect();
     if (!device) return tl::unexpected(device.error());
     return Watcher::Link{std::move(*device), {}};
   }
 
   void watch(Duration time) {
-    const TimePoint end = bench.clock.now() + time;
-    Watcher watcher([this] { return open(); },
+    const TimePoint end = clock.now() + time;
+    Watcher watcher([this] { return link(); },
                     [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
-                    Reconnection::never, bench.clock,
+                    Reconnection::never, clock,
                     [this](const News& one) {
                       if (const auto* motor = std::get_if<MotorNews>(&one)) {
                         events.push_back(motor->event);
-                        heard.push_back(bench.clock.now());
+                        heard.push_back(clock.now());
                         states.push_back(motor->state);
                       }
                       if (std::holds_alternative<ValueNews>(one)) ++samples;
@@ -70,23 +63,21 @@ struct Line {
   }
 
   void name(const std::string& parameter) {
-    plan.values.push_back(bench.profile.find(parameter).value());
+    plan.values.push_back(profile.find(parameter).value());
   }
-  [[nodiscard]] unsigned requests() const {
-    unsigned all = 0;
-    for (const auto& [first, count] : asked) all += count;
-    return all;
+  [[nodiscard]] std::size_t requests() const { return wire.requests.size(); }
+  /// Those that begin with this register.
+  [[nodiscard]] std::size_t asked(std::uint16_t first) const {
+    return static_cast<std::size_t>(std::count_if(
+        wire.requests.begin(), wire.requests.end(),
+        [first](const auto& request) { return get_u16(request.pdu.data, 0) == first; }));
   }
 
-  test::BlvBench bench;
-  WatchPlan plan = {.events = EventMode::none,
-                    .motor = *CommandWord::of(bench.profile).value().monitor(),
-                    .samples = Samples::all};
-  std::map<std::uint16_t, unsigned> asked = {};
+  WatchPlan plan = {};
   std::vector<MotorEvent> events = {};
   std::vector<TimePoint> heard = {};
   std::vector<device::MotorState> states = {};
-  unsigned samples = 0;
+  std::size_t samples = 0;
 };
 
 }  // namespace
@@ -98,8 +89,8 @@ TEST_CASE("one value that is asked for as fast as can be costs a tenth more than
   line.watch(60s);
   REQUIRE(line.samples > 500);
   CHECK(line.requests() <= line.samples * 11 / 10 + 8);
-  CHECK(line.asked.at(status_register) > line.samples / 30);
-  CHECK(line.asked.at(warning_register) > line.samples / 80);
+  CHECK(line.asked(status_register) > line.samples / 30);
+  CHECK(line.asked(warning_register) > line.samples / 80);
 }
 
 TEST_CASE("where there is time, one piece of the motor's state is read between two polls") {
@@ -132,9 +123,9 @@ TEST_CASE("a motor that is run and stopped by others is told soon, with the spee
     Line line;
     line.name("operation.2.speed");
     line.plan.interval = interval;
-    const TimePoint began = line.bench.clock.now();
-    line.bench.clock.at(began + 5s, [&] { line.bench.write(command_register, run_forward); });
-    line.bench.clock.at(began + 10s, [&] { line.bench.write(command_register, 0x0022); });
+    const TimePoint began = line.clock.now();
+    line.clock.at(began + 5s, [&] { line.write(command_register, run_forward); });
+    line.clock.at(began + 10s, [&] { line.write(command_register, 0x0022); });
     line.watch(15s);
     REQUIRE(line.events == std::vector<MotorEvent>{MotorEvent::started, MotorEvent::at_speed,
                                                    MotorEvent::stopped});

@@ -62,7 +62,7 @@ class Reader {
 
 }  // namespace
 
-TEST_CASE("what nobody takes waits, whole and in order, and whoever writes does not") {
+TEST_CASE("what is not taken waits, whole and in order, and the writer does not") {
   Reader reader;
   PatientOut out(reader.streams, reader.interrupt);
   for (const char* text : {"first\n", "second\n", "", "third\n"}) CHECK(reader.streams.out(text));
@@ -95,12 +95,12 @@ TEST_CASE("a signal ends the wait for who takes nothing, and says how much is le
   CHECK(reader.streams.out("one\n"));
   CHECK(reader.streams.out("two\n"));
   reader.interrupt.raise(2);
-  SUBCASE("nobody") {
+  SUBCASE("no reader") {
     const auto left = out.drain();
     REQUIRE(left);
     CHECK(*left == 2);
   }
-  SUBCASE("somebody") {
+  SUBCASE("a reader") {
     reader.bite = 1;
     reader.wake();
     const auto left = out.drain();
@@ -110,23 +110,24 @@ TEST_CASE("a signal ends the wait for who takes nothing, and says how much is le
 }
 
 TEST_CASE(
-    "errors come behind what was written before them, and wait for nobody who takes nothing") {
+    "errors come behind what was written before them, and do not wait for a reader who takes "
+    "nothing") {
   Reader reader;
   PatientOut out(reader.streams, reader.interrupt);
-  SUBCASE("somebody reads") {
+  SUBCASE("a reader takes them") {
     reader.wake();
     CHECK(reader.streams.out("row\n"));
     reader.streams.err("sentence\n");
     CHECK(reader.read() == "row\nsentence\n");
   }
-  SUBCASE("nobody reads") {
+  SUBCASE("no reader takes them") {
     CHECK(reader.streams.out("row\n"));
     reader.streams.err("sentence\n");
     CHECK(reader.read() == "sentence\n");
   }
 }
 
-TEST_CASE("a reader who has gone is told to whoever writes next, and to who waits") {
+TEST_CASE("a reader who has gone is told to the next writer, and to the one that waits") {
   Reader reader;
   PatientOut out(reader.streams, reader.interrupt);
   reader.leave();
@@ -140,7 +141,7 @@ TEST_CASE("a reader who has gone is told to whoever writes next, and to who wait
   CHECK_FALSE(out.is_full());
 }
 
-TEST_CASE("streams that can not write in part write at once, and get back what was theirs") {
+TEST_CASE("streams that cannot write in part write at once, and get back what was theirs") {
   std::string text;
   report::Streams streams{.out = [&](std::string_view piece) -> Result<void> {
                             text += piece;

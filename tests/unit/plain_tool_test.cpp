@@ -2,13 +2,11 @@
 
 #include <doctest/doctest.h>
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "spindle/files/profile_store.hpp"
-#include "spindle/modbus/pdu.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace std::chrono_literals;
@@ -17,32 +15,20 @@ using modbus::RegisterTable;
 
 namespace {
 
-constexpr sim::ConnectionId client{1};
-
 /// A simulated tool of a profile that the program does not ship.
-class Plain {
- public:
-  explicit Plain(const std::string& name, const sim::PlainOptions& options = {}) {
-    const files::ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"});
-    tool = sim::make_plain_tool(store.load(name).value(), store.load_simulation(name).value(),
-                                options);
-  }
+struct Plain : test::PlainRig {
+  explicit Plain(const std::string& name, const sim::PlainOptions& how = {})
+      : Rig(test::product(name), how) {}
 
-  modbus::Pdu ask(const modbus::Pdu& request) {
-    return tool->answer(client, {1}, request, now).value();
-  }
   /// Empty: refused.
   std::optional<Registers> read(RegisterTable table, std::uint16_t first, std::uint16_t count = 1) {
-    const modbus::Pdu response = ask(modbus::read_request(table, {first}, count));
+    const modbus::Pdu response = ask(modbus::read_request(table, {first}, count)).value();
     if (modbus::exception_of(response)) return std::nullopt;
     return modbus::registers_of(response);
   }
   std::optional<std::uint8_t> write(std::uint16_t address, std::uint16_t value) {
-    return modbus::exception_of(ask(modbus::write_request({address}, value)));
+    return modbus::exception_of(ask(modbus::write_request({address}, value)).value());
   }
-
-  TimePoint now = {};
-  std::unique_ptr<sim::PlainTool> tool;
 };
 
 }  // namespace
@@ -50,11 +36,11 @@ class Plain {
 TEST_CASE("a flag is cleared by whatever reads it, and set by the next result") {
   Plain plain("kducer");
   CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
-  plain.tool->happen(EventKind::fastening_ok, plain.now);
+  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
   CHECK(plain.read(RegisterTable::input, 295, 67).has_value());
   CHECK(plain.read(RegisterTable::input, 294) == Registers{1});
   CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
-  plain.tool->happen(EventKind::fastening_ok, plain.now);
+  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
   CHECK(plain.read(RegisterTable::input, 290, 10) == std::nullopt);
   CHECK(plain.read(RegisterTable::input, 294, 4)->front() == 1);
   CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
@@ -65,7 +51,7 @@ TEST_CASE("what events say is given in turn, by kind") {
   std::vector<std::uint16_t> torques;
   for (const EventKind kind : {EventKind::fastening_ok, EventKind::fastening_ok,
                                EventKind::fastening_ng, EventKind::fastening_ok}) {
-    plain.tool->happen(kind, plain.now);
+    plain.tool->happen(kind, plain.clock.now());
     torques.push_back(plain.read(RegisterTable::input, 318)->front());
   }
   CHECK(torques == std::vector<std::uint16_t>{152, 149, 88, 152});
@@ -74,11 +60,11 @@ TEST_CASE("what events say is given in turn, by kind") {
 
 TEST_CASE("results come by themselves, and every so many are NG") {
   Plain plain("countermatic", {.rundown_every = 2s, .ng_every = 2});
-  plain.tool->advance(plain.now);
-  plain.now += 6s;
+  plain.tool->advance(plain.clock.now());
+  plain.clock.advance(6s);
   CHECK(plain.read(RegisterTable::holding, 1000, 2) == Registers{3, 1});
   CHECK(plain.tool->take_pushes().empty());
-  plain.now += 2s;
+  plain.clock.advance(2s);
   CHECK(plain.read(RegisterTable::holding, 1000, 5) == Registers{4, 2, 0xFFFE, 0xEE8F, 7});
 }
 
@@ -91,13 +77,13 @@ TEST_CASE("parameters are stored, and what does not exist or is too long is refu
   CHECK(plain.write(1000, 1) == 2);
   CHECK(plain.read(RegisterTable::holding, 1000, 21) == std::nullopt);
   CHECK(plain.read(RegisterTable::input, 1000) == std::nullopt);
-  CHECK(modbus::exception_of(plain.ask(modbus::report_server_id_request())) == 1);
+  CHECK(modbus::exception_of(plain.ask(modbus::report_server_id_request()).value()) == 1);
 }
 
 TEST_CASE("an alarm shows, and the action that resets it shows, too") {
   Plain plain("countermatic", {.alarms = {{.code = 7, .after = 1s}}});
-  plain.tool->advance(plain.now);
-  plain.now += 1s;
+  plain.tool->advance(plain.clock.now());
+  plain.clock.advance(1s);
   CHECK(plain.read(RegisterTable::holding, 20) == Registers{7});
   CHECK(plain.read(RegisterTable::holding, 1001) == Registers{3});
   CHECK(plain.write(30, 1) == std::nullopt);
@@ -114,9 +100,9 @@ TEST_CASE("faults of a tool are felt") {
 
 TEST_CASE("a reboot counts from 0, and keeps what is stored") {
   Plain plain("countermatic");
-  plain.tool->happen(EventKind::fastening_ok, plain.now);
+  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
   plain.write(10, 450);
-  plain.tool->reboot(plain.now);
+  plain.tool->reboot(plain.clock.now());
   CHECK(plain.read(RegisterTable::holding, 1000) == Registers{0});
   CHECK(plain.read(RegisterTable::holding, 10) == Registers{450});
 }

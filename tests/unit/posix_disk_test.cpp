@@ -77,7 +77,7 @@ TEST_CASE("a file is replaced only when that is allowed, and keeps its rights") 
   CHECK(folder.count() == 1);
 }
 
-TEST_CASE("what is for nobody else can not be read by others, also in place of what they could") {
+TEST_CASE("what is private cannot be read by others, also in place of what they could") {
   const Folder folder;
   const Disk disk = posix::local_disk();
   const std::string path = folder / "a.yaml";
@@ -136,7 +136,7 @@ TEST_CASE("a link leads to the file that is replaced") {
   CHECK(text_of(folder / "real") == "two");
 }
 
-TEST_CASE("what can not be read says why") {
+TEST_CASE("what cannot be read says why") {
   const Folder folder;
   const Disk disk = posix::local_disk();
   CHECK(disk.read(folder / "none").error().message == "no such file");
@@ -222,7 +222,8 @@ TEST_CASE("what may not be looked at is not taken for absent") {
   REQUIRE(disk.write(folder / "there", "text", Overwrite::refuse, Privacy::usual));
   CHECK_FALSE(disk.absent(folder / "there"));
   CHECK(disk.absent(folder / "there/below"));
-  // A name that the system refuses to look up; whoever runs the tests may look into every folder.
+  // A name that the system refuses to look up; the user who runs the tests may look into every
+  // folder.
   CHECK_FALSE(disk.absent(folder / std::string(300, 'x')));
 }
 
@@ -237,6 +238,6 @@ TEST_CASE("folders are made with those above them, for whom it may concern") {
   CHECK_FALSE(disk.make_folders(folder / "file/below", Privacy::own));
 }
 
-TEST_CASE("whoever runs the program has a name") {
+TEST_CASE("the user who runs the program has a name") {
   CHECK_FALSE(posix::local_disk().user().empty());
 }

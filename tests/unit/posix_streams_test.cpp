@@ -224,7 +224,7 @@ TEST_CASE("streams: messages go to standard error, and a closed one is no harm")
   Pipe broken;
   broken.reader.close();
   CHECK(finish(start(STDERR_FILENO, broken.writer.number(), [] {
-          posix::write_err("nobody hears this");
+          posix::write_err("this is not heard");
           return 0;
         })) == 0);
 }

@@ -364,13 +364,13 @@ TEST_CASE("scalar keys override one by one; entries of the same name replace, ot
 TEST_CASE("a base beside the file comes before that of the store") {
   const Folder folder;
   folder.write("doga-common.yaml",
-               "format: 1\nid: doga-common\ntitle: Mine\nabstract: true\nmaker: Nobody\n"
+               "format: 1\nid: doga-common\ntitle: Mine\nabstract: true\nmaker: Other\n"
                "link: {framing: rtu}\n");
   const std::string path =
       folder.write("mine.yaml", "format: 1\nid: mine\ntitle: Mine\nextends: doga-common\n");
   const auto own = shipped().load(path);
   REQUIRE_MESSAGE(own.has_value(), describe(own.error()));
-  CHECK(own->maker == "Nobody");
+  CHECK(own->maker == "Other");
   CHECK(own->link.framing == modbus::Framing::rtu);
 }
 

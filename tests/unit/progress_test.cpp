@@ -162,7 +162,7 @@ TEST_CASE("output that goes elsewhere leaves the line alone") {
   CHECK(terminal.writes == std::vector<std::string>{wipe + "working", "out:a record\n"});
 }
 
-TEST_CASE("it says nothing where there is no terminal, where nobody wants it, and never waits") {
+TEST_CASE("it says nothing where there is no terminal, where it is not wanted, and never waits") {
   test::FakeClock clock;
   Terminal elsewhere;
   elsewhere.streams.err_is_terminal = false;

@@ -126,7 +126,7 @@ TEST_CASE("recording: lines that stand for themselves stay what they are") {
   CHECK(screen.shown == "saved\n");
 }
 
-TEST_CASE("recording: nothing is shown any more where nobody reads") {
+TEST_CASE("recording: nothing is shown any more where the reader is gone") {
   RecordingRenderer one;
   RecordingRenderer two;
   tell_all(one, "one");

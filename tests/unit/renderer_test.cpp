@@ -504,7 +504,7 @@ TEST_CASE("an error without a hint says null") {
   }
 }
 
-TEST_CASE("a closed pipe is handed on by whoever writes") {
+TEST_CASE("a closed pipe is handed on by every function that writes") {
   for (const Format format : {Format::table, Format::json, Format::csv}) {
     Caught caught;
     caught.streams.out = [](std::string_view) -> Result<void> {

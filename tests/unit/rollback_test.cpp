@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "spindle/modbus/pdu.hpp"
-#include "support/guarded_tool.hpp"
+#include "support/rig.hpp"
 
 namespace {
 
@@ -18,19 +18,19 @@ using device::PutBack;
 using device::PutBackReport;
 using device::Rollback;
 using device::TriedWrite;
+using test::BmRig;
 using test::Fate;
-using test::GuardedTool;
 
 /// A tool on which p301 and p302 were written, and the third write went wrong.
 struct Bench {
-  explicit Bench(GuardedTool& guarded) : tool(guarded), device(guarded.open()) {
+  explicit Bench(BmRig& of) : rig(of), device(of.open()) {
     for (std::uint16_t number = 301; number <= 303; ++number) {
-      writes.push_back({tool.profile.find("p" + std::to_string(number)).value(),
+      writes.push_back({rig.profile.find("p" + std::to_string(number)).value(),
                         {Decimal(0), {}},
                         {Decimal(50), {}}});
     }
-    tool.write_past(301, 50);
-    tool.write_past(302, 50);
+    rig.write(301, 50);
+    rig.write(302, 50);
   }
 
   std::vector<PutBackReport> run() { return rollback.run(writes); }
@@ -40,12 +40,10 @@ struct Bench {
     return all;
   }
   std::vector<std::uint16_t> values() {
-    const auto answer = tool.bm->answer(
-        {99}, {}, modbus::read_request(modbus::RegisterTable::holding, {301}, 3), tool.clock.now());
-    return modbus::registers_of(answer.value());
+    return rig.registers(modbus::RegisterTable::holding, 301, 3);
   }
 
-  GuardedTool& tool;
+  BmRig& rig;
   Device device;
   std::vector<TriedWrite> writes = {};
   unsigned reopened = 0;
@@ -53,29 +51,26 @@ struct Bench {
       device,
       [this](Duration) {
         ++reopened;
-        return tool.open(tool.calm, tool.never);
+        return rig.connect_uninterruptibly();
       },
-      tool.calm);
+      rig.uninterruptible);
 };
 
 const std::vector<std::uint16_t> zeros = {0, 0, 0};
 const std::vector<PutBack> all_put_back = {PutBack::kept, PutBack::done, PutBack::done};
 
 /// Writes of one register meet this fate, so often.
-std::function<Fate(const modbus::Pdu&)> fate_of_writes(std::uint16_t address, Fate fate,
-                                                       unsigned times = 1'000'000) {
-  return [=, left = times](const modbus::Pdu& request) mutable {
+auto fate_of_writes(std::uint16_t address, Fate fate, unsigned times = 1'000'000) {
+  return test::next_meet(fate, times, [address](const modbus::Pdu& request) {
     const auto parsed = modbus::parse_request(request);
     const auto* write = parsed ? std::get_if<modbus::WriteSingleRequest>(&*parsed) : nullptr;
-    if (write == nullptr || write->address.value != address || left == 0) return Fate::passes;
-    --left;
-    return fate;
-  };
+    return write != nullptr && write->address.value == address;
+  });
 }
 
 TEST_CASE("what was written is put back, the last first, and what was not is left alone") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   const auto reports = bench.run();
   REQUIRE(reports.size() == 3);
   CHECK(reports[0].write.parameter.name == "p303");
@@ -83,14 +78,14 @@ TEST_CASE("what was written is put back, the last first, and what was not is lef
   CHECK(reports[1].found->to_string() == "50");
   CHECK(reports[1].now->to_string() == "0");
   CHECK(bench.values() == zeros);
-  CHECK(tool.writes == std::vector<GuardedTool::Write>{{302, 0}, {301, 0}});
+  CHECK(rig.wire.writes() == std::vector<test::Wire::Write>{{302, 0}, {301, 0}});
   CHECK(bench.reopened == 0);
 }
 
 TEST_CASE("an interrupt does not end it") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.interrupt.raise(2);
+  BmRig rig;
+  Bench bench(rig);
+  rig.interrupt.raise(2);
   CHECK(bench.results() == all_put_back);
   CHECK(bench.values() == zeros);
 }
@@ -99,19 +94,19 @@ TEST_CASE("a lost link is opened anew") {
   for (const Fate fate :
        {Fate::closes_heard, Fate::closes_unheard, Fate::has_no_answer, Fate::is_lost}) {
     CAPTURE(static_cast<int>(fate));
-    GuardedTool tool;
-    Bench bench(tool);
-    tool.fate = fate_of_writes(302, fate, 3);
+    BmRig rig;
+    Bench bench(rig);
+    rig.wire.fate = fate_of_writes(302, fate, 3);
     CHECK(bench.results() == all_put_back);
     CHECK(bench.values() == zeros);
-    CHECK(tool.most_open_connections == 1);
+    CHECK(rig.wire.most_open_connections == 1);
   }
 }
 
 TEST_CASE("a tool that refuses its old value is told with what it holds") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.fate = fate_of_writes(302, Fate::is_refused);
+  BmRig rig;
+  Bench bench(rig);
+  rig.wire.fate = fate_of_writes(302, Fate::is_refused);
   const auto reports = bench.run();
   CHECK(reports[1].result == PutBack::refused);
   CHECK(reports[1].now->to_string() == "50");
@@ -121,20 +116,20 @@ TEST_CASE("a tool that refuses its old value is told with what it holds") {
 }
 
 TEST_CASE("a tool that only echoes its old value is told as well") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.fate = fate_of_writes(302, Fate::is_only_echoed);
+  BmRig rig;
+  Bench bench(rig);
+  rig.wire.fate = fate_of_writes(302, Fate::is_only_echoed);
   const auto reports = bench.run();
   CHECK(reports[1].result == PutBack::refused);
   CHECK(reports[1].now->to_string() == "50");
 }
 
 TEST_CASE("a tool that is gone is given up after about ten seconds, and nothing is claimed") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.reachable = false;
-  tool.fate = [](const modbus::Pdu&) { return Fate::closes_unheard; };
-  const TimePoint began = tool.clock.now();
+  BmRig rig;
+  Bench bench(rig);
+  rig.wire.unreachable_until = TimePoint::max();
+  rig.wire.fate = [](const modbus::Pdu&) { return Fate::closes_unheard; };
+  const TimePoint began = rig.clock.now();
   const auto reports = bench.run();
   REQUIRE(reports.size() == 3);
   for (const PutBackReport& report : reports) {
@@ -142,15 +137,15 @@ TEST_CASE("a tool that is gone is given up after about ten seconds, and nothing 
     CHECK_FALSE(report.now.has_value());
     CHECK_FALSE(report.trouble.empty());
   }
-  const Duration took = tool.clock.now() - began;
+  const Duration took = rig.clock.now() - began;
   CHECK(took > 9s);
   CHECK(took < 15s);
   CHECK_FALSE(bench.rollback.read_again({bench.writes[0].parameter}).has_value());
 }
 
 TEST_CASE("everything can be read once more afterwards") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   bench.run();
   const auto readings = bench.rollback.read_again({bench.writes[0].parameter});
   REQUIRE(readings.has_value());

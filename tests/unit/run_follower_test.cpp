@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "support/guarded_tool.hpp"
+#include "support/rig.hpp"
 
 namespace {
 
@@ -17,8 +17,8 @@ using device::FollowedRun;
 using device::FollowOptions;
 using device::RunEnding;
 using device::RunFollower;
+using test::BmRig;
 using test::Fate;
-using test::GuardedTool;
 
 constexpr std::size_t number_at = 0;
 constexpr std::size_t error_at = 10;
@@ -27,40 +27,48 @@ constexpr std::uint16_t first_number = 1961;
 
 /// A tool that a follower has prepared for a start.
 struct Bench {
-  explicit Bench(GuardedTool& guarded) : tool(guarded), device(guarded.open()) {
-    REQUIRE(follower.prepare());
-  }
+  explicit Bench(BmRig& of) : rig(of), device(of.open()) { REQUIRE(follower.prepare()); }
   void start() { REQUIRE(device.send(action, 1)); }
   Result<FollowedRun> follow(std::optional<Duration> limit = std::nullopt) {
     FollowOptions options;
-    if (limit) options.deadline = tool.clock.now() + *limit;
-    began = tool.clock.now();
+    if (limit) options.deadline = rig.clock.now() + *limit;
+    began = rig.clock.now();
     return follower.follow(options);
   }
-  [[nodiscard]] Duration took() const { return tool.clock.now() - began; }
+  [[nodiscard]] Duration took() const { return rig.clock.now() - began; }
   /// Something happens to the tool so long after now.
   void after(Duration duration, std::function<void()> what) {
-    tool.clock.at(tool.clock.now() + duration, std::move(what));
+    rig.clock.at(rig.clock.now() + duration, std::move(what));
   }
 
-  GuardedTool& tool;
+  BmRig& rig;
   Device device;
-  catalogue::Action action = tool.start_action();
+  catalogue::Action action = rig.start_action();
   std::vector<device::EventNews> heard = {};
-  RunFollower follower = RunFollower(device, action, tool.clock,
-                                     [this](const auto& event) { heard.push_back(event); });
+  RunFollower follower =
+      RunFollower(device, action, rig.clock, [this](const auto& event) { heard.push_back(event); });
   TimePoint began = {};
 };
 
+/// Events without end that are no results, as changes of direction, numbered by this step.
+std::function<modbus::Pdu()> flood(std::uint16_t step) {
+  return [number = first_number, step]() mutable {
+    Registers block(14, 0);
+    block[number_at] = number = static_cast<std::uint16_t>(number + step);
+    block[status_at] = 3;
+    return modbus::read_response(modbus::RegisterTable::input, block);
+  };
+}
+
 /// A run with this preset takes 19 seconds.
-void slow_down(GuardedTool& tool) {
-  tool.write_past(11, 9000);
-  tool.write_past(13, 9000);
+void slow_down(BmRig& rig) {
+  rig.write(11, 9000);
+  rig.write(13, 9000);
 }
 
 TEST_CASE("the result of a run is its event") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -70,15 +78,15 @@ TEST_CASE("the result of a run is its event") {
   CHECK(run->event->block[status_at] == 1);
   CHECK(run->event->block[number_at] == first_number + 1);
   CHECK(bench.took() < 1500ms);
-  CHECK(tool.starts() == 1);
-  CHECK(tool.stops() == 0);  // a follower starts and stops nothing
+  CHECK(rig.starts() == 1);
+  CHECK(rig.stops() == 0);  // a follower starts and stops nothing
 }
 
 TEST_CASE("the result of a tool that sends nothing unasked is fetched when its run has ended") {
-  GuardedTool tool;
-  tool.profile.events->model = catalogue::EventModel::counter;
-  tool.profile.events->arm.reset();
-  Bench bench(tool);
+  BmRig rig;
+  rig.profile.events->model = catalogue::EventModel::counter;
+  rig.profile.events->arm.reset();
+  Bench bench(rig);
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -89,32 +97,31 @@ TEST_CASE("the result of a tool that sends nothing unasked is fetched when its r
 }
 
 TEST_CASE("a run whose result could not be told from others is not begun") {
-  GuardedTool tool;
-  tool.profile.events->model = catalogue::EventModel::flag;
-  tool.profile.events->number = {};
-  Device device = tool.open();
-  const catalogue::Action start = tool.start_action();
-  const auto prepared = RunFollower(device, start, tool.clock).prepare();
+  BmRig rig;
+  rig.profile.events->model = catalogue::EventModel::flag;
+  rig.profile.events->number = {};
+  Device device = rig.open();
+  const catalogue::Action start = rig.start_action();
+  const auto prepared = RunFollower(device, start, rig.clock).prepare();
   REQUIRE(!prepared);
   CHECK(prepared.error().code == Errc::usage);
 }
 
 TEST_CASE("every event of a run is heard when it comes, and once") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   std::vector<Duration> times;
   FollowOptions options;
-  const TimePoint began = tool.clock.now();
+  const TimePoint began = rig.clock.now();
   options.progress = [&](Duration elapsed) -> Result<void> {
     if (bench.heard.size() > times.size()) times.push_back(elapsed);
     return {};
   };
   options.deadline = began + 2s;
-  tool.pushed_step = 1;
-  bench.after(500ms, [&] { tool.floods = true; });
-  bench.after(505ms, [&] { tool.floods = false; });
+  bench.after(500ms, [&] { rig.wire.flood = flood(1); });
+  bench.after(505ms, [&] { rig.wire.flood = {}; });
   const auto run = bench.follower.follow(options);
   REQUIRE(run);
   CHECK(run->ending == RunEnding::elapsed);
@@ -127,11 +134,11 @@ TEST_CASE("every event of a run is heard when it comes, and once") {
   CHECK(times.front() < 800ms);
 }
 
-TEST_CASE("a run that somebody else ends too early is NG") {
-  GuardedTool tool;
-  Bench bench(tool);
+TEST_CASE("a run that another program ends too early is NG") {
+  BmRig rig;
+  Bench bench(rig);
   bench.start();
-  bench.after(600ms, [&] { tool.write_past(4003, 0); });
+  bench.after(600ms, [&] { rig.write(4003, 0); });
   const auto run = bench.follow();
   REQUIRE(run);
   REQUIRE(run->event);
@@ -141,10 +148,10 @@ TEST_CASE("a run that somebody else ends too early is NG") {
 }
 
 TEST_CASE("an alarm ends a run as its result") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   bench.start();
-  bench.after(600ms, [&] { tool.bm->raise_alarm(118, tool.clock.now()); });
+  bench.after(600ms, [&] { rig.tool->raise_alarm(118, rig.clock.now()); });
   const auto run = bench.follow();
   REQUIRE(run);
   REQUIRE(run->event);
@@ -153,10 +160,10 @@ TEST_CASE("an alarm ends a run as its result") {
 }
 
 TEST_CASE("events of before are no results") {
-  GuardedTool tool;
-  tool.write_past(4003, 1);  // a run of somebody else, up to its end
-  tool.clock.advance(3s);
-  Bench bench(tool);
+  BmRig rig;
+  rig.write(4003, 1);  // a run of another program, up to its end
+  rig.clock.advance(3s);
+  Bench bench(rig);
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -166,8 +173,9 @@ TEST_CASE("events of before are no results") {
 }
 
 TEST_CASE("an event that is pushed again is no second result") {
-  GuardedTool tool({}, {{.kind = sim::FaultKind::push_before}});
-  Bench bench(tool);  // now every answer comes behind the old event
+  BmRig rig;
+  rig.faults = {{.kind = sim::FaultKind::push_before}};
+  Bench bench(rig);  // now every answer comes behind the old event
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -176,9 +184,9 @@ TEST_CASE("an event that is pushed again is no second result") {
 }
 
 TEST_CASE("a result whose push was lost is fetched") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.write_past(4002, 0);
+  BmRig rig;
+  Bench bench(rig);
+  rig.write(4002, 0);
   REQUIRE(bench.device.switch_events(device::EventOutput::off));
   bench.start();
   const auto run = bench.follow();
@@ -190,9 +198,9 @@ TEST_CASE("a result whose push was lost is fetched") {
 }
 
 TEST_CASE("loosening ends neither well nor badly, and still has its event") {
-  GuardedTool tool;
-  tool.write_past(4005, 1);
-  Bench bench(tool);
+  BmRig rig;
+  rig.write(4005, 1);
+  Bench bench(rig);
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -203,10 +211,10 @@ TEST_CASE("loosening ends neither well nor badly, and still has its event") {
 }
 
 TEST_CASE("a tool that is switched off and on has ended without a result") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   bench.start();
-  bench.after(600ms, [&] { tool.bm->reboot(tool.clock.now()); });
+  bench.after(600ms, [&] { rig.tool->reboot(rig.clock.now()); });
   const auto run = bench.follow();
   REQUIRE(run);
   CHECK(run->ending == RunEnding::ended);
@@ -214,9 +222,9 @@ TEST_CASE("a tool that is switched off and on has ended without a result") {
 }
 
 TEST_CASE("a start that is only echoed is known after the answer time") {
-  GuardedTool tool;
-  tool.write_past(4001, 1);  // locked
-  Bench bench(tool);
+  BmRig rig;
+  rig.write(4001, 1);  // locked
+  Bench bench(rig);
   bench.start();
   const auto run = bench.follow();
   REQUIRE(run);
@@ -226,28 +234,28 @@ TEST_CASE("a start that is only echoed is known after the answer time") {
 }
 
 TEST_CASE("the time allowed is kept") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   SUBCASE("while all is well") {}
   SUBCASE("when the tool falls silent, however patient the user is") {
-    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_lost; }; });
+    bench.after(500ms, [&] { rig.wire.fate = [](const auto&) { return Fate::is_lost; }; });
   }
   const auto run = bench.follow(700ms);
   REQUIRE(run);
   CHECK(run->ending == RunEnding::elapsed);
   CHECK(bench.took() >= 700ms);
   CHECK(bench.took() < 750ms);
-  CHECK(tool.runs());
+  CHECK(rig.runs());
 }
 
 TEST_CASE("the time allowed is kept however much the tool sends") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
-  tool.floods = true;
+  rig.wire.flood = flood(0);
   const auto run = bench.follow(400ms);
   REQUIRE(run);
   CHECK(run->ending == RunEnding::elapsed);
@@ -255,21 +263,21 @@ TEST_CASE("the time allowed is kept however much the tool sends") {
   CHECK(bench.took() < 450ms);
   // So is that for the event of the stop, which is asked for in the end.
   REQUIRE(bench.device.send_stop(bench.action));
-  const TimePoint asked = tool.clock.now();
+  const TimePoint asked = rig.clock.now();
   const auto late = bench.follower.late_event();
-  CHECK(tool.clock.now() - asked < 600ms);
+  CHECK(rig.clock.now() - asked < 600ms);
   REQUIRE(late);
   REQUIRE(*late);
 }
 
 TEST_CASE("what a tool remembers across its restart is no result of a run") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   bench.start();
   // Its counter begins anew: the OK with a smaller number may be of any run.
   bench.after(600ms, [&] {
-    tool.bm->reboot(tool.clock.now());
-    tool.write_past(4003, 1);
+    rig.tool->reboot(rig.clock.now());
+    rig.write(4003, 1);
   });
   const auto run = bench.follow(5s);
   REQUIRE(run);
@@ -277,13 +285,13 @@ TEST_CASE("what a tool remembers across its restart is no result of a run") {
 }
 
 TEST_CASE("a patient user's tool that falls silent does not run on for minutes") {
-  GuardedTool tool;
-  tool.answer_timeout = 60s;
-  tool.retries = 100;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  rig.options.answer_timeout = 60s;
+  rig.options.retries = 100;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
-  bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_lost; }; });
+  bench.after(500ms, [&] { rig.wire.fate = [](const auto&) { return Fate::is_lost; }; });
   const auto run = bench.follow(2s);
   REQUIRE(run);
   CHECK(run->ending == RunEnding::elapsed);
@@ -291,13 +299,13 @@ TEST_CASE("a patient user's tool that falls silent does not run on for minutes")
 }
 
 TEST_CASE("one lost answer does not end a run, and silence does") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   const auto lose = [&](unsigned times) {
-    bench.after(500ms, [&tool, times] {
-      tool.fate = [left = times](const auto&) mutable {
+    bench.after(500ms, [&rig, times] {
+      rig.wire.fate = [left = times](const auto&) mutable {
         return left > 0 && left-- > 0 ? Fate::is_lost : Fate::passes;
       };
     });
@@ -318,21 +326,21 @@ TEST_CASE("one lost answer does not end a run, and silence does") {
 }
 
 TEST_CASE("what ends the following early") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   FollowOptions options;
   Errc expected = Errc::internal;
   SUBCASE("an interrupt") {
-    bench.after(500ms, [&] { tool.interrupt.raise(2); });
+    bench.after(500ms, [&] { rig.interrupt.raise(2); });
     expected = Errc::interrupted;
   }
   SUBCASE("a lost link") {
-    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::closes_unheard; }; });
+    bench.after(500ms, [&] { rig.wire.fate = [](const auto&) { return Fate::closes_unheard; }; });
     expected = Errc::closed;
   }
-  SUBCASE("nobody who reads") {
+  SUBCASE("a reader that is gone") {
     options.progress = [](Duration elapsed) -> Result<void> {
       if (elapsed < 500ms) return {};
       return tl::unexpected(Error{.code = Errc::closed_pipe});
@@ -340,20 +348,20 @@ TEST_CASE("what ends the following early") {
     expected = Errc::closed_pipe;
   }
   SUBCASE("a refused reading") {
-    bench.after(500ms, [&] { tool.fate = [](const auto&) { return Fate::is_refused; }; });
+    bench.after(500ms, [&] { rig.wire.fate = [](const auto&) { return Fate::is_refused; }; });
     expected = Errc::exception_response;
   }
-  const TimePoint began = tool.clock.now();
+  const TimePoint began = rig.clock.now();
   const auto run = bench.follower.follow(options);
   REQUIRE_FALSE(run);
   CHECK(run.error().code == expected);
-  CHECK(tool.clock.now() - began < 750ms);
+  CHECK(rig.clock.now() - began < 750ms);
 }
 
 TEST_CASE("a long run: the output stays armed, progress is told, and no read looks like an event") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   unsigned told = 0;
   FollowOptions options;
@@ -367,19 +375,19 @@ TEST_CASE("a long run: the output stays armed, progress is told, and no read loo
   REQUIRE(run->event);
   CHECK(run->event->source == EventOrigin::push);
   CHECK(told > 100);
-  CHECK(tool.writes_of(GuardedTool::arm, 1) >= 4);
-  CHECK(tool.starts() == 1);
-  for (const modbus::Pdu& request : tool.requests) {
+  CHECK(rig.writes_of(BmRig::arm_register, 1) >= 4);
+  CHECK(rig.starts() == 1);
+  for (const auto& [at, request] : rig.wire.requests) {
     CHECK_FALSE((request.function == 4 && request.data.back() == 14));
   }
   bench.follower.leave();
-  CHECK(tool.writes.back() == GuardedTool::Write(GuardedTool::arm, 0));
+  CHECK(rig.wire.writes().back() == test::Wire::Write(BmRig::arm_register, 0));
 }
 
 TEST_CASE("the event that a stop causes is found") {
-  GuardedTool tool;
-  slow_down(tool);
-  Bench bench(tool);
+  BmRig rig;
+  slow_down(rig);
+  Bench bench(rig);
   bench.start();
   REQUIRE(bench.follow(500ms)->ending == RunEnding::elapsed);
   SUBCASE("by listening") {}

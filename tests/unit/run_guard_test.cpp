@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "support/guarded_tool.hpp"
+#include "support/rig.hpp"
 
 namespace {
 
@@ -17,80 +17,86 @@ using device::Device;
 using device::RunGuard;
 using device::StopReport;
 using device::StopResult;
+using test::BmRig;
 using test::Fate;
-using test::fate_of;
-using test::GuardedTool;
+
+/// The fate of writes of one value to the start register, so often; all else passes.
+auto fate_of(std::uint16_t value, Fate fate, unsigned times = 1'000'000) {
+  return test::next_meet(fate, times, [value](const modbus::Pdu& request) {
+    return request == modbus::write_request({BmRig::start_register}, value);
+  });
+}
 
 /// A tool, a connection to it and a guard, as a command has them.
 struct Bench {
-  explicit Bench(GuardedTool& guarded) : tool(guarded), device(guarded.open()) {}
+  explicit Bench(BmRig& of) : rig(of), device(of.open()) {}
 
   RunGuard::Reopen reopen() {
     return [this](Duration patience) {
       patiences.push_back(patience);
-      return tool.open(tool.calm, tool.never);
+      return rig.connect_uninterruptibly();
     };
   }
-  void wait(Duration duration) { tool.clock.advance(duration); }
+  void wait(Duration duration) { rig.clock.advance(duration); }
 
-  GuardedTool& tool;
+  BmRig& rig;
   Device device;
-  catalogue::Action start = tool.start_action();
+  catalogue::Action start = rig.start_action();
   std::vector<Duration> patiences = {};
-  RunGuard guard = RunGuard(device, start, reopen(), tool.calm);
+  RunGuard guard = RunGuard(device, start, reopen(), rig.uninterruptible);
 };
 
 TEST_CASE("a started tool is stopped, and the tool says so") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   REQUIRE(bench.guard.start());
   bench.wait(300ms);
-  REQUIRE(tool.runs());
+  REQUIRE(rig.runs());
   const StopReport report = bench.guard.stop();
   CHECK(report.result == StopResult::confirmed);
   CHECK(report.attempts == 1);
   CHECK(report.tried < 10ms);
-  CHECK_FALSE(tool.runs());
-  CHECK(tool.writes == std::vector<GuardedTool::Write>{{4003, 1}, {4003, 0}});
+  CHECK_FALSE(rig.runs());
+  CHECK(rig.wire.writes() == std::vector<test::Wire::Write>{{4003, 1}, {4003, 0}});
 }
 
 TEST_CASE("a second stop sends nothing and reports the same") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   REQUIRE(bench.guard.start());
   const StopReport first = bench.guard.stop();
   const StopReport second = bench.guard.stop();
   CHECK(second.result == first.result);
   CHECK(second.attempts == first.attempts);
-  CHECK(tool.stops() == 1);
+  CHECK(rig.stops() == 1);
 }
 
-TEST_CASE("the destructor stops what nobody stopped") {
-  GuardedTool tool;
+TEST_CASE("the destructor stops what was not stopped") {
+  BmRig rig;
   SUBCASE("at the end of a scope") {
-    { CHECK(Bench(tool).guard.start()); }
+    { CHECK(Bench(rig).guard.start()); }
   }
   SUBCASE("when an exception passes") {
     const auto fall = [&] {
-      Bench bench(tool);
+      Bench bench(rig);
       CHECK(bench.guard.start());
       throw std::runtime_error("a bug");
     };
     CHECK_THROWS_AS(fall(), std::runtime_error);
   }
   SUBCASE("after a start without an answer") {
-    tool.fate = fate_of(1, Fate::has_no_answer);
-    { CHECK_FALSE(Bench(tool).guard.start()); }
+    rig.wire.fate = fate_of(1, Fate::has_no_answer);
+    { CHECK_FALSE(Bench(rig).guard.start()); }
   }
-  CHECK(tool.starts() == 1);
-  CHECK(tool.stops() == 1);
-  CHECK_FALSE(tool.runs());
+  CHECK(rig.starts() == 1);
+  CHECK(rig.stops() == 1);
+  CHECK_FALSE(rig.runs());
 }
 
 TEST_CASE("a guard that never started stops nothing by itself") {
-  GuardedTool tool;
-  { const Bench bench(tool); }
-  CHECK(tool.writes.empty());
+  BmRig rig;
+  { const Bench bench(rig); }
+  CHECK(rig.wire.writes().empty());
 }
 
 struct Trouble {
@@ -122,101 +128,101 @@ constexpr Trouble troubles[] = {
 TEST_CASE("one start, and a stop that works, whatever becomes of either") {
   for (const Trouble& trouble : troubles) {
     CAPTURE(trouble.what);
-    GuardedTool tool;
-    Bench bench(tool);
-    tool.fate = fate_of(trouble.value, trouble.fate, trouble.times);
+    BmRig rig;
+    Bench bench(rig);
+    rig.wire.fate = fate_of(trouble.value, trouble.fate, trouble.times);
     CHECK(bench.guard.start().has_value() == trouble.acknowledged);
     const StopReport report = bench.guard.stop();
     CHECK(report.result == StopResult::confirmed);
     CHECK(report.tried <= 10s);
-    CHECK_FALSE(tool.runs());
-    CHECK(tool.starts() == 1);
-    CHECK(tool.stops() >= 1);
-    CHECK(tool.writes.back() == GuardedTool::Write(4003, 0));
-    CHECK(tool.connections == trouble.connections);
+    CHECK_FALSE(rig.runs());
+    CHECK(rig.starts() == 1);
+    CHECK(rig.stops() >= 1);
+    CHECK(rig.wire.writes().back() == test::Wire::Write(4003, 0));
+    CHECK(rig.wire.connections == trouble.connections);
     // A tool may serve one client only: the old connection ends before the new one begins.
-    CHECK(tool.most_open_connections == 1);
+    CHECK(rig.wire.most_open_connections == 1);
     // The caller goes on with the connection that works.
     CHECK(bench.device.event_number().has_value());
   }
 }
 
 TEST_CASE("an interrupt does not keep the stop from the tool") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   SUBCASE("while it runs") {
     REQUIRE(bench.guard.start());
     bench.wait(100ms);
-    tool.interrupt.raise(2);
-    CHECK(tool.runs());
+    rig.interrupt.raise(2);
+    CHECK(rig.runs());
   }
   SUBCASE("before the start: it is not sent any more") {
-    tool.interrupt.raise(15);
+    rig.interrupt.raise(15);
     const auto started = bench.guard.start();
     REQUIRE_FALSE(started);
     CHECK(started.error().code == Errc::terminated);
-    CHECK(tool.starts() == 0);
+    CHECK(rig.starts() == 0);
   }
   SUBCASE("while the echo of the start is awaited") {
-    tool.fate = fate_of(1, Fate::has_no_answer);
-    tool.clock.at(tool.clock.now() + 50ms, [&] { tool.interrupt.raise(2); });
+    rig.wire.fate = fate_of(1, Fate::has_no_answer);
+    rig.clock.at(rig.clock.now() + 50ms, [&] { rig.interrupt.raise(2); });
     const auto started = bench.guard.start();
     REQUIRE_FALSE(started);
     CHECK(started.error().code == Errc::interrupted);
-    CHECK(tool.runs());
+    CHECK(rig.runs());
   }
   SUBCASE("and the link is gone, too") {
     REQUIRE(bench.guard.start());
-    tool.interrupt.raise(2);
-    tool.fate = fate_of(0, Fate::closes_unheard, 2);
+    rig.interrupt.raise(2);
+    rig.wire.fate = fate_of(0, Fate::closes_unheard, 2);
   }
   CHECK(bench.guard.stop().result == StopResult::confirmed);
-  CHECK_FALSE(tool.runs());
-  CHECK(tool.starts() <= 1);
-  CHECK(tool.stops() >= 1);
+  CHECK_FALSE(rig.runs());
+  CHECK(rig.starts() <= 1);
+  CHECK(rig.stops() >= 1);
 }
 
 TEST_CASE("a start that was still under way on the old connection is stopped, too") {
-  GuardedTool tool;
-  Bench bench(tool);
-  tool.fate = fate_of(1, Fate::closes_unheard);
-  tool.clock.at(tool.clock.now() + 400ms, [&] { tool.write_past(4003, 1); });
+  BmRig rig;
+  Bench bench(rig);
+  rig.wire.fate = fate_of(1, Fate::closes_unheard);
+  rig.clock.at(rig.clock.now() + 400ms, [&] { rig.write(4003, 1); });
   CHECK_FALSE(bench.guard.start());
   const StopReport report = bench.guard.stop();
   CHECK(report.result == StopResult::confirmed);
   CHECK(report.tried >= 1s);
   bench.wait(400ms);
-  CHECK_FALSE(tool.runs());
+  CHECK_FALSE(rig.runs());
 }
 
 TEST_CASE("a tool that never stops is tried for ten seconds and said so") {
-  GuardedTool tool;
-  Bench bench(tool);
+  BmRig rig;
+  Bench bench(rig);
   std::string trouble;
   SUBCASE("it echoes, and runs on") {
-    tool.fate = [](const modbus::Pdu& request) {
+    rig.wire.fate = [](const modbus::Pdu& request) {
       return request == modbus::write_request({4003}, 0) ? Fate::is_only_echoed : Fate::passes;
     };
     trouble = "the tool still says that it runs";
   }
   SUBCASE("it refuses") {
-    tool.fate = fate_of(0, Fate::is_refused);
+    rig.wire.fate = fate_of(0, Fate::is_refused);
     trouble = "the tool refused 'write register 4003'";
   }
   SUBCASE("it says nothing") {
-    tool.fate = fate_of(0, Fate::is_lost);
+    rig.wire.fate = fate_of(0, Fate::is_lost);
     trouble = "no answer";
   }
-  SUBCASE("nobody can reach it any more") {
-    tool.fate = [&tool](const modbus::Pdu& request) {
-      tool.reachable = false;
+  SUBCASE("it cannot be reached any more") {
+    rig.wire.fate = [&rig](const modbus::Pdu& request) {
+      rig.wire.unreachable_until = TimePoint::max();
       return request == modbus::write_request({4003}, 0) ? Fate::closes_unheard : Fate::passes;
     };
     trouble = "connection refused";
   }
   // A preset that takes long.
-  tool.write_past(11, 9000);
-  tool.write_past(13, 9000);
+  rig.write(11, 9000);
+  rig.write(13, 9000);
   REQUIRE(bench.guard.start());
   const StopReport report = bench.guard.stop();
   CHECK(report.result == StopResult::unconfirmed);
@@ -225,78 +231,79 @@ TEST_CASE("a tool that never stops is tried for ten seconds and said so") {
   CHECK(report.attempts >= 5);
   CAPTURE(report.trouble);
   CHECK(report.trouble.find(trouble) != std::string::npos);
-  CHECK(tool.starts() == 1);
+  CHECK(rig.starts() == 1);
   for (const Duration patience : bench.patiences) CHECK(patience <= 10s);
-  // Whoever goes on with the device gets errors, and no crash.
+  // A caller that goes on with the device gets errors, and no crash.
   static_cast<void>(bench.device.event_number());
 }
 
 TEST_CASE("a tool that answers slowly is believed") {
-  GuardedTool tool({}, {{.kind = sim::FaultKind::latency, .duration = 800ms}});
-  Bench bench(tool);
+  BmRig rig;
+  rig.faults = {{.kind = sim::FaultKind::latency, .duration = 800ms}};
+  Bench bench(rig);
   REQUIRE(bench.guard.start());
   const StopReport report = bench.guard.stop();
   CHECK(report.result == StopResult::confirmed);
-  CHECK(tool.connections == 1);
-  CHECK(tool.stops() == 2);
+  CHECK(rig.wire.connections == 1);
+  CHECK(rig.stops() == 2);
 }
 
 TEST_CASE("however patient the user is, a stop without an answer is soon sent again") {
-  GuardedTool tool;
-  tool.answer_timeout = 60s;
-  tool.retries = 100;
-  Bench bench(tool);
+  BmRig rig;
+  rig.options.answer_timeout = 60s;
+  rig.options.retries = 100;
+  Bench bench(rig);
   REQUIRE(bench.guard.start());
-  SUBCASE("the stop has no answer") { tool.fate = fate_of(0, Fate::is_lost); }
+  SUBCASE("the stop has no answer") { rig.wire.fate = fate_of(0, Fate::is_lost); }
   SUBCASE("its proof has none") {
-    tool.fate = [](const modbus::Pdu& request) {
+    rig.wire.fate = [](const modbus::Pdu& request) {
       return request.function == 4 ? Fate::is_lost : Fate::passes;
     };
   }
   const StopReport report = bench.guard.stop();
   CHECK(report.result == StopResult::unconfirmed);
   CHECK(report.tried <= 13s);
-  CHECK(tool.stops() >= 5);
+  CHECK(rig.stops() >= 5);
 }
 
 TEST_CASE("what another program started is pursued over lost answers and connections") {
-  GuardedTool tool;
-  const catalogue::Action start = tool.start_action();
-  tool.write_past(4003, 1);
-  tool.clock.advance(100ms);
-  REQUIRE(tool.runs());
+  BmRig rig;
+  const catalogue::Action start = rig.start_action();
+  rig.write(4003, 1);
+  rig.clock.advance(100ms);
+  REQUIRE(rig.runs());
   unsigned opened = 0;
   const auto open = [&](Duration patience) -> Result<Device> {
     CHECK(patience <= 10s);
-    tool.reachable = ++opened > 3;
-    return tool.open(tool.calm, tool.never);
+    rig.wire.unreachable_until = ++opened > 3 ? TimePoint::min() : TimePoint::max();
+    return rig.connect_uninterruptibly();
   };
-  tool.fate = fate_of(0, Fate::closes_unheard, 2);
-  RunGuard guard(device::motion_of(start), open, tool.calm, 0s);
+  rig.wire.fate = fate_of(0, Fate::closes_unheard, 2);
+  RunGuard guard(device::motion_of(start), open, rig.uninterruptible, 0s);
   const StopReport report = guard.stop();
   CHECK(report.result == StopResult::confirmed);
   CHECK(report.attempts == 6);
   CHECK(opened == 6);
-  CHECK_FALSE(tool.runs());
-  CHECK(tool.starts() == 0);
+  CHECK_FALSE(rig.runs());
+  CHECK(rig.starts() == 0);
 }
 
 TEST_CASE("a pursued stop goes on for ten seconds, and no longer where it is hopeless") {
-  GuardedTool tool;
-  tool.reachable = false;
-  const catalogue::Action start = tool.start_action();
+  BmRig rig;
+  rig.wire.unreachable_until = TimePoint::max();
+  const catalogue::Action start = rig.start_action();
   device::GuardedMotion motion = device::motion_of(start);
-  const auto open = [&](Duration) { return tool.open(tool.calm, tool.never); };
-  const TimePoint began = tool.clock.now();
-  SUBCASE("a tool that can not be reached") {
-    RunGuard guard(motion, open, tool.calm, 0s);
+  const auto open = [&](Duration) { return rig.connect_uninterruptibly(); };
+  const TimePoint began = rig.clock.now();
+  SUBCASE("a tool that cannot be reached") {
+    RunGuard guard(motion, open, rig.uninterruptible, 0s);
     CHECK(guard.stop().result == StopResult::unconfirmed);
-    CHECK(tool.clock.now() - began > 9s);
-    CHECK(tool.clock.now() - began < 11s);
+    CHECK(rig.clock.now() - began > 9s);
+    CHECK(rig.clock.now() - began < 11s);
   }
   SUBCASE("an error that stays") {
     motion.hopeless = [](const Error& error) { return error.code == Errc::connection_refused; };
-    RunGuard guard(motion, open, tool.calm, 0s);
+    RunGuard guard(motion, open, rig.uninterruptible, 0s);
     const StopReport report = guard.stop();
     CHECK(report.result == StopResult::unconfirmed);
     CHECK(report.attempts == 1);
@@ -304,28 +311,28 @@ TEST_CASE("a pursued stop goes on for ten seconds, and no longer where it is hop
 }
 
 TEST_CASE("stop_and_confirm without a guard: once, and proven") {
-  GuardedTool tool;
-  Device device = tool.open();
-  const catalogue::Action start = tool.start_action();
+  BmRig rig;
+  Device device = rig.open();
+  const catalogue::Action start = rig.start_action();
   SUBCASE("a running tool") {
-    tool.write_past(4003, 1);
-    CHECK(device::stop_and_confirm(device, start, tool.clock) == StopResult::confirmed);
-    CHECK_FALSE(tool.runs());
+    rig.write(4003, 1);
+    CHECK(device::stop_and_confirm(device, start, rig.clock) == StopResult::confirmed);
+    CHECK_FALSE(rig.runs());
   }
   SUBCASE("a tool at rest") {
-    CHECK(device::stop_and_confirm(device, start, tool.clock) == StopResult::confirmed);
+    CHECK(device::stop_and_confirm(device, start, rig.clock) == StopResult::confirmed);
   }
-  SUBCASE("a product whose running state can not be read") {
+  SUBCASE("a product whose running state cannot be read") {
     catalogue::Action blind = start;
     blind.confirm = {};
-    CHECK(device::stop_and_confirm(device, blind, tool.clock) == StopResult::sent);
+    CHECK(device::stop_and_confirm(device, blind, rig.clock) == StopResult::sent);
   }
   SUBCASE("a tool that runs on") {
-    tool.write_past(4003, 1);
-    tool.fate = fate_of(0, Fate::is_only_echoed);
-    CHECK(device::stop_and_confirm(device, start, tool.clock) == StopResult::unconfirmed);
+    rig.write(4003, 1);
+    rig.wire.fate = fate_of(0, Fate::is_only_echoed);
+    CHECK(device::stop_and_confirm(device, start, rig.clock) == StopResult::unconfirmed);
   }
-  CHECK(tool.stops() == 1);
+  CHECK(rig.stops() == 1);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ TEST_CASE("line: silence ends a burst, bytes take their time") {
   REQUIRE(burst);
   CHECK(burst->bytes == hex("01 02 03"));
   CHECK(burst->timing == Burst::Timing::in_time);
-  CHECK(burst->end == start + 3 * character + gap);  // whenever somebody looks
+  CHECK(burst->end == start + 3 * character + gap);  // whenever it is looked at
   CHECK_FALSE(line.take(start + 1s));
   CHECK_FALSE(line.silent_at());
 }

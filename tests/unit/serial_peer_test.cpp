@@ -67,7 +67,7 @@ TEST_CASE("serial peer: an answer comes behind the gap and the driver's own dela
   CHECK(bus.answers() == "45500: " + to_hex(loopback_to_2) + "; ");
 }
 
-TEST_CASE("serial peer: what silence has parted stays apart, however late somebody looks") {
+TEST_CASE("serial peer: what silence has parted stays apart, however late it is looked at") {
   Bus bus;
   bus.peer.receive(read_two, start);
   bus.peer.receive(loopback_to_2, start + 30ms);
@@ -108,7 +108,7 @@ TEST_CASE("serial peer: a query within the gap is not heard, nor is it a bad fra
   CHECK(generic.answers() == "10000: " + two_words + "; 10000: " + two_words + "; ");
 }
 
-TEST_CASE("serial peer: what is no frame is told to the server and answered by nobody") {
+TEST_CASE("serial peer: what is no frame is told to the server and gets no answer") {
   struct Row {
     std::string_view what;
     std::vector<Bytes> bursts;
@@ -147,8 +147,7 @@ TEST_CASE("serial peer: what is no frame is told to the server and answered by n
   CHECK(generic.bank.queries == 1);
 }
 
-TEST_CASE(
-    "serial peer: silence tells where a frame ends, so a function that nobody knows is refused") {
+TEST_CASE("serial peer: silence tells where a frame ends, so an unknown function is refused") {
   Bus bus;
   bus.peer.receive(hex("01 11 C02C"), start);
   CHECK(bus.answers() == "15500: 01 91 01 8C 50; ");

@@ -55,7 +55,7 @@ struct Pty {
   }
 
   Descriptor far;
-  Descriptor near;  ///< keeps the terminal alive while nobody else has it open
+  Descriptor near;  ///< keeps the terminal alive while no other program has it open
   std::string path;
 };
 
@@ -172,7 +172,7 @@ TEST_CASE("serial: a rate that has no name is an error, never another rate") {
   }
 }
 
-TEST_CASE("serial: every cause of a port that can not be opened is told apart") {
+TEST_CASE("serial: every cause of a port that cannot be opened is told apart") {
   Room room;
   struct Row {
     std::string path;

@@ -161,7 +161,7 @@ TEST_CASE("pty: what exists is never touched") {
   CHECK_FALSE(fs::exists(fs::symlink_status(path)));
 }
 
-TEST_CASE("pty: a link that somebody else has put in its place stays") {
+TEST_CASE("pty: a link that another program has put in its place stays") {
   Served served;
   fs::remove(served.path);
   fs::create_symlink("/nowhere", served.path);

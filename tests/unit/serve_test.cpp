@@ -33,7 +33,7 @@ namespace {
 constexpr Duration patience = 5s;
 
 // Reads answer with the connection's number. Writing N to a register makes the tool push N events
-// to everybody a little later, by itself.
+// to every client a little later, by itself.
 class EchoTool final : public sim::Server {
  public:
   std::optional<Pdu> answer(sim::ConnectionId connection, modbus::UnitId, const Pdu& request,
@@ -371,7 +371,7 @@ TEST_CASE("serve: who roams or is switched off and on loses its connections") {
   }
 }
 
-TEST_CASE("serve: while another client holds the session, everybody else is shut out") {
+TEST_CASE("serve: while another client holds the session, every other client is shut out") {
   Served served({.outages = {{sim::OutageKind::other_client, 200ms, 400ms}}});
   Client client(served.port);
   CHECK(number_of(client) == 1);

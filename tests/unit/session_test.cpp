@@ -68,12 +68,10 @@ Bytes part(const Bytes& bytes, std::size_t from, std::size_t to) {
 }
 
 /// A session, its peer and their clock.
-struct Line {
+struct Line : test::ScriptedPeer {
   /// `late_for`: how long late answers to an earlier program may still come.
   explicit Line(SessionOptions options, Duration late_for = {})
-      : session(with_late(late_for), clock, std::move(options), trace()) {
-    script.interrupt = &interrupt;
-  }
+      : session(with_late(late_for), clock, std::move(options), trace()) {}
 
   std::unique_ptr<link::Transport> with_late(Duration late_for) {
     if (late_for > Duration::zero()) script.late_until = clock.now() + late_for;
@@ -102,9 +100,6 @@ struct Line {
     }
   }
 
-  Interrupt interrupt;
-  FakeClock clock{interrupt};
-  Script script{clock};
   std::vector<Decision> decisions = {};
   std::vector<std::string> notices = {};
   Session session;
@@ -228,7 +223,7 @@ TEST_CASE("tcp: events keep their order and the time of their own arrival") {
                                 {40ms, tcp_response(request, two_values) + event_frame(1, 3)}};
   });
   REQUIRE(line.session.transact(read_two) == two_values);
-  line.clock.advance(5s);  // nobody asks for a while
+  line.clock.advance(5s);  // no question for a while
   std::vector<std::pair<std::uint16_t, Duration>> got;
   while (const auto event = line.session.next_spontaneous(line.clock.now()).value()) {
     got.emplace_back(number_of(*event), event->arrival - FakeClock::start);
@@ -238,7 +233,7 @@ TEST_CASE("tcp: events keep their order and the time of their own arrival") {
   CHECK(line.session.counters().spontaneous == 3);
 }
 
-TEST_CASE("tcp: a queue that nobody empties loses its oldest and counts them") {
+TEST_CASE("tcp: a queue that is not emptied loses its oldest and counts them") {
   constexpr std::uint16_t pushed = 5000;
   Line line(tcp());
   line.script.on_request([](ByteView request) {
@@ -388,7 +383,7 @@ TEST_CASE("tcp: junk behind the answer is no matter of this answer, but of the n
   CHECK(line.elapsed() == 1ms);
 }
 
-TEST_CASE("tcp: a stream without end does not keep anybody beyond the deadline") {
+TEST_CASE("tcp: a stream without end keeps no caller beyond the deadline") {
   struct Row {
     std::string_view what;
     Bytes flood;
@@ -541,14 +536,14 @@ TEST_CASE("rtu: the gap is kept from the last byte in either direction, no longe
   Line broadcasting(rtu());
   broadcasting.script.sending_takes = 9ms;
   REQUIRE(broadcasting.session.broadcast(arm));
-  CHECK(broadcasting.elapsed() == 19ms);  // nobody is waited for but the pause from the last byte
+  CHECK(broadcasting.elapsed() == 19ms);  // no wait but the pause from the last byte
   CHECK(broadcasting.script.sent[0].bytes == rtu_frame(0, arm));
   broadcasting.script.on_request(rtu_answer(20ms, two_values));
   REQUIRE(broadcasting.session.transact(read_two));
   CHECK(broadcasting.sent_at(1) == 19ms);
 }
 
-TEST_CASE("rtu: other units' traffic while nobody asks moves the gap") {
+TEST_CASE("rtu: other units' traffic between two questions moves the gap") {
   Line line(rtu());
   line.script.arrive(FakeClock::start + 100ms, rtu_frame(7, two_values));
   line.script.arrive(FakeClock::start + 104ms, rtu_frame(7, two_values) + hex("FF FF"));
@@ -992,11 +987,11 @@ TEST_CASE("rtu: a loop-back's echo is never its answer, whatever the adapter doe
   const std::vector<Row> rows = {
       {"no echo", LocalEcho::automatic, false, true, {}, {0x03, 0x08, 0x08}},
       {"echo", LocalEcho::automatic, true, true, {}, {0x03, 0x08, 0x08}},
-      {"no echo, nobody", LocalEcho::automatic, false, false, Errc::no_answer, {0x03, 0x08}},
-      {"echo, nobody", LocalEcho::automatic, true, false, Errc::local_echo, {0x03, 0x08}},
+      {"no echo, no unit", LocalEcho::automatic, false, false, Errc::no_answer, {0x03, 0x08}},
+      {"echo, no unit", LocalEcho::automatic, true, false, Errc::local_echo, {0x03, 0x08}},
       {"surely no echo", LocalEcho::absent, false, true, {}, {0x08, 0x08}},
       {"surely an echo", LocalEcho::present, true, true, {}, {0x08, 0x08}},
-      {"surely an echo, nobody", LocalEcho::present, true, false, Errc::local_echo, {0x08, 0x08}},
+      {"surely an echo, no unit", LocalEcho::present, true, false, Errc::local_echo, {0x08, 0x08}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.what);
@@ -1053,7 +1048,8 @@ TEST_CASE("rtu: a line that others have just left is given its gap") {
   CHECK(line.sent_at(0) == gap);
 }
 
-TEST_CASE("rtu: one session asks one unit after the other, and a late answer is nobody's") {
+TEST_CASE(
+    "rtu: one session asks one unit after the other, and a late answer belongs to no question") {
   SessionOptions options = rtu();
   options.echo = LocalEcho::absent;
   Line line(options);
@@ -1103,7 +1099,7 @@ TEST_CASE(
   done.session.settle();
   CHECK(done.elapsed() == 15ms);
 
-  Line told(rtu());  // an answer that repeats its request is nobody else's
+  Line told(rtu());  // an answer that repeats its request is the unit's own
   told.script.on_request(silence());
   CHECK_FALSE(told.session.transact(arm));
   told.session.settle();
@@ -1134,7 +1130,7 @@ TEST_CASE("rtu: without an echo a write's only answer is its answer") {
   CHECK(line.session.transact(arm) == arm);
 }
 
-TEST_CASE("rtu: a line that never falls silent keeps nobody for ever") {
+TEST_CASE("rtu: a line that never falls silent keeps no caller for ever") {
   struct Row {
     std::string_view what;
     Bytes flood;
@@ -1411,7 +1407,7 @@ TEST_CASE("rtu: two answers of another program's shape prove nothing") {
   CHECK_FALSE(session.transact(read_holding(2, 1)));
 }
 
-TEST_CASE("rtu: what can not be proved is an error") {
+TEST_CASE("rtu: what cannot be proved is an error") {
   Line line(shared(SessionOptions::Proof::none));
   std::uint16_t value = 0;
   line.script.otherwise = [&](ByteView) {

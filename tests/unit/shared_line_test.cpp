@@ -32,7 +32,7 @@ const modbus::Pdu request = modbus::read_request(RegisterTable::holding, {2}, 1)
 const modbus::Pdu value = modbus::read_response(RegisterTable::holding, Registers{271});
 
 /// A line, its peer, and how often it was opened and is open.
-struct World {
+struct World : test::ScriptedPeer {
   SharedLine::Open opener() {
     return [this]() -> Result<std::unique_ptr<Transport>> {
       if (refusal) return tl::unexpected(Error{.code = *refusal});
@@ -64,9 +64,6 @@ struct World {
     std::unique_ptr<Transport> peer;
   };
 
-  Interrupt interrupt;
-  FakeClock clock{interrupt};
-  Script script{clock};
   std::optional<Errc> refusal = std::nullopt;
   int opened = 0;
   int open = 0;
@@ -175,7 +172,7 @@ TEST_CASE("shared line: the end of an old share does not close a new opening") {
   CHECK(world.open == 1);
 }
 
-TEST_CASE("shared line: one at a time, and everybody in the end") {
+TEST_CASE("shared line: one at a time, and each of them in the end") {
   FairLock lock;
   std::atomic<int> inside = 0;
   std::atomic<bool> overlapped = false;

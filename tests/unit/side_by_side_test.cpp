@@ -26,7 +26,7 @@ using Lines = std::vector<std::vector<std::size_t>>;
 
 }  // namespace
 
-TEST_CASE("the units of one serial line take turns, everybody else has a line of their own") {
+TEST_CASE("the units of one serial line take turns, every other tool has a line of its own") {
   CHECK(by_line({}).empty());
   CHECK(by_line(targets_at({"tcp://a", "tcp://a", "sim:doga-bm", "sim:doga-bm"})) ==
         Lines{{0}, {1}, {2}, {3}});

@@ -186,7 +186,7 @@ TEST_CASE("signals: several at once are one wish") {
   CHECK(status == 0);
 }
 
-TEST_CASE("signals: Ctrl-Z suspends, until somebody refuses it") {
+TEST_CASE("signals: Ctrl-Z suspends, until it is refused") {
   const int status = status_of_child([] {
     posix::SignalWatch watch;
     if (handler_of(SIGTSTP) != SIG_DFL) ::_exit(1);

@@ -7,10 +7,7 @@
 #include <vector>
 
 #include "hex.hpp"
-#include "spindle/sim/bm_tool.hpp"
-#include "support/bm_profile.hpp"
-#include "support/fake_clock.hpp"
-#include "support/fault_plan.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace spindle::sim;
@@ -27,14 +24,10 @@ const Bytes arm = hex("8004 0000 0006 00 06 0FA2 0001");
 const Bytes start = hex("8005 0000 0006 00 06 0FA3 0001");
 const Bytes reset_alarm = hex("8006 0000 0006 00 06 0FA0 0001");
 
-std::unique_ptr<BmTool> make_tool() {
-  return make_bm_tool(test::bm_profile(), test::bm_start(), {});
-}
-
-struct Bench {
-  explicit Bench(const std::vector<std::string>& faults = {}) {
+struct Bench : test::BmRig {
+  explicit Bench(const std::vector<std::string>& typed = {}) {
     transport =
-        make_sim_transport(make_tool(), Framing::tcp, test::plan_of(faults), clock, interrupt);
+        make_sim_transport(std::move(tool), Framing::tcp, test::plan_of(typed), clock, interrupt);
   }
 
   Result<void> send(const Bytes& bytes) { return transport->send(bytes, clock.now() + 1s); }
@@ -49,9 +42,7 @@ struct Bench {
 
   [[nodiscard]] Duration elapsed() const { return clock.now() - FakeClock::start; }
 
-  Interrupt interrupt;
-  FakeClock clock{interrupt};
-  std::unique_ptr<link::Transport> transport;
+  std::unique_ptr<link::Transport> transport = nullptr;
 };
 
 }  // namespace
@@ -153,7 +144,7 @@ TEST_CASE("an interrupt ends a wait at once") {
   CHECK(sent.error().code == Errc::interrupted);
 }
 
-TEST_CASE("behind the shield the last words get their answers though nobody can sleep") {
+TEST_CASE("behind the shield the last words get their answers though no wait is possible") {
   Bench bench({"lost@2"});
   bench.interrupt.raise(15);
   bench.transport->shield();
@@ -167,13 +158,11 @@ TEST_CASE("behind the shield the last words get their answers though nobody can 
 }
 
 TEST_CASE("two transports share one tool and one count of answers") {
-  Interrupt interrupt;
-  FakeClock clock;
-  const auto tool = make_tool();
-  AnswerCounter answers;
-  const FaultPlan plan = {*parse_fault("lost@2")};
-  auto one = make_sim_transport(*tool, {1}, Framing::tcp, plan, answers, clock, interrupt);
-  auto other = make_sim_transport(*tool, {2}, Framing::tcp, plan, answers, clock, interrupt);
+  test::BmRig rig;
+  rig.faults = test::plan_of({"lost@2"});
+  auto& clock = rig.clock;
+  const auto one = rig.transport(clock, rig.interrupt);
+  const auto other = rig.transport(clock, rig.interrupt);
   std::array<std::uint8_t, 260> into = {};
   const auto ask = [&](link::Transport& transport, const Bytes& request) {
     REQUIRE(transport.send(request, clock.now() + 1s).has_value());

@@ -5,11 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "spindle/sim/bm_tool.hpp"
-#include "spindle/sim/sim_transport.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/identification.hpp"
-#include "support/fake_clock.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace spindle::work;
@@ -17,8 +15,8 @@ using namespace spindle::work;
 namespace {
 
 /// A world with one tools file and, at 192.168.10.23:5000, one simulated tool.
-struct Bench {
-  explicit Bench(const sim::BmOptions& options = {}) : tool(options) {
+struct Bench : test::BmRig {
+  explicit Bench(const sim::BmOptions& how = {}) : BmRig(test::product("doga-bm"), how) {
     tools.path = "spindle.yaml";
     tools.tools = {{.name = "station3",
                     .url = "tcp://192.168.10.23",
@@ -36,8 +34,8 @@ struct Bench {
   Environment context() {
     return {.clock = clock,
             .interrupt = interrupt,
-            .open = open,
-            .uninterruptible = uninterruptible,
+            .open = lines,
+            .uninterruptible = without_end,
             .disk = disk,
             .state_folder = state_folder,
             .version = "1.2.3",
@@ -47,24 +45,19 @@ struct Bench {
             .common = common};
   }
 
-  Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& endpoint) {
-    opened.push_back(endpoint.host + ":" + std::to_string(endpoint.port.value_or(0)));
+  Result<std::unique_ptr<link::Transport>> connect_to(const link::Endpoint& to) {
+    opened.push_back(to.host + ":" + std::to_string(to.port.value_or(0)));
     if (opened.back() != "192.168.10.23:5000") {
       return tl::unexpected(Error{.code = Errc::connection_refused});
     }
-    auto server = sim::make_bm_tool(profiles.load("doga-bm").value(),
-                                    profiles.load_simulation("doga-bm").value(), tool);
-    return sim::make_sim_transport(std::move(server), modbus::Framing::tcp, {}, clock, interrupt);
+    return transport(clock, interrupt);
   }
 
-  sim::BmOptions tool;
-  Interrupt interrupt;
-  test::FakeClock clock{interrupt};
   std::vector<std::string> opened;
-  device::OpenTransport open = [this](const auto& endpoint, const auto&, Duration) {
-    return connect_to(endpoint);
+  device::OpenTransport lines = [this](const auto& to, const auto&, Duration) {
+    return connect_to(to);
   };
-  work::Uninterruptible uninterruptible{clock, interrupt, open};
+  work::Uninterruptible without_end{clock, interrupt, lines};
   Disk disk = {};
   std::string state_folder = {};
   files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};
@@ -132,8 +125,8 @@ TEST_CASE("what is no target says what is near, or what there is") {
   const std::vector<Case> cases = {
       {"staton3", Errc::unknown_name, "unknown target 'staton3'; did you mean 'station3'?"},
       {"@line", Errc::unknown_name, "unknown target '@line'; did you mean '@line1'?"},
-      {"nobody", Errc::unknown_name,
-       "unknown target 'nobody'; name a tool of spindle.yaml, or a URL such as tcp://HOST"},
+      {"elsewhere", Errc::unknown_name,
+       "unknown target 'elsewhere'; name a tool of spindle.yaml, or a URL such as tcp://HOST"},
       {"@line1", Errc::usage,
        "'@line1' is 2 tools, and this command takes one; name one of them, such as station3"},
   };

@@ -299,7 +299,7 @@ TEST_CASE("open: IPv6") {
   CHECK(world.open("::1", test::local_port(listener.number())).has_value());
 }
 
-TEST_CASE("open: the socket is inherited by nobody, quick, and notices a tool that is gone") {
+TEST_CASE("open: the socket is not inherited, quick, and notices a tool that is gone") {
   const Connected connected;
   const int socket = descriptor_connected_to(connected.acceptor.port());
   REQUIRE(socket >= 0);
@@ -313,7 +313,7 @@ TEST_CASE("open: the socket is inherited by nobody, quick, and notices a tool th
   CHECK(option(socket, IPPROTO_TCP, TCP_USER_TIMEOUT) == 10'000);
 }
 
-TEST_CASE("open: a port where nobody listens refuses; a name's address is told") {
+TEST_CASE("open: a port without a listener refuses; a name's address is told") {
   World world;
   const test::BoundSocket silent;
   const auto by_address = world.open("127.0.0.1", silent.port());
@@ -327,7 +327,7 @@ TEST_CASE("open: a port where nobody listens refuses; a name's address is told")
   CHECK(message_of(by_name.error()).starts_with("connection refused (address "));
 }
 
-TEST_CASE("open: a connection that nobody completes ends with the connect timeout") {
+TEST_CASE("open: a connection that is never completed ends with the connect timeout") {
   const FullPort port;
   REQUIRE(port.full());
   World world;

@@ -68,7 +68,7 @@ TEST_CASE("a file is believed by its owner, and by who else can write it") {
   CHECK(verdict(owned_by(1001, "anna"), with_anna) == "read");
   CHECK(verdict(owned_by(1002), with_anna) == "read");
   CHECK(verdict(owned_by(1003, "otto"), with_anna) != "read");
-  // Root believes nobody because it could.
+  // Root believes no other user because it could.
   CHECK(verdict(owned_by(me, "anna"), {.self = 0}) != "read");
   CHECK(verdict(owned_by(me, ""), {.self = 0, .others = {""}}) != "read");
 

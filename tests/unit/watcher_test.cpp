@@ -8,10 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "spindle/sim/bm_tool.hpp"
-#include "spindle/sim/sim_transport.hpp"
-#include "support/bm_profile.hpp"
-#include "support/fake_clock.hpp"
+#include "support/rig.hpp"
 
 using namespace spindle;
 using namespace std::chrono_literals;
@@ -37,37 +34,27 @@ constexpr std::uint8_t read_input = 0x04;
 constexpr std::uint8_t write_single = 0x06;
 constexpr std::uint8_t report_server_id = 0x11;
 
-struct Asked {
-  TimePoint at;
-  modbus::Pdu pdu;
-
-  [[nodiscard]] bool is(std::uint8_t function, std::uint16_t address, std::uint16_t word) const {
-    return pdu.function == function && get_u16(pdu.data, 0) == address &&
-           get_u16(pdu.data, 2) == word;
-  }
-};
-
-catalogue::Profile profile_with_keep_alive() {
-  catalogue::Profile profile = test::bm_profile();
-  profile.link.keep_alive = 1s;
-  profile.identity->models = {{3, "3204"}};
-  profile.identity->firmware_below = 4000;
-  return profile;
+test::Product product_with_keep_alive() {
+  test::Product made = test::small_bm();
+  made.profile.link.keep_alive = 1s;
+  made.profile.identity->models = {{3, "3204"}};
+  made.profile.identity->firmware_below = 4000;
+  return made;
 }
 
-/// A simulated tool, the line to it, and everything that is asked and told.
-class Workshop {
- public:
-  explicit Workshop(const sim::BmOptions& options = {}) { power_on(options); }
+/// A simulated tool, the wire to it, and everything that is told of it.
+struct Workshop : test::BmRig {
+  explicit Workshop(const sim::BmOptions& how = {}) : BmRig(product_with_keep_alive(), how) {}
 
-  /// Another tool, or the same one that lost its memory, on the same address.
-  void power_on(const sim::BmOptions& options) {
-    tool = sim::make_bm_tool(profile, test::bm_start(), options);
+  /// Another tool on the same address; the old one lives on as long as the lines to it.
+  void replace_tool(const sim::BmOptions& how) {
+    wire.cut();
+    gone = std::exchange(tool, test::simulated(product_with_keep_alive(), how));
   }
 
   [[nodiscard]] Result<void> watch(Duration time) {
     const TimePoint end = clock.now() + time;
-    Watcher watcher([this] { return open(); },
+    Watcher watcher([this] { return link(); },
                     [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
                     reconnection, clock, [this](const News& one) { return hear(one); });
     auto watched = watcher.run([end] { return end; });
@@ -90,99 +77,42 @@ class Workshop {
   }
   [[nodiscard]] std::vector<TimePoint> times(std::uint8_t function) const {
     std::vector<TimePoint> all;
-    for (const Asked& one : asked) {
-      if (one.pdu.function == function) all.push_back(one.at);
+    for (const auto& [at, pdu] : wire.requests) {
+      if (pdu.function == function) all.push_back(at);
     }
     return all;
   }
-  void lose_line() { ++generation; }
   /// An event at once; error 116 may happen as often as a test wants.
   void happen() { tool->raise_alarm(116, clock.now()); }
-  /// The output is switched by others than the watcher.
+  /// Not by the watcher, but on its connection.
   void switch_output(std::uint16_t value) {
-    const sim::ConnectionId connection{static_cast<std::uint32_t>(attempts.size())};
-    tool->answer(connection, {}, modbus::write_request({4002}, value), clock.now());
+    tool->answer({wire.connections}, {}, modbus::write_request({arm_register}, value), clock.now());
   }
 
-  Interrupt interrupt;
-  test::FakeClock clock{interrupt};
-  catalogue::Profile profile = profile_with_keep_alive();
-  std::unique_ptr<sim::BmTool> tool;
-  sim::FaultPlan faults;
-  sim::AnswerCounter answers;
-  WatchPlan plan;
+  WatchPlan plan = {};
   Reconnection reconnection = Reconnection::forever;
-  TimePoint unreachable_until = TimePoint::min();
-  std::vector<TimePoint> attempts;
-  std::vector<Asked> asked;
-  std::vector<News> news;
-  std::vector<TimePoint> event_heard;
-  std::optional<Error> unreached;
-  std::function<void(const modbus::Pdu&)> on_request = {};  ///< just before the tool gets it
-  std::size_t wanted = 1'000'000;                           ///< news, then stop
-  unsigned generation = 0;  ///< of connections; older ones are broken
+  std::vector<News> news = {};
+  std::vector<TimePoint> event_heard = {};
+  std::optional<Error> unreached = std::nullopt;
+  std::size_t wanted = 1'000'000;  ///< news, then stop
+  std::unique_ptr<sim::BmTool> gone = nullptr;
 
  private:
-  class Line;
-
-  Result<Watcher::Link> open();
+  Result<Watcher::Link> link() {
+    auto device = connect();
+    if (!device) return tl::unexpected(device.error());
+    if (auto known = device->require_known_registers(); !known) {
+      return tl::unexpected(known.error());
+    }
+    std::string identity = device->identity_text();
+    return Watcher::Link{std::move(*device), std::move(identity)};
+  }
   Heed hear(const News& one) {
     news.push_back(one);
     if (std::holds_alternative<EventNews>(one)) event_heard.push_back(clock.now());
     return news.size() < wanted ? Heed::go_on : Heed::stop;
   }
 };
-
-/// Keeps the requests, and breaks when the workshop says so.
-class Workshop::Line final : public link::Transport {
- public:
-  Line(Workshop& shop, std::unique_ptr<link::Transport> inner)
-      : shop_(&shop), generation_(shop.generation), inner_(std::move(inner)) {}
-
-  Result<void> send(ByteView bytes, TimePoint deadline) override {
-    if (broken()) return tl::unexpected(Error{.code = Errc::closed});
-    const auto frame = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, bytes);
-    const modbus::Pdu request = std::get<modbus::Deframed>(frame).adu.pdu;
-    if (const auto hook = shop_->on_request) hook(request);  // a copy: it may take itself away
-    auto sent = inner_->send(bytes, deadline);
-    if (sent) shop_->asked.push_back({shop_->clock.now(), request});
-    return sent;
-  }
-  Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
-    if (broken()) return tl::unexpected(Error{.code = Errc::closed});
-    return inner_->receive(into, deadline);
-  }
-  void shield() override { inner_->shield(); }
-
- private:
-  [[nodiscard]] bool broken() const { return generation_ != shop_->generation; }
-
-  Workshop* shop_;
-  unsigned generation_;
-  std::unique_ptr<link::Transport> inner_;
-};
-
-Result<Watcher::Link> Workshop::open() {
-  attempts.push_back(clock.now());
-  const auto connect = [this](const auto&, const auto&,
-                              Duration) -> Result<std::unique_ptr<link::Transport>> {
-    if (clock.now() < unreachable_until) {
-      return tl::unexpected(Error{.code = Errc::connection_refused});
-    }
-    const sim::ConnectionId connection{static_cast<std::uint32_t>(attempts.size())};
-    return std::make_unique<Line>(
-        *this, sim::make_sim_transport(*tool, connection, modbus::Framing::tcp, faults, answers,
-                                       clock, interrupt));
-  };
-  auto device = device::Device::open(link::parse_endpoint("tcp://tool:5000").value(), profile, {},
-                                     connect, clock);
-  if (!device) return tl::unexpected(device.error());
-  if (auto known = device->require_known_registers(); !known) {
-    return tl::unexpected(known.error());
-  }
-  std::string identity = device->identity_text();
-  return Watcher::Link{std::move(*device), std::move(identity)};
-}
 
 Duration longest_pause(const std::vector<TimePoint>& times) {
   Duration longest = Duration::zero();
@@ -192,7 +122,7 @@ Duration longest_pause(const std::vector<TimePoint>& times) {
   return longest;
 }
 
-bool reads_full_block(const Asked& asked) {
+bool reads_full_block(const test::Wire::Request& asked) {
   return asked.pdu.function == read_input && get_u16(asked.pdu.data, 2) == 14;
 }
 
@@ -224,12 +154,12 @@ TEST_CASE("the old event is not a result") {
 
 TEST_CASE("what was pushed before the counter was read is old") {
   Workshop shop;
-  shop.on_request = [&](const modbus::Pdu& request) {
+  shop.wire.before = [&](const modbus::Pdu& request) {
     if (request.function != read_input || get_u16(request.data, 2) != 1) return;
     shop.switch_output(1);
     shop.happen();
     shop.happen();
-    shop.on_request = {};
+    shop.wire.before = {};
   };
   REQUIRE(shop.watch(3s));
   CHECK(shop.numbers().empty());
@@ -239,9 +169,9 @@ TEST_CASE("what was pushed before the counter was read is old") {
 TEST_CASE("what is pushed while the last event is fetched keeps its place") {
   Workshop shop;
   const auto while_fetching = [&](const std::function<void()>& what) {
-    shop.on_request = [&shop, what](const modbus::Pdu& request) {
+    shop.wire.before = [&shop, what](const modbus::Pdu& request) {
       if (request.function != read_input || get_u16(request.data, 2) != 13) return;
-      shop.on_request = {};
+      shop.wire.before = {};
       what();
     };
     REQUIRE(shop.watch(3s));
@@ -273,17 +203,17 @@ TEST_CASE("output is armed again in time, the tool kept alive, and no block is r
   REQUIRE(arms.size() >= 12);
   CHECK(longest_pause(arms) <= shop.profile.events->arm->every);
   CHECK(longest_pause(shop.times(report_server_id)) <= 1s);
-  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
-  for (std::size_t at = 0; at + 1 < shop.asked.size(); ++at) {
-    CHECK_FALSE(shop.asked[at].is(write_single, 4002, 0));
+  CHECK(std::none_of(shop.wire.requests.begin(), shop.wire.requests.end(), reads_full_block));
+  for (std::size_t at = 0; at + 1 < shop.wire.requests.size(); ++at) {
+    CHECK_FALSE(shop.wire.requests[at].is(write_single, 4002, 0));
   }
-  CHECK(shop.asked.back().is(write_single, 4002, 0));
+  CHECK(shop.wire.requests.back().is(write_single, 4002, 0));
 }
 
 TEST_CASE("the tool is disarmed on every way out") {
   Workshop shop(busy());
   SUBCASE("at its end") { CHECK(shop.watch(5s)); }
-  SUBCASE("when nobody wants more") {
+  SUBCASE("when no more is wanted") {
     shop.wanted = 2;
     CHECK(shop.watch(60s));
     CHECK(shop.news.size() == 2);
@@ -302,12 +232,12 @@ TEST_CASE("the tool is disarmed on every way out") {
     CHECK(watched.error().name == "@holding:9999");
     CHECK(shop.told<LinkNews>().size() == 1);
   }
-  CHECK(shop.asked.back().is(write_single, 4002, 0));
+  CHECK(shop.wire.requests.back().is(write_single, 4002, 0));
 }
 
 TEST_CASE("an interrupt ends the wait for a tool that is not there") {
   Workshop shop;
-  shop.unreachable_until = TimePoint::max();
+  shop.wire.unreachable_until = TimePoint::max();
   shop.clock.at(shop.clock.now() + 25s, [&] { shop.interrupt.raise(2); });
   const auto watched = shop.watch(3600s);
   REQUIRE_FALSE(watched);
@@ -317,17 +247,17 @@ TEST_CASE("an interrupt ends the wait for a tool that is not there") {
 
 TEST_CASE("attempts come at once, then after 0.25 s, doubling up to 10 s, a fifth less at most") {
   Workshop shop;
-  shop.unreachable_until = TimePoint::max();
+  shop.wire.unreachable_until = TimePoint::max();
   REQUIRE(shop.watch(120s));
   const auto links = shop.told<LinkNews>();
-  REQUIRE(links.size() == shop.attempts.size());
+  REQUIRE(links.size() == shop.wire.attempts.size());
   REQUIRE(links.size() > 10);
-  CHECK(shop.attempts.front() == test::FakeClock::start);
+  CHECK(shop.wire.attempts.front() == test::FakeClock::start);
   Duration even = 250ms;
   bool jitters = false;
-  for (std::size_t at = 1; at < shop.attempts.size();
+  for (std::size_t at = 1; at < shop.wire.attempts.size();
        ++at, even = std::min<Duration>(10s, 2 * even)) {
-    const Duration pause = shop.attempts[at] - shop.attempts[at - 1];
+    const Duration pause = shop.wire.attempts[at] - shop.wire.attempts[at - 1];
     CAPTURE(at);
     CHECK(pause <= even);
     CHECK(pause >= even * 4 / 5);
@@ -344,8 +274,8 @@ TEST_CASE("after a lost link the missed events are a gap and the last one is fet
   Workshop shop(busy());
   // Run-downs end about every two seconds; the line is away for ten of them.
   shop.clock.at(shop.clock.now() + 10s, [&] {
-    shop.lose_line();
-    shop.unreachable_until = shop.clock.now() + 20s;
+    shop.wire.cut();
+    shop.wire.unreachable_until = shop.clock.now() + 20s;
   });
   REQUIRE(shop.watch(60s));
   const auto links = shop.told<LinkNews>();
@@ -375,7 +305,7 @@ TEST_CASE("a link that never serves is tried ever more seldom") {
   Workshop shop;
   shop.faults = {sim::parse_fault("close@every:3").value()};
   REQUIRE(shop.watch(60s));
-  CHECK(shop.attempts.size() < 14);
+  CHECK(shop.wire.attempts.size() < 14);
   CHECK(shop.told<LinkNews>().size() > 6);
 }
 
@@ -386,8 +316,8 @@ TEST_CASE("a link whose values were polled has served, and attempts are counted 
   shop.plan.values = {shop.profile.find("status.running").value()};
   for (const Duration after : {5s, 15s, 25s}) {
     shop.clock.at(shop.clock.now() + after, [&] {
-      shop.lose_line();
-      shop.unreachable_until = shop.clock.now() + 1s;
+      shop.wire.cut();
+      shop.wire.unreachable_until = shop.clock.now() + 1s;
     });
   }
   REQUIRE(shop.watch(30s));
@@ -430,7 +360,7 @@ TEST_CASE("a restarted tool is said, and what stands in its registers is no even
   Workshop shop(busy());
   shop.clock.at(shop.clock.now() + 10s, [&] {
     shop.tool->reboot(shop.clock.now());
-    shop.lose_line();
+    shop.wire.cut();
   });
   REQUIRE(shop.watch(20s));
   const auto gaps = shop.told<GapNews>();
@@ -455,7 +385,7 @@ TEST_CASE("a counter that comes to the last number, or just past it, hides no ev
   SUBCASE("just past it") { since = 21; }
   SUBCASE("farther") { since = 30; }
   shop.clock.at(shop.clock.now() + 5s, [&] {
-    shop.lose_line();
+    shop.wire.cut();
     shop.tool->reboot(shop.clock.now());
     happen(116, since);
   });
@@ -472,7 +402,7 @@ TEST_CASE("a counter that comes to the last number, or just past it, hides no ev
 TEST_CASE("what a restarted tool remembers is told as such, and what it pushes is a result") {
   Workshop shop;
   shop.clock.at(shop.clock.now() + 5s, [&] {
-    shop.lose_line();
+    shop.wire.cut();
     shop.tool->reboot(shop.clock.now());
     shop.happen();
   });
@@ -490,7 +420,7 @@ TEST_CASE("what a restarted tool remembers is told as such, and what it pushes i
 TEST_CASE("an event that was missed for a moment is a result, and no doubt about its number") {
   Workshop shop;
   shop.clock.at(shop.clock.now() + 5s, [&] {
-    shop.lose_line();
+    shop.wire.cut();
     shop.happen();
   });
   REQUIRE(shop.watch(10s));
@@ -506,12 +436,7 @@ TEST_CASE("another tool or firmware behind the address is said, and its old even
   sim::BmOptions other;
   SUBCASE("serial") { other.serial = 1021100099; }
   SUBCASE("firmware") { other.firmware = 2200; }
-  std::unique_ptr<sim::BmTool> gone;
-  shop.clock.at(shop.clock.now() + 3s, [&] {
-    shop.lose_line();
-    gone = std::move(shop.tool);  // the old line still refers to it
-    shop.power_on(other);
-  });
+  shop.clock.at(shop.clock.now() + 3s, [&] { shop.replace_tool(other); });
   REQUIRE(shop.watch(10s));
   const auto links = shop.told<LinkNews>();
   REQUIRE(links.size() == 3);
@@ -524,12 +449,8 @@ TEST_CASE("another tool or firmware behind the address is said, and its old even
 
 TEST_CASE("another product ends the watch, because no retry mends it") {
   Workshop shop;
-  std::unique_ptr<sim::BmTool> gone;
-  shop.clock.at(shop.clock.now() + 3s, [&] {
-    shop.lose_line();
-    gone = std::move(shop.tool);
-    shop.power_on({.firmware = std::uint16_t{4001}});
-  });
+  shop.clock.at(shop.clock.now() + 3s,
+                [&] { shop.replace_tool({.firmware = std::uint16_t{4001}}); });
   const auto watched = shop.watch(10s);
   REQUIRE_FALSE(watched);
   CHECK(watched.error().code == Errc::wrong_generation);
@@ -539,28 +460,28 @@ TEST_CASE("without reconnection the first trouble ends it") {
   Workshop shop(busy());
   shop.reconnection = Reconnection::never;
   SUBCASE("the link is lost") {
-    shop.clock.at(shop.clock.now() + 5s, [&] { shop.lose_line(); });
+    shop.clock.at(shop.clock.now() + 5s, [&] { shop.wire.cut(); });
     const auto watched = shop.watch(60s);
     REQUIRE_FALSE(watched);
     CHECK(watched.error().code == Errc::closed);
     CHECK(shop.told<LinkNews>().back().state == LinkState::lost);
   }
-  SUBCASE("nobody is there") {
-    shop.unreachable_until = TimePoint::max();
+  SUBCASE("the tool is not there") {
+    shop.wire.unreachable_until = TimePoint::max();
     const auto watched = shop.watch(60s);
     REQUIRE_FALSE(watched);
     CHECK(watched.error().code == Errc::connection_refused);
     CHECK(shop.news.empty());
   }
-  CHECK(shop.attempts.size() == 1);
+  CHECK(shop.wire.attempts.size() == 1);
 }
 
 TEST_CASE("an event is told at once, however long a keep-alive goes without an answer") {
   Workshop shop;
   shop.faults = {sim::parse_fault("lost@every:3").value()};
   std::vector<TimePoint> happened;
-  shop.on_request = [&](const modbus::Pdu& request) {
-    if (request.function != report_server_id || shop.asked.size() < 6) return;
+  shop.wire.before = [&](const modbus::Pdu& request) {
+    if (request.function != report_server_id || shop.wire.requests.size() < 6) return;
     happened.push_back(shop.clock.now());
     shop.happen();
   };
@@ -573,11 +494,11 @@ TEST_CASE("an event is told at once, however long a keep-alive goes without an a
   }
 }
 
-TEST_CASE("a counter that runs away from whoever polls it is told as it was seen") {
+TEST_CASE("a counter that runs away from its polls is told as it was seen") {
   Workshop shop;
   shop.plan.events = EventMode::unarmed;
   std::uint16_t last = 0;
-  shop.on_request = [&](const modbus::Pdu& request) {
+  shop.wire.before = [&](const modbus::Pdu& request) {
     if (request.function != read_input) return;
     shop.happen();
     last = static_cast<std::uint16_t>(last + 1);
@@ -602,7 +523,7 @@ TEST_CASE("polling the counter finds every event and arms nothing") {
   for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
   CHECK(shop.told<EventNews>().front().source == EventOrigin::poll);
   CHECK(shop.times(write_single).empty());
-  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
+  CHECK(std::none_of(shop.wire.requests.begin(), shop.wire.requests.end(), reads_full_block));
 }
 
 TEST_CASE("events that come between two polls are a gap") {
@@ -671,7 +592,7 @@ TEST_CASE("a tool that hangs up behind every answer is connected on the beat of 
     CHECK(polled[at] - polled[at - 1] > 4990ms);
     CHECK(polled[at] - polled[at - 1] < 5010ms);
   }
-  CHECK(shop.attempts.size() <= polled.size() + 1);
+  CHECK(shop.wire.attempts.size() <= polled.size() + 1);
 }
 
 TEST_CASE("pauses grow until a connection has lasted") {
@@ -679,10 +600,10 @@ TEST_CASE("pauses grow until a connection has lasted") {
   shop.plan.interval = 200ms;
   REQUIRE(shop.watch(60s));
   // At 0, 0, 0.25, 0.75, 1.75, 3.75, 7.75, 15.75 s and then every ten seconds, or a fifth sooner.
-  CHECK(shop.attempts.size() > 8);
-  CHECK(shop.attempts.size() < 18);
-  CHECK(longest_pause(shop.attempts) > 7s);
-  CHECK(longest_pause(shop.attempts) <= 10100ms);
+  CHECK(shop.wire.attempts.size() > 8);
+  CHECK(shop.wire.attempts.size() < 18);
+  CHECK(longest_pause(shop.wire.attempts) > 7s);
+  CHECK(longest_pause(shop.wire.attempts) <= 10100ms);
 }
 
 TEST_CASE("a beat that was missed is told, at once and then once a minute") {
@@ -720,6 +641,6 @@ TEST_CASE("whole blocks of event and status are polled in parts while output is 
   }
   REQUIRE(shop.plan.values.size() > 20);
   REQUIRE(shop.watch(20s));
-  CHECK(std::none_of(shop.asked.begin(), shop.asked.end(), reads_full_block));
+  CHECK(std::none_of(shop.wire.requests.begin(), shop.wire.requests.end(), reads_full_block));
   CHECK(longest_pause(shop.times(report_server_id)) <= 1s);
 }
