@@ -163,8 +163,9 @@ class UsageTest(unittest.TestCase):
 
 class BadFileTest(unittest.TestCase):
     def test_bad_profiles(self):
-        files = sorted((support.ROOT / "tests" / "profiles" / "bad").glob("*.yaml"))
-        self.assertTrue(files, "no bad profiles to try")
+        # One in ten: what is found in each of them is shown in profile_store_test.
+        files = sorted((support.ROOT / "tests" / "profiles" / "bad").glob("*.yaml"))[::10]
+        self.assertGreater(len(files), 10, "no bad profiles to try")
         for file in files:
             with self.subTest(file.name):
                 finished = support.run("profile", "check", file, "--json")
