@@ -17,7 +17,7 @@
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/sim/blv_driver.hpp"
-#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
 
@@ -74,7 +74,8 @@ std::int64_t number_of(Dice& dice, const Shape& shape) {
   return shape.lowest + static_cast<std::int64_t>(dice.upto(width));
 }
 
-/// Writes one profile: of a screwdriver, of a motor driver, or one that extends ours.
+/// Writes one profile: of a screwdriver, of a motor driver, of bare registers, or one that extends
+/// ours.
 class Author {
  public:
   explicit Author(std::uint64_t seed) : dice_(seed), id_(fmt::format("trial-{}", seed)) {}
@@ -114,6 +115,9 @@ class Author {
         return;
       case 2:
         return screwdriver();
+      case 3:
+        text_ += link(dice_.one_in(2) ? "tcp" : "rtu");
+        return;
       default:
         return motor();
     }
@@ -436,19 +440,13 @@ TEST_CASE("generated profiles: what passes the checks can be simulated and asked
     REQUIRE(profile);
     REQUIRE(start);
     ++valid;
-    if (profile->run && profile->run->word() != nullptr) {
-      const auto bus = sim::make_blv_bus(
-          *profile, *start,
-          {.alarms = {{.code = 0x30, .after = 1s}}, .warnings = {{.code = 0x21}}});
-      besiege(*bus, seed);
-    } else {
-      sim::BmOptions options{.rundown_every = 3s, .ng_every = 2, .burst = 2};
-      options.alarms = {{.code = 110, .after = 5s}};
-      options.faults = {{.kind = sim::FaultKind::reset_neighbour, .number = 5000, .every = 2},
-                        {.kind = sim::FaultKind::store_other, .every = 3}};
-      const auto tool = sim::make_bm_tool(*profile, *start, options);
-      besiege(*tool, seed);
-    }
+    sim::BmOptions tool{.rundown_every = 3s, .ng_every = 2, .burst = 2};
+    tool.alarms = {{.code = 110, .after = 5s}};
+    tool.faults = {{.kind = sim::FaultKind::reset_neighbour, .number = 5000, .every = 2},
+                   {.kind = sim::FaultKind::store_other, .every = 3}};
+    const sim::BlvOptions bus{.alarms = {{.code = 0x30, .after = 1s}},
+                              .warnings = {{.code = 0x21}}};
+    besiege(*sim::make_simulated_server(*profile, *start, tool, bus), seed);
   }
   // Else the author has forgotten how to write. Some of what it writes is unguarded by accident.
   CHECK(valid * 5 >= trials().size() * 3);
@@ -493,7 +491,10 @@ TEST_CASE("generated profiles: every verb ends in a result or in an error of its
         lines.push_back({"set", tool, parameter.name + "=" + value, "--yes"});
       }
     }
+    // What is inherited does the same for each heir.
+    const bool inherits = text.find("\nextends:") != std::string::npos;
     for (const catalogue::Action& action : profile->actions) {
+      if (inherits && !action.name.starts_with("own")) continue;
       const std::string value = action.value ? "" : fmt::format("={}", action.minimum);
       lines.push_back({"do", tool, action.name + value, "--yes", "--accept-unverified"});
     }
