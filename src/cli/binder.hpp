@@ -53,7 +53,8 @@ auto one_of(const EnumTable<E, count>& table) {
 
 /// What is wrong with the options of a command, found while they are parsed.
 struct Faults {
-  /// A check over several options, made when all were read; empty where all is well.
+  /// A check over several options, made when all were read; empty where all is well. It may move
+  /// what was typed to where it belongs.
   using Check = std::function<std::optional<Error>()>;
 
   std::vector<Check> required = {};  ///< arguments that must be there

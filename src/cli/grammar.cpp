@@ -168,8 +168,8 @@ void add_command(CLI::App& parent, Draft& draft, const Words& words, Options& op
   command->final_callback([&draft, &options, command, run] {
     if (draft.chosen != nullptr) return;  // a command below this one was named
     draft.chosen = command;
-    draft.invocation.run = [options, fault = draft.faults[command].first(),
-                            run](Context& context) -> Result<Outcome> {
+    const auto fault = draft.faults[command].first();  // the checks come before the copy
+    draft.invocation.run = [options, fault, run](Context& context) -> Result<Outcome> {
       auto outcome = fault ? Result<Outcome>(tl::unexpected(*fault)) : run(options, context);
       return std::move(outcome).map_error([&](Error error) {
         if (error.asked_of.empty()) error.asked_of = asked_of(options);
@@ -497,8 +497,8 @@ void add_backup(CLI::App& app, Draft& draft) {
               });
 }
 
-/// Beside --dir no second side and no FILE is named, so what stands there is the first NAME. Else it
-/// is needed.
+/// Beside --dir no second side and no FILE is named, so what stands there is the first NAME. Else
+/// it is needed.
 std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
                                   const std::string& folder, std::vector<std::string>& names,
                                   std::string_view command) {
@@ -516,22 +516,21 @@ void add_diff(CLI::App& app, Draft& draft) {
                            "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
                            "spindle diff station3 station4 --ignore 'preset.1.*'\n"
                            "spindle diff @line1 --dir backups"};
-  add_command(app, draft, words, draft.options.diff, commands::diff,
-              [](Binder& bind, commands::DiffOptions& options) {
-                bind.required("A", options.a,
-                              "tool, backup file, or 'defaults'; with --dir also @group");
-                bind.argument("B", options.b, "tool, backup file, or 'defaults'");
-                bind.argument("NAME", options.patterns, "compare only these");
-                bind.repeatable("--ignore", "PATTERN", options.ignored,
-                                "leave these out, repeatable");
-                bind.option("--dir", "FOLDER", options.folder,
-                            "compare each tool with its own backup in this folder, as backup "
-                            "--dir writes it");
-                bind_jobs(bind, options.jobs);
-                bind.check([&options] {
-                  return make_name_of("B", options.b, options.folder, options.patterns, "diff");
-                });
-              });
+  add_command(
+      app, draft, words, draft.options.diff, commands::diff,
+      [](Binder& bind, commands::DiffOptions& options) {
+        bind.required("A", options.a, "tool, backup file, or 'defaults'; with --dir also @group");
+        bind.argument("B", options.b, "tool, backup file, or 'defaults'");
+        bind.argument("NAME", options.patterns, "compare only these");
+        bind.repeatable("--ignore", "PATTERN", options.ignored, "leave these out, repeatable");
+        bind.option("--dir", "FOLDER", options.folder,
+                    "compare each tool with its own backup in this folder, as backup "
+                    "--dir writes it");
+        bind_jobs(bind, options.jobs);
+        bind.check([&options] {
+          return make_name_of("B", options.b, options.folder, options.patterns, "diff");
+        });
+      });
 }
 
 void add_restore(CLI::App& app, Draft& draft) {

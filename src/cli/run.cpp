@@ -165,8 +165,7 @@ Result<void> tell_version(const World& world, report::Format format, report::Ren
                                         library, files::profile_format);
   if (format != report::Format::json) return world.io.out(plain + "\n");
   report::Texts profiles;
-  for (const auto& entry :
-       profile_store(world).list()) {
+  for (const auto& entry : profile_store(world).list()) {
     profiles.push_back(entry.id);
   }
   return renderer.line({.type = "version",

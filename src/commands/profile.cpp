@@ -20,16 +20,16 @@ const std::array<Column, 5> profile_columns = {{{"PROFILE", "profile"},
                                                 {"FILE", "file"}}};
 
 Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
-  return {.type = "profile",
-          .target = {},
-          .time = clock.wall(),
-          .fields = {{"profile", profile.id},
-                     {"title", profile.title},
-                     {"parameters", count(profile.parameters.size())},
-                     {"actions", count(profile.actions.size())},
-                     {"file", files::names_profile_file(profile.path)
-                                  ? profile.path.to_string()
-                                  : std::string(files::built_in)}}};
+  return {
+      .type = "profile",
+      .target = {},
+      .time = clock.wall(),
+      .fields = {{"profile", profile.id},
+                 {"title", profile.title},
+                 {"parameters", count(profile.parameters.size())},
+                 {"actions", count(profile.actions.size())},
+                 {"file", files::names_profile_file(profile.path) ? profile.path.to_string()
+                                                                  : std::string(files::built_in)}}};
 }
 
 }  // namespace

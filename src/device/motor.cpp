@@ -40,7 +40,7 @@ Result<MotorMonitor> MotorMonitor::of(const MonitorFacts& facts,
   MotorMonitor monitor;
   monitor.facts_ = facts;
   for (const catalogue::Text* name : {&facts.status, &facts.command_speed, &facts.feedback_speed,
-                                  &facts.alarm, &facts.warning, &facts.load}) {
+                                      &facts.alarm, &facts.warning, &facts.load}) {
     if (name->empty()) continue;
     auto parameter = profile.find(*name);
     if (!parameter) return tl::unexpected(std::move(parameter.error()));

@@ -96,7 +96,8 @@ void read_command(const YamlNode& node, CommandWordFacts& run, Need need, Findin
   map.finish();
 }
 
-void read_codes_of_status(YamlMap& map, std::string_view key, catalogue::List<std::int64_t>& codes) {
+void read_codes_of_status(YamlMap& map, std::string_view key,
+                          catalogue::List<std::int64_t>& codes) {
   const YamlNode* node = map.get(key);
   if (node == nullptr) return;
   expect(*node, YamlNode::Kind::sequence, map.findings());

@@ -265,8 +265,8 @@ class RunRules {
   // ---- what a motor says ----
 
   void check_monitor(const MonitorFacts& monitor, const Position& at) {
-    for (const catalogue::Text* name : {&monitor.command_speed, &monitor.feedback_speed, &monitor.load,
-                                    &monitor.alarm, &monitor.warning}) {
+    for (const catalogue::Text* name : {&monitor.command_speed, &monitor.feedback_speed,
+                                        &monitor.load, &monitor.alarm, &monitor.warning}) {
       require_optional(*name, at);
     }
     if (monitor.status.empty()) {

@@ -124,7 +124,8 @@ std::string words_of(const ActionRequest& request) {
       std::find_if(action.labels.begin(), action.labels.end(),
                    [&](const catalogue::Label& one) { return one.number == request.value; });
   const bool labelled = label != action.labels.end();
-  return fmt::format("{}={}", action.name, labelled ? label->text.to_string() : std::to_string(request.value));
+  return fmt::format("{}={}", action.name,
+                     labelled ? label->text.to_string() : std::to_string(request.value));
 }
 
 Result<void> check_evidence(const Action& action, const Target& target, Acceptance acceptance) {

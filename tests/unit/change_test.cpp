@@ -109,12 +109,11 @@ catalogue::Profile bank_profile() {
   Parameter a;
   a.name = "a";
   a.access = catalogue::Access::read_write;
-  profile.parameters.push_back(a);
   Parameter wide = a;
   wide.name = "wide";
   wide.address = {10};
   wide.encoding.kind = catalogue::Kind::u32;
-  profile.parameters.push_back(wide);
+  profile.parameters = {a, wide};
   return profile;
 }
 
@@ -141,8 +140,8 @@ struct Bench : test::Rig<Bank> {
   std::vector<std::string> records() const {
     std::vector<std::string> lines;
     std::istringstream written(memory.text("/state/changes.jsonl"));
-    for (std::string line; std::getline(written, line);) {
-      const auto change = nlohmann::json::parse(line);
+    for (std::string text; std::getline(written, text);) {
+      const auto change = nlohmann::json::parse(text);
       lines.push_back(change.at("result").get<std::string>() + " " + change.at("old").dump() + " " +
                       change.at("new").dump());
     }

@@ -112,12 +112,12 @@ TEST_CASE("complete: options are those that the profile declares") {
 }
 
 TEST_CASE("complete: a group is offered where several tools make sense") {
-  for (const char* command :
-       {"identify", "get", "set", "do", "watch", "remote-stop", "alarms", "backup", "ping"}) {
+  for (const char* command : {"identify", "get", "set", "do", "watch", "remote-stop", "alarms",
+                              "backup", "ping", "diff", "restore"}) {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@line1", "@single"});
   }
-  for (const char* command : {"list", "remote-start", "restore", "diff", "scan"}) {
+  for (const char* command : {"list", "remote-start", "scan"}) {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@single"});
   }
