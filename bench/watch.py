@@ -33,7 +33,7 @@ def event_frame(number):
 
 
 class Tool:
-    """The registers of one tool whose events are made by whoever measures."""
+    """The registers of one tool whose events are made by the measuring program."""
 
     def __init__(self):
         self.number = 0

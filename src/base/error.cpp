@@ -49,7 +49,7 @@ constexpr std::array errors = {
     ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed",
              "answer 'y', or add --yes, when you are sure"},
     ErrcInfo{Errc::unverified, ExitStatus::usage,
-             "nobody has verified this action on this product, nothing was sent",
+             "this action is not verified on this product, nothing was sent",
              "check it on the tool, then give --accept-unverified or list it under 'verified' in "
              "the tools file"},
     ErrcInfo{Errc::bad_file, ExitStatus::bad_file, "the file cannot be used", ""},
@@ -107,7 +107,7 @@ constexpr std::array errors = {
              "check the file, disk or program that it goes to"},
     ErrcInfo{Errc::interrupted, ExitStatus::interrupted, "interrupted", ""},
     ErrcInfo{Errc::terminated, ExitStatus::terminated, "terminated", ""},
-    ErrcInfo{Errc::closed_pipe, ExitStatus::ok, "nobody reads the output any more", ""},
+    ErrcInfo{Errc::closed_pipe, ExitStatus::ok, "the output has no reader any more", ""},
 };
 
 // info() finds a row by its place.
@@ -124,7 +124,7 @@ void replace(std::string& text, std::string_view what, std::string_view by) {
   if (at != std::string::npos) text.replace(at, what.size(), by);
 }
 
-// A measured time has digits that nobody wants to read.
+// A measured time has digits that are not worth reading.
 std::string waited_text(Duration waited) {
   using std::chrono::milliseconds;
   if (waited < milliseconds(1)) return to_text(waited);
@@ -133,7 +133,7 @@ std::string waited_text(Duration waited) {
 
 std::string expand(std::string_view sentence, const Error& error) {
   std::string text(sentence);
-  // A line also breaks while nobody asks anything.
+  // A line also breaks while nothing is asked.
   if (error.tried.empty()) replace(text, " during '{tried}'", "");
   replace(text, "'{tried}'", error.tried.empty() ? "the request" : "'" + error.tried + "'");
   replace(text, "{waited}", error.waited ? waited_text(*error.waited) : "the time allowed");

@@ -78,7 +78,7 @@ Error not_a_label(const Parameter& parameter, std::string_view text) {
       with_suggestion(fmt::format("it has {}", list_labels(parameter)), suggestion(text, names)));
 }
 
-/// For somebody who typed a word, or a comma where a point is meant.
+/// For a user who typed a word, or a comma where a point is meant.
 Error not_a_number(const Parameter& parameter, std::string_view text) {
   const bool has_decimals = parameter.encoding.scale.exponent() < 0;
   return fault(Errc::bad_value, parameter, fmt::format("'{}' is not a number", text),

@@ -309,7 +309,7 @@ std::string scan_words() {
   return "The line is asked at the rate and parity of the target or profile, and at no others: a\n"
          "driver that hears three bad frames in a row stops its motor, and every frame at a wrong\n"
          "rate is bad. A wrong unit costs one --timeout; nothing is asked twice. Behind a gateway\n"
-         "(tcp://) a unit that the gateway can not reach counts as absent.\n";
+         "(tcp://) a unit that the gateway cannot reach counts as absent.\n";
 }
 
 void add_scan(CLI::App& app, Draft& draft) {
@@ -604,7 +604,7 @@ void bind_simulated_work(Binder& bind, sim::BmOptions& bm) {
   bind.option("--model", "N", bm.tool_model, NumberFrom{0, 0xFFFF}, "tool model code to report")
       ->group(of_identity);
   bind.option("--rundown-every", "DURATION", bm.rundown_every, to_duration,
-              "an operator who drives a screw at this interval (default: nobody)")
+              "an operator who drives a screw at this interval (default: no operator)")
       ->group(of_screwdrivers);
   const auto* every = bind.option("--ng-every", "N", bm.ng_every, NumberFrom{0, 1'000'000},
                                   "every so many of the operator's screws end NG")

@@ -33,7 +33,7 @@ std::string xdg_folder(const World& world, std::string_view name, std::string_vi
   return home.empty() ? std::string() : home + "/" + std::string(below_home);
 }
 
-/// Where spindle keeps what it remembers between runs; empty when nobody says.
+/// Where spindle keeps what it remembers between runs; empty when it is not said.
 std::string state_folder(const World& world) {
   const std::string folder = xdg_folder(world, "XDG_STATE_HOME", ".local/state");
   return folder.empty() ? folder : folder + "/spindle";
@@ -139,11 +139,11 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   return invocation.run(context);
 }
 
-/// Tells why, and says with which status to end. Nobody is left to tell after a closed pipe.
+/// Tells why, and says with which status to end. No reader is left after a closed pipe.
 int tell(const Error& error, World& world, report::Renderer& renderer) {
   if (error.code == Errc::closed_pipe) return exit_status(ExitStatus::ok);
   const auto told = renderer.error(error, world.clock.wall());
-  static_cast<void>(told);  // the status says it even where the words can not
+  static_cast<void>(told);  // the status says it even where the words cannot
   return exit_status(error.status());
 }
 

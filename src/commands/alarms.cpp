@@ -22,7 +22,7 @@ struct AlarmPlan {
 /// Nothing that is sent ends such an alarm, and its cause has to be dealt with first.
 Error not_resettable(const AlarmReport& report) {
   return {.code = Errc::negative,
-          .message = fmt::format("alarm {} can not be reset by command, nothing was sent",
+          .message = fmt::format("alarm {} cannot be reset by command, nothing was sent",
                                  report.present.to_string()),
           .hint = "remove its cause, then switch the tool off and on"};
 }

@@ -25,7 +25,7 @@ const std::array<Column, 3> columns = {{{"FILE", "file"},
                                         {"PARAMETERS", "parameters", Align::right},
                                         {"MISSING", "missing", Align::right}}};
 
-/// A profile that can not be read is told before a tool is asked.
+/// A profile that cannot be read is told before a tool is asked.
 Result<void> check_profiles(const std::vector<Target>& targets, const Context& context) {
   for (const Target& target : targets) {
     if (auto profile = load_profile(target, context); !profile) {

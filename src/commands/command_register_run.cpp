@@ -66,7 +66,7 @@ class RegisterSetup final : public MotorSetup {
     return {};
   }
 
-  /// A start that stands at speed 0 would turn the motor when a speed is set, and one that can not
+  /// A start that stands at speed 0 would turn the motor when a speed is set, and one that cannot
   /// be read may.
   Result<void> clear_command() {
     const auto found = read_number(plan_->model->command_parameter());

@@ -116,7 +116,7 @@ Parameter WordSetup::written_as(const Parameter& parameter, const Value& before,
 
 std::string WordSetup::left_note(const Parameter& parameter) const {
   if (parameter.name != facts().watchdog) return {};
-  return "; the driver stops with an alarm when nobody asks it";
+  return "; the driver stops with an alarm when no client asks it";
 }
 
 std::uint16_t WordSetup::standard_word() const {
@@ -138,7 +138,7 @@ Result<void> WordSetup::check_ready() {
   return check_inputs().and_then([&] { return check_analog(); });
 }
 
-/// A start whose word can not be made for this driver is none.
+/// A start whose word cannot be made for this driver is none.
 Result<void> WordSetup::check_inputs() const {
   const std::uint16_t word = standard_word();
   if (found_.bits.word(word)) return {};

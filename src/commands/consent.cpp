@@ -27,7 +27,7 @@ Result<std::optional<std::string>> ask(std::string_view what, std::string_view q
   context.io.err(fmt::format("{}. {} ", what, question));
   const auto answer = context.io.read_line();
   if (answer) return *answer;
-  context.io.err("\n");  // behind a question that nobody answered, the terminal's line goes on
+  context.io.err("\n");  // behind a question without an answer, the terminal's line goes on
   if (context.interrupt.signalled()) return tl::unexpected(context.interrupt.error());
   return "";
 }

@@ -7,7 +7,7 @@
 
 namespace spindle::commands {
 
-/// Whether a question would reach somebody: nobody is asked with --yes or --no-input, nor where
+/// Whether a question would reach a user: none is asked with --yes or --no-input, nor where
 /// stdin or stderr is no terminal.
 bool can_ask(const Context& context);
 
@@ -15,8 +15,8 @@ bool can_ask(const Context& context);
 /// refused with `not_confirmed`, and the flag is named. `what` completes "… changes nothing yet:".
 Result<void> ask_consent(std::string_view what, const Context& context);
 
-/// Refuses as ask_consent() does where nobody can be asked; asks nothing. For who has to look at a
-/// tool before the question can be put.
+/// Refuses as ask_consent() does where no user can be asked; asks nothing. For a command that has
+/// to look at a tool before the question can be put.
 Result<void> require_answer(std::string_view what, const Context& context);
 
 /// Asks about a tool that was looked at, which --yes does not answer. The tool is let go while the

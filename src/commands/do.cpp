@@ -18,7 +18,7 @@ using catalogue::Action;
 using catalogue::Hazard;
 using catalogue::Profile;
 
-/// A started motion needs somebody who stops it again, and this command ends at once.
+/// A started motion needs a command that stops it again, and this command ends at once.
 Result<void> check_guard(const ActionRequest& request, const Profile& profile) {
   const bool starts = request.action.motion == catalogue::Motion::start ||
                       (request.action.stop_value && request.value != *request.action.stop_value);

@@ -60,7 +60,7 @@ class SharedOutput final : public GroupOutput {
  private:
   class Member;
 
-  /// Draws, unless nobody reads any more.
+  /// Draws, unless there is no reader any more.
   template <typename Draw>
   Result<void> draw(Draw draw);
 

@@ -66,7 +66,7 @@ class GuardedRun {
                                                   const std::function<void()>& begin,
                                                   const std::function<Result<void>()>& follow);
 
-  /// Error `closed_pipe` when nobody reads the output any more.
+  /// Error `closed_pipe` when the output has no reader any more.
   Result<void> check_reader() const;
 
   /// On a terminal, while something goes on.
@@ -95,7 +95,7 @@ class GuardedRun {
   device::RunGuard::Reopen reopener();
   /// A stop that could not be confirmed: nothing else matters as much.
   void fail(const device::StopReport& unconfirmed);
-  /// Each on its own: they reach people even where nobody reads the records any more.
+  /// Each on its own: they reach people even where the records have no reader any more.
   Result<void> tell_errors();
   void tell_left() const;
   /// Waits until what was told is taken.

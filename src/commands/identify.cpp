@@ -99,7 +99,7 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
   found.maker = tool.profile->maker;
   found.series = tool.profile->series;
   found.identity.notes.push_back(fmt::format(
-      "{}, but {} can not prove what it is: profile {} is what the user named",
+      "{}, but {} cannot prove what it is: profile {} is what the user named",
       tool.profile->link.loopback ? "answers a loop-back" : "answers",
       tool.profile->series.empty() ? "it" : "a " + tool.profile->series, tool.profile->id));
   if (auto words = motor_state_words(tool); !words.empty()) {
@@ -110,7 +110,7 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
 
 Result<Identified> identify_one(OpenTool& tool, const Context& context) {
   const Target& target = tool.target;
-  // What says nothing of an identity can not be contradicted by one.
+  // What says nothing of an identity cannot be contradicted by one.
   const bool named = !target.profile.empty();
   if (named && !tool.profile->identity) return meet(tool, context.clock);
   if (!named && target.endpoint.medium != link::Medium::tcp) {

@@ -20,7 +20,7 @@ class Listing {
   }
   /// As one of the tool that the context is about.
   void add(const Error& error);
-  /// Whether anybody still reads.
+  /// Whether there is still a reader.
   [[nodiscard]] bool open() const { return drawn_.has_value(); }
   Result<void> end() {
     if (drawn_) drawn_ = context_->renderer.end();

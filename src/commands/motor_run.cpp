@@ -86,8 +86,8 @@ class MotorRun final : public ToolRun {
     return {};
   }
 
-  /// An alarm may have ended the run where nobody looked: by the driver's own watchdog while this
-  /// program was kept from asking it.
+  /// An alarm may have ended the run where the program did not look: by the driver's own watchdog
+  /// while this program was kept from asking it.
   void look_back(Result<void>& followed, const device::StopReport& stop) override {
     if (stop.result != device::StopResult::confirmed || monitor_ == nullptr) return;
     auto state = monitor_->look(tool().device);
@@ -152,7 +152,7 @@ class MotorRun final : public ToolRun {
                          "'spindle alarms' shows what helps");
       case MotorEnding::stopped:
         return not_ready(target, "the motor stopped before its time, and not by this program",
-                         "does somebody else command it?");
+                         "does another program command it?");
       case MotorEnding::ignored:
         return with_target(
             {.code = Errc::mismatch,

@@ -11,7 +11,7 @@ namespace spindle::commands {
 using MakeMotorSetup = std::function<std::unique_ptr<MotorSetup>(work::ChangeLog&)>;
 
 /// The run of a motor that is told by polling it, or by nothing where `monitor` is null: until its
-/// time is over, or somebody ends it. All but `make_setup` must outlive it.
+/// time is over, or a signal ends it. All but `make_setup` must outlive it.
 std::unique_ptr<ToolRun> make_motor_run(const MotorPlan& plan, const device::MotorMonitor* monitor,
                                         OpenTool& tool, Context& context,
                                         const MakeMotorSetup& make_setup);

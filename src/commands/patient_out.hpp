@@ -15,7 +15,7 @@
 namespace spindle::commands {
 
 /// As long as it lives, what is written to standard output waits in a queue for a thread of its
-/// own, so that a reader who takes nothing holds up nobody who watches tools. Order stays, and each
+/// own, so that a reader who takes nothing holds up no watch of a tool. Order stays, and each
 /// piece is written as soon as those before it are. Where the streams have no `out_for`, everything
 /// is written at once, as ever.
 ///
@@ -36,10 +36,10 @@ class PatientOut {
   /// From when the queue is full until a quarter of it is free again.
   [[nodiscard]] bool is_full();
 
-  /// Waits until all is written, or nobody seems to take it.
+  /// Waits until all is written, or no reader seems to take it.
   void settle();
 
-  /// Waits until all is written, for as long as that takes; after a signal only as long as somebody
+  /// Waits until all is written, for as long as that takes; after a signal only as long as a reader
   /// takes it. Returns how many pieces are left. Fails as `Streams::out` does.
   Result<std::size_t> drain();
 
@@ -58,7 +58,7 @@ class PatientOut {
   std::condition_variable written_ = {};
   std::deque<std::string> waiting_ = {};  ///< the first one until it is written whole
   std::optional<Error> failure_ = std::nullopt;
-  unsigned stalls_ = 0;  ///< how often in a row nobody took anything
+  unsigned stalls_ = 0;  ///< how often in a row the reader took nothing
   bool full_ = false;
   bool ending_ = false;
   std::thread writer_ = {};

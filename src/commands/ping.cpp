@@ -104,7 +104,7 @@ class Ping final : public Verb<std::monostate, Statistics> {
     return end(listing, counted, tool.target, context);
   }
 
-  /// A tool that can not be reached keeps none of the others from being asked, and is counted.
+  /// A tool that cannot be reached keeps none of the others from being asked, and is counted.
   Result<Done> give_up(const Target& target, const Plan* /*plan*/, const Error& error,
                        Context& context) const override {
     Statistics none;

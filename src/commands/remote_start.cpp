@@ -11,7 +11,7 @@ namespace spindle::commands {
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context) {
   const auto target =
       resolve_target(options.target, context,
-                     {.why = "a motion is started one tool at a time, by somebody who watches it",
+                     {.why = "a motion is started one tool at a time, by a user who watches it",
                       .instead = "start them one after the other, beginning with"});
   if (!target) return tl::unexpected(target.error());
   const auto plan_for = [&](const catalogue::Profile& profile) {

@@ -133,7 +133,7 @@ Summary summary_of(const Outcome& outcome, Reach reach, std::size_t unproven) {
 }  // namespace
 
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) {
-  // Nobody's wrong name keeps another tool running, and no fault of the tools file.
+  // No wrong name keeps another tool running, and no fault of the tools file.
   auto [targets, faults] = resolve_each_target(options.targets, context);
   for (Target& target : targets) {
     target.reach = options.reach;

@@ -88,7 +88,7 @@ Result<void> RestoreRun::save_present() {
   if (task_->plan.writes.empty()) return {};
   if (context_->state_folder.empty()) {
     return tl::unexpected(Error{.code = Errc::bad_file,
-                                .message = "the tool's present state can not be saved: neither "
+                                .message = "the tool's present state cannot be saved: neither "
                                            "XDG_STATE_HOME nor HOME is set, so nothing was written",
                                 .hint = "set one of them to a folder"});
   }
@@ -205,7 +205,7 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
     return;
   }
   const std::string holds = report.now ? fmt::format("holds {}", report.now->to_string())
-                                       : fmt::format("holds {} or {}, nobody knows",
+                                       : fmt::format("holds {} or {}, it is not known which",
                                                      tried.to_string(), before.to_string());
   Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
                                              before.to_string(), holds, report.trouble));
@@ -255,7 +255,7 @@ std::string RestoreRun::command_to_finish() const {
   return command_for(tool_->target, *context_, task_->file, options_->patterns);
 }
 
-/// What was written and is not put back, because nobody wants it so.
+/// What was written and is not put back, because it is wanted so.
 void RestoreRun::tell_what_stays() {
   const std::size_t planned = task_->plan.writes.size();
   const bool left = !errors_.empty() && counts_.written < planned && counts_.rolled_back == 0;

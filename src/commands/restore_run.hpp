@@ -60,7 +60,7 @@ class RestoreRun {
   ProgressLine progress_;
   std::optional<Listing> listing_ = std::nullopt;
   Outcome outcome_ = {};
-  std::vector<Error> errors_ = {};  ///< told last, where nobody overlooks them
+  std::vector<Error> errors_ = {};  ///< told last, where they are not overlooked
   std::string saved_ = {};
   RestoreCounts counts_;
 };

@@ -13,7 +13,7 @@ namespace spindle::commands {
 template <typename Plan>
 struct Preflight {
   std::vector<Planned<Plan>> planned = {};
-  Outcome unavailable = {};  ///< of tools that can not be had now: the others go on
+  Outcome unavailable = {};  ///< of tools that cannot be had now: the others go on
   Outcome rejected = {};     ///< of tools that what was asked for does not fit: none goes on
 };
 
@@ -139,7 +139,7 @@ Result<Outcome> VerbRun<V>::each_alone(const std::vector<Target>& tools) const {
 
 // ---- several tools, planned together ----
 
-/// A tool whose profile nobody named is asked what it is.
+/// A tool whose profile was not named is asked what it is.
 template <typename V>
 auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) const
     -> Result<Planned<Plan>> {

@@ -59,14 +59,14 @@ bool is_silence(const Error& error) {
   return error.code == Errc::no_answer || error.code == Errc::local_echo;
 }
 
-/// A gateway says for a unit that it can not reach it.
+/// A gateway says for a unit that it cannot reach it.
 bool is_absence(const device::Probe& probe) {
   using enum modbus::ExceptionCode;
   return probe.exception == static_cast<std::uint8_t>(gateway_path_unavailable) ||
          probe.exception == static_cast<std::uint8_t>(gateway_target_failed_to_respond);
 }
 
-/// Somebody speaks where one unit should, and can not be understood: two units of one address, a
+/// Something speaks where one unit should, and cannot be understood: two units of one address, a
 /// bad line.
 bool is_noise(const Error& error) {
   return error.code == Errc::bad_checksum || error.code == Errc::incomplete_answer ||

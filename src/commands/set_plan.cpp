@@ -16,7 +16,7 @@ using catalogue::Parameter;
 using catalogue::Profile;
 using catalogue::Value;
 
-/// Why a parameter can not be written. A raw register says what it belongs to instead.
+/// Why a parameter cannot be written. A raw register says what it belongs to instead.
 Error not_writable(const Parameter& parameter, const Profile& profile) {
   Error error{
       .code = Errc::read_only, .name = parameter.name, .register_address = parameter.address.value};
@@ -87,7 +87,7 @@ std::optional<Decimal> number_of(const std::optional<Value>& value) {
   return value ? std::optional(value->number) : std::nullopt;
 }
 
-/// The tool's own limits; a parameter whose limits should exist but can not be read is not written.
+/// The tool's own limits; a parameter whose limits should exist but cannot be read is not written.
 Result<void> check_own_limits(const Assignment& assignment, const device::Reading& reading,
                               const Profile& profile) {
   if (reading.limits_error) return tl::unexpected(*reading.limits_error);

@@ -20,7 +20,7 @@ struct Assignment {
 /// One assignment with what the tool holds now.
 struct SetStep {
   Assignment assignment;
-  std::optional<catalogue::Value> before;  ///< empty: it can not be asked
+  std::optional<catalogue::Value> before;  ///< empty: it cannot be asked
 
   [[nodiscard]] bool changes() const { return before != assignment.value; }
 };

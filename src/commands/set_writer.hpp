@@ -32,7 +32,7 @@ class SetWriter {
   /// Writes what differs, reads each back, and ends with a summary.
   Result<SetResult> write(const std::vector<SetStep>& steps);
 
-  /// To everybody on the line. Nobody says what they hold now.
+  /// To all units on the line. None says what it holds now.
   Result<SetResult> send(const std::vector<SetStep>& steps);
 
  private:

@@ -239,7 +239,7 @@ Result<std::unique_ptr<RunPlan>> plan_start_action(const RemoteStartOptions& opt
   if (!model) return tl::unexpected(model.error());
   if (!profile.events || model->start().confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "a run of this product can not be followed",
+                                .message = "a run of this product cannot be followed",
                                 .hint = "its profile lacks 'events', or 'confirm' of its start",
                                 .name = profile.id});
   }

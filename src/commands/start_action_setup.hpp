@@ -33,7 +33,7 @@ class StartActionSetup {
         log_(&log),
         uninterruptible_line_(tool, context) {}
 
-  /// Checks that the tool has no alarm and stands still (whether it is locked can not be read on
+  /// Checks that the tool has no alarm and stands still (whether it is locked cannot be read on
   /// every product), and reads what is going to be changed. Only reads.
   Result<void> look();
 
@@ -55,7 +55,7 @@ class StartActionSetup {
   /// A selection and what the tool showed before it.
   struct Selected {
     ActionRequest request;
-    std::optional<std::int64_t> before;  ///< empty: it can not be read
+    std::optional<std::int64_t> before;  ///< empty: it cannot be read
     bool tried = false;
   };
 

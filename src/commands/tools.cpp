@@ -45,7 +45,7 @@ Record tool_record(const files::Tool& tool, const files::Tools& tools, const Clo
                      {"verified", tool.verified}}};
 }
 
-/// Collects what the file's own rules can not see: whether URLs, profiles and actions exist.
+/// Collects what the file's own rules cannot see: whether URLs, profiles and actions exist.
 class ToolsCheck {
  public:
   ToolsCheck(files::CheckedTools checked, const Context& context)

@@ -32,7 +32,7 @@ Result<device::WatchPlan> check_purpose(const WatchOptions& options,
   return plan;
 }
 
-/// Why the counter alone can not be polled instead; empty: it can.
+/// Why the counter alone cannot be polled instead; empty: it can.
 std::string_view why_not_unarmed(const catalogue::Profile& profile) {
   if (!profile.events) return "it has no events";
   if (!catalogue::sends_unasked(profile)) return "its events are polled, it sends nothing unasked";
@@ -46,7 +46,7 @@ Result<void> check_for_any_profile(const WatchOptions& options, ProfileShelf& sh
   for (const files::ProfileEntry& entry : context.profiles.list()) {
     const auto known = shelf.take(entry.id);
     if (!known) continue;                       // another one's broken file
-    if (!(*known)->profile.identity) continue;  // found by nobody, always named
+    if (!(*known)->profile.identity) continue;  // never found, always named
     auto plan = plan_watch(options, (*known)->profile);
     if (plan) return {};
     checked = tl::unexpected(std::move(plan.error()));

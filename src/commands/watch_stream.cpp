@@ -175,8 +175,9 @@ void WatchStream::tell_dropped(Voice& voice) {
   const Dropped dropped = std::exchange(voice.dropped, {});
   ++counts_.gaps;
   report::Record record = voice.records->gap(
-      {dropped.events, fmt::format("{} not told, because nobody took what was told before",
-                                   counted(dropped.records, "record"))},
+      {dropped.events,
+       fmt::format("{} not told, because the reader did not take what was told before",
+                   counted(dropped.records, "record"))},
       context_->clock.wall());
   record.fields.push_back({"dropped", count(dropped.records)});
   listing_.add(record);
@@ -197,12 +198,13 @@ void WatchStream::end() {
   ended_ = true;
 }
 
-/// A signal came, and nobody takes what there is to tell.
+/// A signal came, and the reader does not take what there is to tell.
 Result<Outcome> WatchStream::give_up(std::size_t left) {
   outcome_.fail(context_->interrupt.error());
   if (!context_->io.err_is_ready || context_->io.err_is_ready()) {
-    context_->renderer.note(fmt::format(
-        "{} could not be written: nobody took them from standard output", counted(left, "record")));
+    context_->renderer.note(
+        fmt::format("{} could not be written: no reader took them from standard output",
+                    counted(left, "record")));
   }
   return outcome_;
 }

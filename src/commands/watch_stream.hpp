@@ -14,7 +14,7 @@
 
 namespace spindle::commands {
 
-/// What was not told of one tool, because nobody took what was told before.
+/// What was not told of one tool, because the reader did not take what was told before.
 struct Dropped {
   std::size_t records = 0;
   std::optional<std::uint32_t> events = 0;  ///< among them, and in gaps; empty: unknown

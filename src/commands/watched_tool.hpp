@@ -38,7 +38,7 @@ class ProfileShelf {
 };
 
 /// A tool that is opened again and again. Where its profile is not known, it is asked at the first
-/// time, so that a tool that is not there keeps nobody from the others.
+/// time, so that a tool that is not there keeps no tool from being watched.
 class WatchedTool {
  public:
   /// Loads the profile of a target that names one. `names` are the values that are wanted: raw

@@ -8,7 +8,7 @@
 namespace spindle::device {
 namespace {
 
-/// How long a tool that can not be reached is tried before it is given up and said so.
+/// How long a tool that cannot be reached is tried before it is given up and said so.
 constexpr Duration patience = std::chrono::seconds(10);
 /// Pause before the next try.
 constexpr Duration pause = std::chrono::milliseconds(200);

@@ -68,7 +68,7 @@ std::unique_ptr<Stopper> CommandWord::stopper(StopMode mode) const {
   return std::make_unique<CommandWordStopper>(*this, mode);
 }
 
-/// Which bit starts what on each of them can not be asked.
+/// Which bit starts what on each of them cannot be asked.
 Result<void> CommandWord::broadcast_stop(Device& device, StopMode mode) const {
   const bool gently = mode == StopMode::decelerate && !has_inputs();
   return device.broadcast_word(command_register_, gently ? facts_.decelerate_always : idle_word());

@@ -204,7 +204,7 @@ Error without_proof(Error reading) {
   return reading;
 }
 
-/// It is not known what became of a write without an answer that can not be read back either.
+/// It is not known what became of a write without an answer that cannot be read back either.
 Error without_knowledge(Error write, const Value& before, const Value& value) {
   if (is_interruption(write)) return write;
   write.hint = fmt::format("whether it was written is not known: it holds {} or {}; read it again",
@@ -772,7 +772,7 @@ Result<ActionResult> Device::confirm(const catalogue::Action& action, const Para
 }
 
 /// On a driver whose inputs are assigned otherwise other bits do the same; all of them where that
-/// can not be known.
+/// cannot be known.
 std::uint16_t Device::bits_to_clear(const catalogue::Preparation& preparation) {
   const auto motor = CommandWord::of(*profile_);
   const bool varies =
@@ -837,7 +837,7 @@ Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
   return {};
 }
 
-/// Nobody says when it is done, so the longest time that it may take is waited for.
+/// No register says when it is done, so the longest time that it may take is waited for.
 Result<void> Device::broadcast(const catalogue::Action& action, std::int64_t value) {
   Result<void> sent;
   if (action.prepare) sent = broadcast_word(action.prepare->address, 0);
@@ -906,7 +906,7 @@ Result<Shown> Device::take_event_flag() {
   if (session_->options().rules.framing == modbus::Framing::rtu) {
     return tl::unexpected(
         located({.code = Errc::usage,
-                 .message = "a flag that reading clears can not be read on a serial line",
+                 .message = "a flag that reading clears cannot be read on a serial line",
                  .hint = "connect the tool by Modbus TCP"}));
   }
   for (const Parameter& parameter : profile_->parameters) {

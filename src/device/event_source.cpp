@@ -43,9 +43,10 @@ std::optional<GapNews> gap_of(const Tracked& tracked, EventOrigin origin) {
     case Novelty::restart:
       return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
     case Novelty::doubtful:
-      return GapNews{std::nullopt,
-                     "the tool may have been restarted while nobody was connected, and count its "
-                     "events anew"};
+      return GapNews{
+          std::nullopt,
+          "the tool may have been restarted while no client was connected, and count its "
+          "events anew"};
     case Novelty::wrap:
       return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
     case Novelty::jump:
@@ -57,7 +58,7 @@ std::optional<GapNews> gap_of(const Tracked& tracked, EventOrigin origin) {
   }
   switch (origin) {
     case EventOrigin::catch_up:
-      return GapNews{tracked.missed, "events while nobody was connected"};
+      return GapNews{tracked.missed, "events while no client was connected"};
     case EventOrigin::poll:
       return GapNews{tracked.missed, "events came faster than they were polled"};
     case EventOrigin::push:

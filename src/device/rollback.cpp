@@ -6,11 +6,11 @@
 namespace spindle::device {
 namespace {
 
-/// How long a tool that can not be reached is tried before it is given up and said so.
+/// How long a tool that cannot be reached is tried before it is given up and said so.
 constexpr Duration patience = std::chrono::seconds(10);
 /// Pause before the next try.
 constexpr Duration pause = std::chrono::milliseconds(200);
-/// However patient the user is with answers: somebody waits for a tool that is half written.
+/// However patient the user is with answers: the user waits for a tool that is half written.
 constexpr Duration longest_answer = std::chrono::seconds(2);
 /// A connection on which so many requests in a row stayed without an answer is given up.
 constexpr unsigned silences_allowed = 2;

@@ -106,7 +106,7 @@ Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
     return std::nullopt;
   }
   if (has_run_) return RunEnding::ended;
-  // A run may be over before anybody looked: then its event is there.
+  // A run may be over before the program looked: then its event is there.
   if (clock_->now() < confirm_by_) return std::nullopt;
   return RunEnding::ignored;
 }

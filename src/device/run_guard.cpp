@@ -150,7 +150,7 @@ bool RunGuard::is_hopeless(const Error& error) const {
 }
 
 /// On one connection a stop comes after its start. On another one it may come before a start that
-/// nobody acknowledged and that is still under way.
+/// was not acknowledged and that is still under way.
 bool RunGuard::is_proven(const StopReport& report) const {
   return report.result != StopResult::unconfirmed && calm_->now() >= settled_at_;
 }

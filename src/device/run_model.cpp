@@ -23,7 +23,7 @@ Result<std::unique_ptr<const RunModel>> make(const catalogue::Profile& profile) 
 Result<std::unique_ptr<const RunModel>> RunModel::of(const catalogue::Profile& profile) {
   if (!profile.run) {
     return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "this product can not be started and stopped by Modbus",
+                                .message = "this product cannot be started and stopped by Modbus",
                                 .hint = "start and stop it at the tool",
                                 .name = profile.id});
   }

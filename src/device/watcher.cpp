@@ -28,7 +28,7 @@ constexpr Duration lag_told_every = std::chrono::minutes(1);
 /// How long a wait may be before it is asked anew when to end.
 constexpr Duration longest_pause = std::chrono::seconds(1);
 
-/// Whether who refused says that it only can not do it now (1.1b3, section 7).
+/// Whether who refused says that it only cannot do it now (1.1b3, section 7).
 bool is_busy(std::uint8_t exception) {
   switch (static_cast<modbus::ExceptionCode>(exception)) {
     case modbus::ExceptionCode::acknowledge:

@@ -53,8 +53,8 @@ bool is_plain(std::string_view text) {
          std::find(other_meaning.begin(), other_meaning.end(), text) == other_meaning.end();
 }
 
-/// Characters that a reader of YAML would fold or refuse, or that nobody would see: controls, marks
-/// of width and direction, separators of lines, and those that are none.
+/// Characters that a reader of YAML would fold or refuse, or that no reader would see: controls,
+/// marks of width and direction, separators of lines, and those that are none.
 constexpr std::array<std::pair<char32_t, char32_t>, 7> escaped_ranges = {{{0x00, 0x1F},
                                                                           {0x7F, 0x9F},
                                                                           {0x200B, 0x200F},

@@ -445,7 +445,7 @@ void event_source_is_complete(const ProfileDraft& draft, Findings& findings) {
   }
   // There an answer may be proved by reading again, which would find a flag that is cleared.
   if (flags && draft.profile.link.framing == modbus::Framing::rtu) {
-    add("source", "a flag that reading clears can not be read on a serial line");
+    add("source", "a flag that reading clears cannot be read on a serial line");
   }
   const Parameter* number = parameter_named(draft, events.number);
   if (number != nullptr && number->encoding.kind != catalogue::Kind::u16) {

@@ -111,7 +111,7 @@ class RunRules {
     const unsigned lowest = run.select & (~unsigned{run.select} + 1U);
     const unsigned room = lowest == 0 ? 0 : run.select / lowest;
     if (room < run.last || ((room + 1) & room) != 0) {
-      findings_.add_once(at, fmt::format("the bits {:#x} can not select operation data up to {}",
+      findings_.add_once(at, fmt::format("the bits {:#x} cannot select operation data up to {}",
                                          run.select, run.last));
     }
   }

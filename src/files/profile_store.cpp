@@ -85,7 +85,7 @@ std::optional<std::string> locate_base(const std::string& file, std::string_view
 }
 
 /// The profile of the program that was made from this file and from those that it extends; null
-/// when there is none. A file that can not be read is none of them: who needs it is told why.
+/// when there is none. A file that cannot be read is none of them: who needs it is told why.
 const ShippedProfile* shipped_as(const std::string& path, const Places& places);
 
 const ShippedProfile* compare(const std::string& path, const Places& places) {

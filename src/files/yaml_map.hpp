@@ -84,7 +84,7 @@ class YamlMap {
   /// Marks a key as known that is read elsewhere.
   void allow(std::string_view key) { known_.push_back(key); }
 
-  /// Reports the keys nobody asked for.
+  /// Reports the keys that were not asked for.
   void finish();
 
   [[nodiscard]] const YamlNode& node() const { return map_; }

@@ -29,7 +29,7 @@ constexpr std::size_t deepest_nesting = 32;
 /// A backup of two thousand parameters has twenty thousand; bounds the memory of the tree.
 constexpr std::size_t most_values = 100'000;
 
-/// Nobody mends more in one go; bounds the work on a file that is something else altogether.
+/// No user mends more in one go; bounds the work on a file that is something else altogether.
 constexpr std::size_t most_findings = 1'000;
 
 /// Places by the number of code points in front, which is how the parser counts; they are asked for

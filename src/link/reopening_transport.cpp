@@ -147,7 +147,7 @@ void ReopeningTransport::note_answer(ByteView frames) {
   }
 }
 
-/// How many bytes of what is held are whole frames; all where that can not be told.
+/// How many bytes of what is held are whole frames; all where that cannot be told.
 std::size_t ReopeningTransport::whole() const {
   std::size_t at = 0;
   while (held_.size() - at >= head_size) {

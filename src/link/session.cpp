@@ -16,11 +16,11 @@ namespace {
 // Events are taken at once where they are watched; this bounds memory elsewhere.
 constexpr std::size_t max_queued = 4096;
 
-// A tool that answers at all has long done so; whoever pressed Ctrl-C hardly notices.
+// A tool that answers at all has long done so; a user who pressed Ctrl-C hardly notices.
 constexpr Duration longest_settling = std::chrono::milliseconds(250);
 
-// Times the answer timeout, behind the quarantine: nobody knows how late an answer can be, but it
-// hardly is by more, and every proof takes time that a stop may be waiting for.
+// Times the answer timeout, behind the quarantine: it is not known how late an answer can be, but
+// it hardly is by more, and every proof takes time that a stop may be waiting for.
 constexpr Duration::rep longest_doubt = 2;
 /// For how long the next program on the line doubts, at least: it may ask much sooner than this one
 /// would have.
@@ -538,7 +538,7 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   return answer;
 }
 
-/// An exchange whose echo can not be taken for its answer shows whether there is one.
+/// An exchange whose echo cannot be taken for its answer shows whether there is one.
 void Session::learn_echo(const Outstanding& outstanding) {
   const bool telling = !is_repeated_by_answer(outstanding.request.pdu);
   if (options_.echo != LocalEcho::automatic || !telling) return;
@@ -569,7 +569,7 @@ Result<void> Session::broadcast(const modbus::Pdu& request) {
       .and_then([&] { return send(adu, modbus::frame(options_.rules.framing, adu)); })
       .map([&] {
         last_activity_ += std::max(Duration::zero(), options_.broadcast_gap - options_.gap);
-        // Whoever has the line next does not know of the pause; and it was sent, come what may.
+        // The next owner of the line does not know of the pause; and it was sent, come what may.
         static_cast<void>(keep_gap());
       });
 }
@@ -932,7 +932,7 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
   return error;
 }
 
-/// Somebody speaks, so nothing is asleep.
+/// A device speaks, so nothing is asleep.
 Error Session::with_evidence(Error error, const Outstanding& outstanding) const {
   const std::string begin =
       fmt::format("no answer to '{}' within {}", error.tried, to_text(options_.answer_timeout));

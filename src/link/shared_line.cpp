@@ -58,7 +58,7 @@ class SharedLine::Share : public Transport {
   }
 
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
-    if (!turn_.owns_lock()) {  // what comes now is for somebody else
+    if (!turn_.owns_lock()) {  // what comes now is for another session
       return line_->clock_->sleep_until(deadline).map([] { return std::size_t{0}; });
     }
     return transport().and_then(

@@ -139,7 +139,7 @@ class TemporaryFile {
   void look_like(const fs::path& other) const {
     struct stat about = {};
     if (::stat(other.c_str(), &about) != 0) return;
-    // Rights that can not be kept are no reason to fail.
+    // Rights that cannot be kept are no reason to fail.
     static_cast<void>(::fchmod(file_.number(), about.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO)));
   }
 
@@ -153,7 +153,7 @@ class TemporaryFile {
   }
 
  private:
-  /// Some file systems can not rename like this, others have no hard links.
+  /// Some file systems cannot rename like this, others have no hard links.
   int rename_to_free(const std::string& path) {
     const int renamed =
         ::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE);
@@ -170,7 +170,7 @@ class TemporaryFile {
 
 void sync_folder(const fs::path& folder) {
   const Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  // The file is in place; what a file system can not do for its folder is no reason to fail.
+  // The file is in place; what a file system cannot do for its folder is no reason to fail.
   if (opened.valid()) ::fsync(opened.number());
 }
 

@@ -16,7 +16,7 @@
 namespace spindle::posix {
 namespace {
 
-/// A folder that nobody else can put a link or a file into.
+/// A folder that no other user can put a link or a file into.
 bool is_own(const std::string& folder) {
   struct stat status = {};
   if (::lstat(folder.c_str(), &status) != 0) return false;

@@ -13,7 +13,7 @@ namespace spindle::posix {
 /// user's own, and is free again when its holder ends, however that ends.
 struct LineLock {
   Descriptor file = Descriptor(-1);  ///< invalid: another program holds it, or no folder is there
-  std::string holder = {};           ///< who holds it; empty: nobody else, as far as is known
+  std::string holder = {};           ///< who holds it; empty: no other program, as far as is known
 };
 
 /// Takes the lock of this name (letters, digits, '.', ':', '-', '_', '%', '[' and ']'), or says who

@@ -19,7 +19,7 @@
 namespace spindle::posix {
 namespace {
 
-// More than anybody waits for to fail one after the other; keeps the answer of a look-up one
+// More than a user waits for to fail one after the other; keeps the answer of a look-up one
 // message of fixed size.
 constexpr std::size_t max_addresses = 16;
 
@@ -62,8 +62,8 @@ Lookup look_up(const std::string& host, std::uint16_t port, int flags) {
 }
 
 // getaddrinfo() has neither a deadline nor a way to be stopped: it may hang in a name server's
-// silence long after nobody wants the answer. So it runs in a thread that is never waited for.
-// Everything that the thread touches is its own copy, and the answer travels as one message
+// silence long after the answer is not wanted any more. So it runs in a thread that is never waited
+// for. Everything that the thread touches is its own copy, and the answer travels as one message
 // through a socket; once the reader is gone, sending fails and the thread ends by itself. A thread
 // that still hangs when the process ends is ended with it.
 Result<Descriptor> start_look_up(const std::string& host, std::uint16_t port) {

@@ -51,7 +51,8 @@ Result<Terminal> make_terminal(speed_t speed) {
   return terminal;
 }
 
-/// A symbolic link that is taken away at the end, unless somebody has put something else there.
+/// A symbolic link that is taken away at the end, unless another program has put something else
+/// there.
 class Link {
  public:
   static Result<Link> make(const std::string& path, const std::string& to) {

@@ -29,7 +29,7 @@ class Serving {
   void listen(Descriptor listener) { listener_ = std::move(listener); }
   /// A client that is there already.
   void adopt(Descriptor descriptor, ServedClient::Wire wire);
-  /// Until an interrupt, or until nobody is left and nobody can come any more.
+  /// Until an interrupt, or until no client is left and none can come any more.
   void run();
 
  private:

@@ -18,7 +18,7 @@ namespace spindle::posix {
 bool hold_standard_descriptors() {
   for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(number, F_GETFD) != -1) continue;
-    // Opened the wrong way round: whoever uses it is told so, as if it were closed still.
+    // Opened the wrong way round: its user is told so, as if it were closed still.
     const int direction = number == STDIN_FILENO ? O_WRONLY : O_RDONLY;
     if (::open("/dev/null", direction) != number) return false;  // the lowest free one
   }

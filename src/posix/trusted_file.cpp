@@ -68,7 +68,7 @@ Ownership ownership_of(const struct stat& about, const Trust& trust) {
   return ownership;
 }
 
-/// Whoever made a link chose the file behind it.
+/// The one who made a link chose the file behind it.
 Result<void> check_link(const std::string& path, const Trust& trust) {
   struct stat about = {};
   if (::lstat(path.c_str(), &about) != 0 || !S_ISLNK(about.st_mode)) return {};

@@ -14,7 +14,7 @@ enum class WhenFull : std::uint8_t { wait, fail };
 int write_whole(int descriptor, std::string_view text, WhenFull when_full);
 
 /// Whether `descriptor` is an ordinary file in which the next text would be written behind a line
-/// that has no end: a crash or a full disk cut it off. False where that can not be seen.
+/// that has no end: a crash or a full disk cut it off. False where that cannot be seen.
 bool ends_within_line(int descriptor);
 
 }  // namespace spindle::posix

@@ -49,7 +49,7 @@ class PlainRenderer : public Renderer {
 /// One line on stderr behind "spindle: ", quiet or not.
 void say_error(const Streams& streams, const Error& error);
 
-/// The sentence on stderr, unless it is empty or nobody wants it.
+/// The sentence on stderr, unless it is empty or not wanted.
 void say_sentence(const Streams& streams, Talk talk, std::string_view sentence);
 
 }  // namespace spindle::report

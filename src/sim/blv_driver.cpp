@@ -40,7 +40,7 @@ class SimulatedBus final : public BlvBus {
       if (unit.value == one->address() || is_network_) {
         response = one->answer(request, now);
       } else if (unit.value == everybody ? is_write(request) : follows(*one, unit, request)) {
-        one->answer(request, now);  // and nobody hears what it says to it
+        one->answer(request, now);  // and no client hears what it says to it
       }
     }
     return response;

@@ -391,7 +391,7 @@ std::uint32_t BlvUnit::status_word(TimePoint now) const {
   return word;
 }
 
-// Monitors are looked at only when somebody reads.
+// Monitors are looked at only when a client reads.
 void BlvUnit::show(TimePoint now) {
   const bool alarm = registers_.get(run_.monitor.alarm) != 0;
   const std::int64_t speed = motor_.speed(now);

@@ -28,7 +28,7 @@ struct KindInfo {
 
 constexpr std::uint16_t byte_limit = std::numeric_limits<std::uint8_t>::max();
 constexpr std::uint16_t word_limit = std::numeric_limits<std::uint16_t>::max();
-// More than a connection's buffers hold helps nobody.
+// More than a connection's buffers hold is of no use.
 constexpr std::uint16_t size_limit = 4096;
 // Extra registers or bytes that a header can still state beside the longest answer of a tool.
 constexpr std::uint16_t extra_limit = 20;

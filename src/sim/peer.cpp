@@ -20,7 +20,7 @@ constexpr Duration longest_hold = milliseconds(50);
 // Where no gap is kept, what has waited so long for its rest is a torn frame.
 constexpr Duration longest_pause = milliseconds(50);
 
-// Can not begin a frame: no protocol identifier, length or function of that kind exists.
+// Cannot begin a frame: no protocol identifier, length or function of that kind exists.
 constexpr std::uint8_t noise_byte = 0xFF;
 
 constexpr std::size_t mbap_protocol_at = 2;
@@ -245,7 +245,7 @@ void Peer::receive(ByteView bytes, TimePoint now) {
   if (deaf_) return;
   if (framing_ == Framing::rtu) echo(bytes, now);
   if (line_) {
-    take_burst(now);  // which ended before these bytes, when nobody could look in time
+    take_burst(now);  // which ended before these bytes, when no client could look in time
     if (!deaf_) line_->hear(bytes, now);
     return;
   }

@@ -48,7 +48,7 @@ class SimTransport final : public link::Transport {
   const Interrupt* interrupt_;
   Peer peer_;
   Bytes unread_ = {};
-  // After an interrupt nobody sleeps any more, but the tool's time still has to pass.
+  // After an interrupt no wait sleeps any more, but the tool's time still has to pass.
   Duration skipped_ = Duration::zero();
   Shielding shielding_ = Shielding::off;
 };

@@ -85,7 +85,7 @@ Result<void> find_profile(OpenTool& tool, const Environment& environment) {
   return {};
 }
 
-/// The port that was tried is nobody's choice when neither URL nor profile names one.
+/// The port that was tried was not chosen when neither URL nor profile names one.
 std::string other_port_hint(const Environment& environment) {
   for (const files::ProfileEntry& entry : environment.profiles.list()) {
     const auto profile = environment.profiles.load(entry.id);
@@ -125,7 +125,7 @@ Result<void> check_reach(const Target& target, const catalogue::Profile& profile
   if (everybody == (target.reach == Reach::everybody)) return {};
   Error error{.code = Errc::usage};
   if (everybody) {
-    error.message = "unit 0 is everybody on the line, and nobody answers";
+    error.message = "unit 0 is every unit on the line, and none answers";
     error.hint = "name one unit, or add --broadcast to 'set', 'do' or 'remote-stop'";
   } else {
     error.message = "--broadcast is for everybody on a serial line, but this is one tool";

@@ -13,7 +13,7 @@ struct Match {
   catalogue::Generation generation;
   bool named;  ///< by the user, rather than looked for
 
-  /// Of profiles that nobody named, one that only extends the product's own is not meant.
+  /// Of profiles that were not named, one that only extends the product's own is not meant.
   [[nodiscard]] bool fits() const {
     const std::string& product = identity.product_profile;
     return catalogue::judge(profile, identity) == catalogue::Judgement::fits &&

@@ -114,7 +114,7 @@ std::string shared_line(const link::Endpoint& endpoint) {
 Error unproven(const Target& target) {
   return with_target(
       Error{.code = Errc::usage,
-            .message = "a tool on a serial line can not prove what it is",
+            .message = "a tool on a serial line cannot prove what it is",
             .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
                     "shows all"},
       target);

@@ -122,6 +122,11 @@ constexpr std::string_view verbs_header = "include/spindle/commands/commands.hpp
 // Spelt in halves so that this file does not find itself.
 const std::vector<std::string> unfinished = {std::string("TO") + "DO", std::string("FIX") + "ME"};
 
+// Who does it is said: the caller, another program, a reader.
+const std::vector<std::string> unclear = {std::string("some") + "body", std::string("any") + "body",
+                                          std::string("no") + "body", std::string("who") + "ever",
+                                          std::string("can") + " not"};
+
 // ---- reading code ----
 
 bool is_word_character(char c) {
@@ -314,6 +319,17 @@ void check_words(const Source& source, Findings& findings) {
   }
 }
 
+void check_english(const Source& source, Findings& findings) {
+  std::string text = source.text;
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const std::string& word : unclear) {
+    if (text.find(word) != std::string::npos) {
+      findings.push_back(fmt::format("{}: says {}", source.path, word));
+    }
+  }
+}
+
 void check_finished(const Source& source, Findings& findings) {
   for (const std::string& mark : unfinished) {
     if (source.text.find(mark) != std::string::npos) {
@@ -500,8 +516,8 @@ void check_verbs(const Source& source, Findings& findings) {
 Findings judge(const Source& source) {
   Findings findings;
   for (const auto rule : {check_layers, check_private_headers, check_homes, check_words,
-                          check_formats, check_finished, check_pragma_once, check_main,
-                          check_run_models, check_functions, check_verbs}) {
+                          check_formats, check_english, check_finished, check_pragma_once,
+                          check_main, check_run_models, check_functions, check_verbs}) {
     rule(source, findings);
   }
   return findings;
@@ -648,6 +664,8 @@ TEST_CASE("a file that breaks the law is found") {
       {{"src/link/a.hpp", "// #pragma once\n"}, "src/link/a.hpp: lacks #pragma once"},
       {{"src/link/a.cpp", "// " + unfinished.front() + ": later\n"},
        "src/link/a.cpp: says " + unfinished.front()},
+      {{"src/link/a.cpp", "// For the next one, w" + unclear[3].substr(1) + " it is.\n"},
+       "src/link/a.cpp: says " + unclear[3]},
   };
   for (const Row& row : rows) CHECK(joined(judge(row.source)) == row.finding);
 }

@@ -12,12 +12,12 @@ namespace spindle {
 /// Whether a file that is there may be replaced.
 enum class Overwrite : std::uint8_t { refuse, allow };
 
-/// Who may look into a folder or file that is made: whoever the user usually allows it, or nobody
+/// Who may look into a folder or file that is made: those whom the user usually allows it, or none
 /// else.
 enum class Privacy : std::uint8_t { usual, own };
 
 /// The file system as functions, so that tests can bring one in memory. All errors name the path:
-/// what can not be read is `bad_file`, what can not be written `storage`, but for a file that must
+/// what cannot be read is `bad_file`, what cannot be written `storage`, but for a file that must
 /// not be replaced: that is `usage`.
 struct Disk {
   std::function<bool(const std::string& path)> exists;
@@ -28,7 +28,7 @@ struct Disk {
   std::function<Result<std::string>(const std::string& path)> read;
   /// All of the text or nothing: what was there stays whole until the new text is safely stored,
   /// and nothing is left beside it when that fails. A file that is replaced keeps its rights,
-  /// unless the new text is for nobody else.
+  /// unless the new text is for no other user.
   std::function<Result<void>(const std::string& path, std::string_view text, Overwrite overwrite,
                              Privacy privacy)>
       write;

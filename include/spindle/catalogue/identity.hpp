@@ -18,7 +18,7 @@ struct Slice {
   std::uint8_t size = 0;
 };
 
-/// How a product's answer to FC 11h is read. A profile without it can not be recognised.
+/// How a product's answer to FC 11h is read. A profile without it cannot be recognised.
 struct IdentityFacts {
   std::uint8_t minimum_bytes = 0;  ///< a shorter answer is another product's
   Slice id = {};

@@ -169,7 +169,7 @@ struct NumberedFacts {
 enum class Motion : std::uint8_t { none, start, stop };
 
 /// Done before an action is sent: these bits of a register are cleared. A broadcast clears all of
-/// it, because it can not be read.
+/// it, because it cannot be read.
 struct Preparation {
   modbus::RegisterAddress address = {};
   std::uint16_t clear = 0;
@@ -198,7 +198,7 @@ struct Action {
   Text note = {};  ///< what a user should know before sending it; may be empty
   /// Parameter that says what a value stands for, with {n} in place of the value; may be empty.
   Text tells = {};
-  List<Label> effects = {};  ///< what a value does to whoever works with the tool, in words
+  List<Label> effects = {};  ///< what a value does to a user who works with the tool, in words
   Text check;                ///< how to verify the assignment on the tool; one sentence
   Text confirm;              ///< parameter whose reading proves the effect; empty: nothing can
   /// Reading that proves it; empty: the value written.

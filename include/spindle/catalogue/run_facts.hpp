@@ -111,7 +111,7 @@ struct CommandWordFacts {
   /// Bits of which every motion needs at least one, whatever the mode: a word without them never
   /// moves a motor.
   std::uint16_t starting = 0;
-  /// Words that stop in every mode: for broadcasts, and when the mode can not be read.
+  /// Words that stop in every mode: for broadcasts, and when the mode cannot be read.
   std::uint16_t decelerate_always = 0;
   std::uint16_t instant_always = 0;
   std::uint16_t select = 0;  ///< adjoining bits that hold the number of the operation data

@@ -26,7 +26,7 @@ struct SnapshotEntry {
 enum class Missing : std::uint8_t {
   absent,      ///< the tool says that there is no such register
   unreadable,  ///< the tool refused to show it
-  left_out,    ///< a secret that nobody asked for
+  left_out,    ///< a secret that was not asked for
 };
 
 struct MissingEntry {
@@ -130,7 +130,7 @@ Destination destination_of(const Snapshot& backup, const Snapshot& present);
 /// Why an entry of the backup is not written.
 enum class Skip : std::uint8_t {
   equal,       ///< the tool holds it already
-  read_only,   ///< it can not be written
+  read_only,   ///< it cannot be written
   not_cloned,  ///< it belongs to one tool (`clone: never`)
   absent,      ///< the tool has no such register
   dangerous,   ///< a write to it may do more than store a value

@@ -29,7 +29,7 @@ enum class Verbosity : std::uint8_t { normal, frames };
 struct UserOptions {
   Consent consent = Consent::ask;
   Verbosity verbosity = Verbosity::normal;
-  /// Not with --quiet, not beside frames, not on a terminal that can not draw over a line.
+  /// Not with --quiet, not beside frames, not on a terminal that cannot draw over a line.
   report::Showing progress = report::Showing::wanted;
 };
 

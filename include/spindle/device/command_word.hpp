@@ -51,7 +51,7 @@ class CommandWord final : public RunModel {
 /// Stops one motor, as gently as it was asked to, and harder when that does not help.
 ///
 /// A word that decelerates in one input mode starts the motor in another, and a mode that was
-/// written but not configured yet can not be told from one that counts. So the words of a mode are
+/// written but not configured yet cannot be told from one that counts. So the words of a mode are
 /// used only for a motor that was seen to run by a word of that mode; else words that stop in every
 /// mode. Where the inputs of a driver can be assigned, a word with any bit is used only for a motor
 /// that this program started or that was seen to run, and while it is known what the bits do; else

@@ -19,7 +19,7 @@ enum class Novelty : std::uint8_t {
   wrap,      ///< the 16-bit counter began again behind 65535; `missed` may be 0
   restart,   ///< the tool began to count anew: smaller and not by wrapping, or another event with
              ///< the last number; what was missed is unknown
-  doubtful,  ///< behind the last number, but the tool may have begun to count anew while nobody
+  doubtful,  ///< behind the last number, but the tool may have begun to count anew while no client
              ///< looked, and come to it: what was missed is unknown
 };
 
@@ -27,7 +27,7 @@ struct Tracked {
   Novelty novelty = Novelty::baseline;
   std::uint32_t missed = 0;  ///< for `jump` and `wrap`
 
-  /// Whether the event is a result that nobody has had yet.
+  /// Whether the event is a result that is new.
   [[nodiscard]] bool is_new() const {
     return novelty != Novelty::baseline && novelty != Novelty::repeat;
   }
@@ -48,9 +48,9 @@ class EventTracker {
     last_block_.reset();
   }
 
-  /// The connection is a new one, and nobody looked for so long. Nothing comes late on it, a tool
-  /// that was restarted may have equal events, and the next number is doubtful when a tool that
-  /// began to count anew in that time can have come to it.
+  /// The connection is a new one, and the tool was not looked at for so long. Nothing comes late on
+  /// it, a tool that was restarted may have equal events, and the next number is doubtful when a
+  /// tool that began to count anew in that time can have come to it.
   void look_again(Duration unseen) {
     recent_.clear();
     unseen_ = unseen;

@@ -66,7 +66,7 @@ class MotorMonitor {
   std::vector<catalogue::Parameter> proof_ = {};  ///< of a standstill
 };
 
-/// A time as a duration, in seconds with up to three decimals; `fallback` when it can not be read.
+/// A time as a duration, in seconds with up to three decimals; `fallback` when it cannot be read.
 Duration time_of(const Reading& reading, Duration fallback);
 
 }  // namespace spindle::device

@@ -10,7 +10,7 @@ namespace spindle::device {
 enum class MotorEnding : std::uint8_t {
   elapsed,   ///< the time allowed is over; it still runs
   alarm,     ///< an alarm ended the run
-  stopped,   ///< it stopped, and nobody here stopped it
+  stopped,   ///< it stopped, and not by this program
   ignored,   ///< the start was acknowledged, but the motor does not run
   too_fast,  ///< its command speed is above the one asked for
   unseen,    ///< the time allowed is over, and nothing that can be read says whether it ran

@@ -37,9 +37,9 @@ struct GuardedMotion {
 /// The motion of an action with a stop value, which must outlive it.
 GuardedMotion motion_of(const catalogue::Action& start);
 
-/// From the moment a start is sent, a stop is sent on every way out. Whoever holds a guard calls
-/// stop(); the destructor does it when nobody did. Stopping is not ended by an interrupt, and it
-/// reopens a lost link. It can not stop a tool that can not be reached: this is not a safety
+/// From the moment a start is sent, a stop is sent on every way out. The holder of a guard calls
+/// stop(); else the destructor does it. Stopping is not ended by an interrupt, and it
+/// reopens a lost link. It cannot stop a tool that cannot be reached: this is not a safety
 /// function.
 class RunGuard {
  public:

@@ -57,7 +57,7 @@ struct WatchPlan {
   Samples samples = Samples::changes;
 };
 
-/// What whoever hears the news wants next.
+/// What the listener wants next.
 enum class Heed : std::uint8_t { go_on, stop };
 
 /// Watches one tool: pushed and polled events as one stream, values by polling, keep-alive,
@@ -83,7 +83,7 @@ class Watcher {
 
   Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell);
 
-  /// Returns at its end, or when whoever hears the news wants to stop; then the tool's output
+  /// Returns at its end, or when the listener wants to stop; then the tool's output
   /// is switched off again where the link still allows it, and what had arrived is told. Errors: an
   /// interrupt; what no retry can mend (another product, a refusal); with Reconnection::never any
   /// trouble.

@@ -30,7 +30,7 @@ struct BackupLine {
   Place value_at = {};
 };
 
-/// A backup file whose form is right, before anybody asked what its names mean.
+/// A backup file whose form is right, before it is asked what its names mean.
 struct BackupFile {
   std::string path;
   catalogue::Snapshot head = {};  ///< everything but the entries

@@ -70,7 +70,7 @@ class ProfileStore {
   [[nodiscard]] Result<catalogue::CodeTables> load_code_tables(std::string_view name_or_file) const;
 
   /// Every fault of a file and of those it extends, all documents; empty when it is valid. Error
-  /// only when the file can not be read or found.
+  /// only when the file cannot be read or found.
   [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;
 
   /// Every valid profile that list() names, sorted by id. Files with faults are left out: one of a

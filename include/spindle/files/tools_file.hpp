@@ -51,7 +51,7 @@ struct CheckedTools {
   std::vector<Finding> findings;
 };
 
-/// Error only when the file can not be read.
+/// Error only when the file cannot be read.
 Result<CheckedTools> check_tools(const std::string& path, const ReadText& read = read_text_file);
 
 }  // namespace spindle::files

@@ -33,7 +33,7 @@ bool is_lost_answer(const Error& error);
 /// What a server allows, from the profile.
 struct ReadLimits {
   std::uint16_t max_read = modbus::max_read_count;
-  /// Areas in which registers that nobody asked for may be read along to save a request.
+  /// Areas in which registers that were not asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
   Neighbours neighbours = Neighbours::contiguous;
   /// Areas that are said not to exist. What is wanted there shares a request with nothing but its

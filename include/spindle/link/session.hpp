@@ -21,7 +21,7 @@ struct SessionOptions {
   modbus::UnitId unit = {};
   Duration answer_timeout = std::chrono::seconds(1);
   /// RTU: silence kept before each request, from the last byte in either direction. What is
-  /// received meanwhile is sorted like any frame that nobody asked for.
+  /// received meanwhile is sorted like any frame that was not asked for.
   Duration gap = Duration::zero();
   /// RTU: silence after a broadcast before the next request; the gap is part of it.
   Duration broadcast_gap = Duration::zero();
@@ -36,7 +36,7 @@ struct SessionOptions {
   /// RTU: until when others may have used the line; the first gap counts from then.
   TimePoint in_use_until = {};
   /// RTU: whether a late answer may come that an earlier session on this line did not wait for, or
-  /// other clients use the line that can not be seen.
+  /// other clients use the line that cannot be seen.
   enum class Past : std::uint8_t { clean, doubtful, shared } past = Past::clean;
   /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is
   /// listened to before the first read and behind the first answers.
@@ -51,7 +51,7 @@ struct OtherRead {
   std::size_t skip = 0;  ///< registers in front of those
 };
 
-/// A frame that nobody asked for, with the time when its last byte arrived.
+/// A frame that was not asked for, with the time when its last byte arrived.
 struct Spontaneous {
   modbus::Pdu pdu;
   TimePoint arrival;
@@ -62,18 +62,18 @@ struct SessionCounters {
   std::uint64_t requests = 0;
   std::uint64_t strays = 0;  ///< late answers included
   std::uint64_t spontaneous = 0;
-  std::uint64_t overflowed = 0;   ///< spontaneous frames dropped because nobody took them
+  std::uint64_t overflowed = 0;   ///< spontaneous frames dropped because they were not taken
   std::uint64_t noise_bytes = 0;  ///< skipped before RTU frames
 };
 
 /// The dialogue on one connection: one outstanding request, everything else sorted by judge(). What
-/// arrives while somebody waits for something else is kept, not dropped and not mistaken; a late
+/// arrives while the caller waits for something else is kept, not dropped and not mistaken; a late
 /// answer never becomes the next value.
 ///
 /// RTU: a frame that nothing asked for, the request of another master, junk beside an answer, the
 /// same answer to another request, or another program that has the port open make the line doubtful
 /// until it was quiet for a while. On a doubtful line each answer is proved: by another read that
-/// holds the same registers, by FC 08 behind it, or by the same read again. What can not be proved
+/// holds the same registers, by FC 08 behind it, or by the same read again. What cannot be proved
 /// is `no_answer`. That others are on the line is told once, by the trace's `notice`.
 class Session {
  public:
@@ -110,7 +110,7 @@ class Session {
   /// TCP: whether the stream has lost its frame boundaries, so that only a new connection helps.
   [[nodiscard]] bool is_out_of_step() const { return out_of_step_; }
 
-  /// RTU: sends to unit 0, and keeps the pause behind it. Nobody answers, so success means "sent",
+  /// RTU: sends to unit 0, and keeps the pause behind it. No unit answers, so success means "sent",
   /// never "done".
   Result<void> broadcast(const modbus::Pdu& request);
 

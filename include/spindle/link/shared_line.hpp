@@ -12,8 +12,8 @@
 
 namespace spindle::link {
 
-/// A lock that is had in the order in which it was asked for, so that somebody who is always busy
-/// keeps nobody waiting for ever.
+/// A lock that is had in the order in which it was asked for, so that a session that is always busy
+/// keeps no other one waiting for ever.
 class FairLock {
  public:
   void lock() {

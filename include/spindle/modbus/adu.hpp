@@ -27,7 +27,7 @@ struct Deframed {
 /// So far nothing complete, and nothing impossible.
 struct NeedMore {};
 
-/// The bytes can not become a frame. On TCP the stream has lost its boundaries: reconnect.
+/// The bytes cannot become a frame. On TCP the stream has lost its boundaries: reconnect.
 /// On RTU `size` bytes are noise and may be dropped.
 struct Junk {
   std::size_t size = 0;

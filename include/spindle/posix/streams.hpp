@@ -13,7 +13,7 @@
 namespace spindle::posix {
 
 /// Takes the numbers of those standard streams that are closed, so that no socket or serial line
-/// gets one and hears what is meant for people. False when that can not be done. To be called
+/// gets one and hears what is meant for people. False when that cannot be done. To be called
 /// before anything is opened.
 bool hold_standard_descriptors();
 
@@ -24,10 +24,10 @@ Result<void> write_out(std::string_view text);
 
 /// Writes what the reader of standard output takes within `patience`, at most 4096 bytes at a time,
 /// and returns how many bytes; 0 when it takes nothing. A file takes all of it, as ever. Fails as
-/// write_out() does. Never waits longer, as long as nobody else writes to the same pipe.
+/// write_out() does. Never waits longer, as long as no other program writes to the same pipe.
 Result<std::size_t> write_out_for(std::string_view text, Duration patience);
 
-/// Writes everything to standard error; failures are ignored, there is nobody left to tell.
+/// Writes everything to standard error; failures are ignored, there is no other way to tell.
 void write_err(std::string_view text);
 
 /// Reads one line of standard input, without its end; empty at end of input and when an interrupt

@@ -25,7 +25,7 @@ struct Step {
 };
 
 /// The one line on a terminal that says how far long work has come. Says nothing elsewhere and
-/// where nobody wants it, is never wider than the terminal, and never waits for a terminal that
+/// where it is not wanted, is never wider than the terminal, and never waits for a terminal that
 /// does not take it. Several threads may call it.
 ///
 /// As long as it lives, whatever is written to the streams takes the line away first. It must be

@@ -15,21 +15,21 @@ enum class Color : std::uint8_t { off, on };
 
 /// The three standard streams, as functions so that tests can catch them.
 struct Streams {
-  /// Writes and flushes; `closed_pipe` when nobody reads any more.
+  /// Writes and flushes; `closed_pipe` when there is no reader any more.
   std::function<Result<void>(std::string_view)> out;
-  /// Never fails: there is nobody left to tell.
+  /// Never fails: there is no other way to tell.
   std::function<void(std::string_view)> err;
   /// One line from the user without its end; empty at end of input.
   std::function<std::optional<std::string>()> read_line;
   bool in_is_terminal = false;
   bool out_is_terminal = false;
   bool err_is_terminal = false;
-  /// Whether somebody still reads what out() writes; may be empty, which means yes.
+  /// Whether a reader still takes what out() writes; may be empty, which means yes.
   std::function<bool()> out_is_open = {};
   /// Whether err() can write a line without waiting; may be empty, which means yes. A motor must
-  /// not run on because nobody takes what is told meanwhile.
+  /// not run on because no reader takes what is told meanwhile.
   std::function<bool()> err_is_ready = {};
-  /// Cells of a row of the terminal behind err(); 0, or an empty function: nobody knows.
+  /// Cells of a row of the terminal behind err(); 0, or an empty function: not known.
   std::function<std::size_t()> err_columns = {};
   /// Whether out() writes to a file that ends within a line; may be empty, which means no.
   std::function<bool()> out_ends_within_line = {};

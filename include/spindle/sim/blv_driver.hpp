@@ -38,7 +38,7 @@ class BlvBus : public Server {
   /// A warning begins; 0 ends it.
   virtual void raise_warning(std::uint8_t unit, std::uint8_t code, TimePoint now) = 0;
 
-  /// Somebody works with the hand-held setter: writes are refused with 89h until then.
+  /// A user works with the hand-held setter: writes are refused with 89h until then.
   virtual void use_setter(std::uint8_t unit, TimePoint until) = 0;
 
   /// All units are switched off and on.

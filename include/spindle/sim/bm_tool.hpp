@@ -25,7 +25,7 @@ struct BmOptions {
   /// accepted writes from 1.
   FaultPlan faults = {};
   /// An operator who runs down a screw at this interval, beginning one interval after the first
-  /// advance(); empty: nobody.
+  /// advance(); empty: no operator.
   std::optional<Duration> rundown_every = std::nullopt;
   unsigned ng_every = 0;  ///< every so many of the operator's run-downs end NG; 0: none
   std::vector<Raised> alarms = {};
@@ -41,7 +41,8 @@ enum class Rundown : std::uint8_t { ok, ng };
 /// profile, so it shares the catalogue's misreadings; independent peers are the judge.
 class BmTool : public Server {
  public:
-  /// Somebody pulls the trigger at `now`. Ignored while the tool runs, is locked or has an alarm.
+  /// The operator pulls the trigger at `now`. Ignored while the tool runs, is locked or has an
+  /// alarm.
   virtual void operator_rundown(Rundown outcome, TimePoint now) = 0;
 
   /// A fault occurs: a run ends, `error` is sent as event, starts are ignored until the reset.

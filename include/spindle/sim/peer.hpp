@@ -40,8 +40,8 @@ class Peer {
   /// be sent.
   void forget();
 
-  /// Bytes from the client. Complete requests are answered into the outbox. Bytes that can not be a
-  /// frame close the connection on TCP; on RTU the server hears of them (`bad_frame`) and nobody
+  /// Bytes from the client. Complete requests are answered into the outbox. Bytes that cannot be a
+  /// frame close the connection on TCP; on RTU the server hears of them (`bad_frame`) and no client
   /// answers. Where the server wants a gap, a query is complete when the line is silent again, and
   /// what begins within the gap is not heard.
   void receive(ByteView bytes, TimePoint now);

@@ -34,7 +34,7 @@ class SerialLine {
   void hear(ByteView bytes, TimePoint now);
   /// The server's own last byte has left.
   void spoke(TimePoint now);
-  /// When the silence behind what is being heard will be complete; empty while nobody speaks.
+  /// When the silence behind what is being heard will be complete; empty while the line is quiet.
   [[nodiscard]] std::optional<TimePoint> silent_at() const;
   /// The burst that has ended by `now`.
   std::optional<Burst> take(TimePoint now);

@@ -31,7 +31,8 @@ struct ServeOptions {
   LineModel line = {};
   FaultPlan faults = {};
   std::vector<Outage> outages = {};  ///< counted from the beginning of serving
-  /// Called once with the port that is listened on (0 on a serial line), before anybody is served.
+  /// Called once with the port that is listened on (0 on a serial line), before any client is
+  /// served.
   std::function<Result<void>(std::uint16_t port)> listening = {};
   /// Hears every connection and all bytes as they come and go (usually a frame at a time).
   std::function<void(Heard, std::uint32_t connection, ByteView bytes)> log = {};

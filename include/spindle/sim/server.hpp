@@ -22,7 +22,7 @@ struct Push {
 };
 
 /// A simulated tool as a state machine over time: PDU in, PDU out. It never waits and never reads a
-/// clock; whoever drives it says what time it is. Not thread-safe.
+/// clock; the caller says what time it is. Not thread-safe.
 class Server {
  public:
   Server() = default;

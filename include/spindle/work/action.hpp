@@ -42,7 +42,7 @@ LoggedChange logged(const ActionRequest& request, const Result<device::ActionRes
 Result<device::ActionResult> perform_recorded(const ActionRequest& request, OpenTool& tool,
                                               ChangeLog& log, const Environment& environment);
 
-/// The tool acknowledged the action, and its effect can not be seen.
+/// The tool acknowledged the action, and its effect cannot be seen.
 Error not_confirmed(const ActionRequest& request);
 
 }  // namespace spindle::work

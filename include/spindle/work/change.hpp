@@ -19,7 +19,7 @@ Error of_write(const std::string& parameter, Error error);
 /// `mismatch`; `what` says what differs.
 Error changed_meanwhile(std::string_view what);
 
-/// The result of an action that failed: "refused" by the tool, or "unknown" where it can not be
+/// The result of an action that failed: "refused" by the tool, or "unknown" where it cannot be
 /// said whether it was done.
 std::string_view result_of_failure(const Error& error);
 

@@ -37,7 +37,7 @@ struct LogOptions {
 };
 
 /// The record of changes of one command on one tool: what is about to be sent, and how it ended. A
-/// record that can not be written is a single warning and never an error: a tool must not be left
+/// record that cannot be written is a single warning and never an error: a tool must not be left
 /// half-way because of it.
 class ChangeLog {
  public:

@@ -26,7 +26,7 @@ enum class Need : std::uint8_t {
 /// The target's profile, or an empty one where none is known before connecting.
 Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment);
 
-/// Whether somebody works with a tool of sim:, so that there is something to watch.
+/// Whether an operator works with a tool of sim:, so that there is something to watch.
 enum class SimulatedOperator : std::uint8_t { absent, working };
 
 /// Connects with a profile that outlives the device, and asks nothing. `past` says whether an
@@ -46,7 +46,7 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Environment& environment);
 
-/// Unit 0 on a serial line is everybody, and nobody answers: refuses it where one tool is meant,
+/// Unit 0 on a serial line is every unit, and none answers: refuses it where one tool is meant,
 /// and one tool where everybody is.
 Result<void> check_reach(const Target& target, const catalogue::Profile& profile);
 
@@ -61,7 +61,7 @@ struct Opened {
 };
 
 /// Opens a tool and calls `prepare(profile)` as early as possible: before connecting where the
-/// profile is known, so that a misspelt name is told without asking anybody.
+/// profile is known, so that a misspelt name is told without asking a tool.
 template <typename Prepare>
 auto open_prepared(const Target& target, Need need, const Environment& environment, Prepare prepare)
     -> Result<

@@ -18,7 +18,7 @@ class SharedLines {
   SharedLines(const std::vector<Target>& targets, const Environment& environment);
 
   /// Like `open` of the environment; on a shared line all get a share of one opening, with the
-  /// settings of whoever came first.
+  /// settings of the one that came first.
   [[nodiscard]] device::OpenTransport opener();
 
  private:

@@ -12,7 +12,7 @@ inline constexpr int most_stops = 3;
 bool leaves_open(const Result<device::StopResult>& stopped);
 
 /// Stops the motor of a product that is run by a command word, or all on the line where the target
-/// says so. Whatever can be read helps to stop gently; whatever can not be read does not keep it
+/// says so. Whatever can be read helps to stop gently; whatever cannot be read does not keep it
 /// from being stopped.
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Environment& environment);

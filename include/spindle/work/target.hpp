@@ -69,7 +69,7 @@ bool names_group(std::string_view text);
 /// Whether a first argument is meant as a target rather than a parameter pattern.
 bool is_target(std::string_view text, const Environment& environment);
 
-/// A tool on a serial line whose profile nobody named.
+/// A tool on a serial line whose profile was not named.
 Error unproven(const Target& target);
 
 }  // namespace spindle::work
