@@ -58,7 +58,7 @@ class FlagServer(support.Port):
                 self.mute.remove(request.words[0])
                 return
         if is_taken and self.gate:
-            self.gate.wait(support.DEADLINE)
+            support.wait_until(self.gate.is_set, "the gate opens")
         connection.sendall(hostile_server.frame(request.transaction, function, data, unit=1))
 
     def _read(self, request):
