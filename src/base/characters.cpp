@@ -21,12 +21,14 @@ bool is_control(char32_t character) {
 
 }  // namespace
 
-std::size_t cells_of(char32_t character) {
+std::size_t cell_width(char32_t character) {
   if (character < no_cell.front().first) return 1;
   if (is_in(character, no_cell)) return 0;
   return is_in(character, two_cells) ? 2 : 1;
 }
 
-bool steers(char32_t character) { return is_control(character) || is_in(character, unseen); }
+bool is_unsafe_on_terminal(char32_t character) {
+  return is_control(character) || is_in(character, unseen);
+}
 
 }  // namespace spindle

@@ -48,7 +48,7 @@ std::size_t append_character(std::string& out, std::string_view text) {
   const CodePoint character = first_code_point(text);
   if (const std::string_view escape = short_escape(character.value); !escape.empty()) {
     out += escape;
-  } else if (steers(character.value)) {
+  } else if (is_unsafe_on_terminal(character.value)) {
     append_escaped(out, character.value);
   } else {
     append_first(out, character, text);

@@ -21,7 +21,7 @@ bool looks_like_text(ByteView bytes) {
                        [](std::uint8_t byte, bool) { return printable(byte); }) != bytes.end();
 }
 
-bool fits(const IdentityFacts& facts, ByteView answer) {
+bool fits(const IdentitySpec& facts, ByteView answer) {
   return answer.size() >= facts.minimum_bytes &&
          !looks_like_text(answer.first(facts.minimum_bytes));
 }
@@ -52,7 +52,7 @@ void read_long_serial(ByteView bytes, Identity& identity) {
   }
 }
 
-void read_product(const IdentityFacts& facts, ByteView answer, Identity& identity) {
+void read_product(const IdentitySpec& facts, ByteView answer, Identity& identity) {
   const unsigned code = answer[facts.product_byte];
   if (const Text* id = facts.products.find(code)) {
     identity.product_profile = *id;
@@ -61,7 +61,7 @@ void read_product(const IdentityFacts& facts, ByteView answer, Identity& identit
   }
 }
 
-void read_serial(const IdentityFacts& facts, ByteView answer, Identity& identity) {
+void read_serial(const IdentitySpec& facts, ByteView answer, Identity& identity) {
   const bool is_long = facts.long_serial_bytes != 0 && answer.size() >= facts.long_serial_bytes;
   if (!is_long) {
     if (const auto number = number_at(answer, facts.serial)) {
@@ -75,7 +75,7 @@ void read_serial(const IdentityFacts& facts, ByteView answer, Identity& identity
   }
 }
 
-void read_model(const IdentityFacts& facts, ByteView answer, Identity& identity) {
+void read_model(const IdentitySpec& facts, ByteView answer, Identity& identity) {
   identity.tool_model_code = number_at(answer, facts.tool_model);
   if (!identity.tool_model_code) return;
   if (const Text* name = facts.models.find(*identity.tool_model_code)) {
@@ -88,7 +88,7 @@ void read_model(const IdentityFacts& facts, ByteView answer, Identity& identity)
 
 }  // namespace
 
-Identity decode_identity(const IdentityFacts& facts, ByteView answer) {
+Identity decode_identity(const IdentitySpec& facts, ByteView answer) {
   Identity identity;
   identity.raw.assign(answer.begin(), answer.end());
   if (answer.size() < facts.minimum_bytes) {
@@ -111,7 +111,7 @@ Identity decode_identity(const IdentityFacts& facts, ByteView answer) {
   return identity;
 }
 
-Generation generation_of(const IdentityFacts& facts, const Identity& identity) {
+Generation generation_of(const IdentitySpec& facts, const Identity& identity) {
   if (!fits(facts, identity.raw)) return Generation::unknown;
   const unsigned firmware = identity.firmware.value_or(0);
   if (firmware == 0) return Generation::unknown;

@@ -32,7 +32,7 @@ std::vector<std::string> names_of(const Entries& entries) {
   return names;
 }
 
-Parameter make_numbered(const NumberedFacts& facts, std::uint16_t number) {
+Parameter make_numbered(const NumberedSpec& facts, std::uint16_t number) {
   return {.name = fmt::format("{}{}", facts.prefix, number),
           .title = fmt::format("Parameter {}", number),
           .table = facts.table,
@@ -50,7 +50,7 @@ bool all_digits(std::string_view text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-std::optional<Parameter> find_numbered(const NumberedFacts& facts, std::string_view name) {
+std::optional<Parameter> find_numbered(const NumberedSpec& facts, std::string_view name) {
   if (!name.starts_with(facts.prefix)) return std::nullopt;
   const std::string_view digits = name.substr(facts.prefix.size());
   if (!all_digits(digits)) return std::nullopt;
@@ -111,7 +111,7 @@ std::vector<Parameter> match_named(const Profile& profile, std::string_view patt
 }
 
 std::vector<Parameter> match_numbered(const Profile& profile, std::string_view pattern) {
-  const NumberedFacts& facts = *profile.numbered;
+  const NumberedSpec& facts = *profile.numbered;
   std::vector<Parameter> found;
   for (unsigned number = facts.from; number <= facts.to; ++number) {
     Parameter parameter = make_numbered(facts, static_cast<std::uint16_t>(number));
@@ -214,14 +214,14 @@ Result<Parameter> parse_raw(std::string_view text) {
 
 }  // namespace
 
-std::optional<Duration> SerialFacts::gap_at(unsigned baud) const {
+std::optional<Duration> SerialSpec::gap_at(unsigned baud) const {
   for (const GapRule& rule : gaps) {
     if (rule.up_to_baud == 0 || baud <= rule.up_to_baud) return rule.gap;
   }
   return std::nullopt;
 }
 
-Result<void> check_pair(Kind kind, const LinkFacts& link) {
+Result<void> check_pair(Kind kind, const LinkSpec& link) {
   if (!link.even_pairs || register_count(kind) <= link.max_write) return {};
   return tl::unexpected(
       Error{.code = Errc::usage,
@@ -230,12 +230,12 @@ Result<void> check_pair(Kind kind, const LinkFacts& link) {
             .hint = "a profile with 'pairs: any' writes the two words one after the other"});
 }
 
-modbus::RegisterTable table_of(const EventFacts& events) {
+modbus::RegisterTable table_of(const EventSpec& events) {
   constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
   return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
 }
 
-bool RefusalFacts::is_busy(std::int64_t code) const {
+bool RefusalSpec::is_busy(std::int64_t code) const {
   return std::find(busy.begin(), busy.end(), code) != busy.end();
 }
 
@@ -288,7 +288,7 @@ Result<Action> Profile::find_action(std::string_view name) const {
 
 bool Profile::is_guarded_start(std::string_view action) const {
   if (!run || run->is_derived) return false;
-  if (const StartActionFacts* facts = run->action()) return facts->start == action;
+  if (const StartActionSpec* facts = run->action()) return facts->start == action;
   const auto found = std::find_if(actions.begin(), actions.end(),
                                   [action](const Action& each) { return each.name == action; });
   return found != actions.end() && found->motion == Motion::start;

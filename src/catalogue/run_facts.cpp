@@ -12,7 +12,7 @@ std::uint16_t joined(unsigned a, unsigned b) { return static_cast<std::uint16_t>
 
 }  // namespace
 
-const InputFunction* InputFacts::find(std::int64_t number) const {
+const InputFunction* InputSpec::find(std::int64_t number) const {
   const auto found =
       std::find_if(functions.begin(), functions.end(),
                    [number](const InputFunction& function) { return function.number == number; });
@@ -23,7 +23,7 @@ CommandBits::CommandBits() {
   for (std::size_t bit = 0; bit < functions_.size(); ++bit) functions_[bit] = bit_of(bit);
 }
 
-CommandBits::CommandBits(const InputFacts& facts, std::span<const std::int64_t> numbers) {
+CommandBits::CommandBits(const InputSpec& facts, std::span<const std::int64_t> numbers) {
   for (std::size_t bit = 0; bit < functions_.size(); ++bit) {
     const bool is_read = bit >= facts.first && bit - facts.first < numbers.size();
     const InputFunction* function = is_read ? facts.find(numbers[bit - facts.first]) : nullptr;
@@ -65,12 +65,12 @@ std::uint16_t CommandBits::any_of(std::uint16_t standard) const {
   return mask;
 }
 
-std::uint16_t CommandWordFacts::selecting(std::uint16_t number) const {
+std::uint16_t CommandWordSpec::selecting(std::uint16_t number) const {
   const unsigned shifted = unsigned{number} << static_cast<unsigned>(std::countr_zero(select));
   return static_cast<std::uint16_t>(shifted & select);
 }
 
-bool RunFacts::is_command(std::string_view parameter) const {
+bool RunSpec::is_command(std::string_view parameter) const {
   if (const auto* by_word = word()) return parameter == by_word->command;
   const auto* by_register = command_register();
   if (by_register == nullptr || parameter.empty()) return false;

@@ -42,14 +42,14 @@ class Claims {
   std::vector<bool> taken_ = std::vector<bool>(2 * table_size + 1);
 };
 
-bool is_numbered(const Parameter& parameter, const NumberedFacts& facts) {
+bool is_numbered(const Parameter& parameter, const NumberedSpec& facts) {
   return parameter.table == facts.table && parameter.address.value >= facts.from &&
          parameter.address.value <= facts.to;
 }
 
 /// What is set is stored; what is only shown changes by itself.
 std::vector<Parameter> numbered_space(const Profile& profile) {
-  const NumberedFacts& facts = *profile.numbered;
+  const NumberedSpec& facts = *profile.numbered;
   Claims claims;
   std::vector<Parameter> space;
   for (const Parameter& parameter : profile.parameters) {

@@ -119,7 +119,7 @@ struct Typed {
 
 class Completer {
  public:
-  Completer(const Description& description, const Nameable& nameable)
+  Completer(const Description& description, const CompletionSources& nameable)
       : description_(&description), nameable_(&nameable) {}
 
   Completion run(const std::vector<std::string>& words) {
@@ -424,7 +424,7 @@ class Completer {
   }
 
   const Description* description_;
-  const Nameable* nameable_;
+  const CompletionSources* nameable_;
   Typed typed_ = {};
   Completion found_ = {};
 };
@@ -432,7 +432,7 @@ class Completer {
 }  // namespace
 
 Completion complete(const std::vector<std::string>& words, const Description& description,
-                    const Nameable& nameable) {
+                    const CompletionSources& nameable) {
   return Completer(description, nameable).run(words);
 }
 

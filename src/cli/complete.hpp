@@ -25,7 +25,7 @@ struct Completion {
 };
 
 /// What can be named. Nothing is asked over a line: completion works offline.
-struct Nameable {
+struct CompletionSources {
   const files::Tools& tools;
   const files::ProfileStore& profiles;
 };
@@ -33,7 +33,7 @@ struct Nameable {
 /// What the last of the words, which is still being typed, can become. The program's name is left
 /// out. Never fails: what is not understood has no candidates.
 Completion complete(const std::vector<std::string>& words, const Description& description,
-                    const Nameable& nameable);
+                    const CompletionSources& nameable);
 
 /// For the shells' scripts: "none", "files" or "folders", then a line "TEXT<tab>MEANING" for each
 /// candidate.

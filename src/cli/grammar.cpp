@@ -67,7 +67,7 @@ struct AllOptions {
 };
 
 /// The grammar while it is being parsed: the innermost command that was named.
-struct Draft {
+struct ParseState {
   Extent extent = Extent::as_named;
   AllOptions options = {};
   Invocation invocation = {};  ///< as far as the common options say
@@ -93,7 +93,7 @@ constexpr const char* of_identity = "of profiles with an identity";
 constexpr const char* of_screwdrivers = "of profiles that count their results";
 constexpr const char* of_alarms = "of profiles whose run names alarms and warnings";
 
-void add_common_options(CLI::App& app, Draft& draft) {
+void add_common_options(CLI::App& app, ParseState& draft) {
   Binder bind(app, "", draft.common_faults);
   Invocation& invocation = draft.invocation;
   work::CommonOptions& common = invocation.common;
@@ -159,7 +159,7 @@ std::string path_of(const CLI::App* command) {
 /// options are copied, because the grammar is gone when it runs; what is wrong with them is told
 /// then, as an error of the command.
 template <typename Options, typename RunCommand, typename BindOptions>
-void add_command(CLI::App& parent, Draft& draft, const Words& words, Options& options,
+void add_command(CLI::App& parent, ParseState& draft, const Words& words, Options& options,
                  RunCommand run, BindOptions bind_options) {
   CLI::App* command = parent.add_subcommand(std::string(words.name), std::string(words.meaning));
   command->fallthrough();
@@ -194,7 +194,7 @@ void bind_jobs(Binder& bind, std::size_t& jobs) {
   bind.option("--jobs", "N", jobs, NumberFrom{1, 10'000}, "how many tools at a time (default 64)");
 }
 
-void add_identify(CLI::App& app, Draft& draft) {
+void add_identify(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"identify", "TARGET...",
                            "who is there: maker, model, serial, firmware, profile",
                            "spindle identify sim:doga-bm\n"
@@ -207,7 +207,7 @@ void add_identify(CLI::App& app, Draft& draft) {
               });
 }
 
-void add_list(CLI::App& app, Draft& draft) {
+void add_list(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"list", "[TARGET] [PATTERN...]",
                            "the parameter catalogue, offline when --profile is given",
                            "spindle list --profile doga-bm\n"
@@ -220,7 +220,7 @@ void add_list(CLI::App& app, Draft& draft) {
               });
 }
 
-void add_get(CLI::App& app, Draft& draft) {
+void add_get(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"get", "TARGET [NAME|PATTERN...]",
                            "read parameters by name, pattern, number (p242) or raw register "
                            "(@holding:2, @input:3204/i16)",
@@ -244,7 +244,7 @@ constexpr std::string_view save_words =
 constexpr std::string_view broadcast_words =
     "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
 
-void add_set(CLI::App& app, Draft& draft) {
+void add_set(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"set", "TARGET NAME=VALUE...",
                            "check everything, show old and new, write only what differs, read back",
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
@@ -259,7 +259,7 @@ void add_set(CLI::App& app, Draft& draft) {
                 bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
                           "check and show everything, write nothing");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);
-                bind.flag("--broadcast", options.reach, commands::Reach::everybody,
+                bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
                           broadcast_words);
                 bind_jobs(bind, options.jobs);
               });
@@ -268,26 +268,27 @@ void add_set(CLI::App& app, Draft& draft) {
 constexpr std::string_view accept_unverified_words =
     "send what may move or lock the tool although its register is not certain";
 
-void add_do(CLI::App& app, Draft& draft) {
+void add_do(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"do", "TARGET [ACTION[=VALUE]...]",
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
                            "spindle do station3 alarm-reset\n"
                            "spindle do @line1 lock=unlocked"};
-  add_command(
-      app, draft, words, draft.options.perform, commands::perform,
-      [](Binder& bind, commands::DoOptions& options) {
-        bind.required("TARGET", options.target, target_words);
-        bind.argument("ACTION", options.actions, "actions, with =VALUE where they take one");
-        bind.flag("--accept-unverified", options.acceptance, commands::Acceptance::unverified,
-                  accept_unverified_words);
-        bind.flag("--broadcast", options.reach, commands::Reach::everybody, broadcast_words);
-        bind_jobs(bind, options.jobs);
-      });
+  add_command(app, draft, words, draft.options.perform, commands::perform,
+              [](Binder& bind, commands::DoOptions& options) {
+                bind.required("TARGET", options.target, target_words);
+                bind.argument("ACTION", options.actions,
+                              "actions, with =VALUE where they take one");
+                bind.flag("--accept-unverified", options.acceptance,
+                          commands::Acceptance::unverified, accept_unverified_words);
+                bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
+                          broadcast_words);
+                bind_jobs(bind, options.jobs);
+              });
 }
 
-void add_ping(CLI::App& app, Draft& draft) {
+void add_ping(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"ping", "TARGET [-c N]",
                            "round-trip statistics without touching any value",
                            "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
@@ -312,7 +313,7 @@ std::string scan_words() {
          "(tcp://) a unit that the gateway cannot reach counts as absent.\n";
 }
 
-void add_scan(CLI::App& app, Draft& draft) {
+void add_scan(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"scan", "BUS [--units 1-31]",
                            "which units answer on a serial line or behind a gateway",
                            "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
@@ -381,7 +382,7 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
             "end when the link is lost");
 }
 
-void add_watch(CLI::App& app, Draft& draft) {
+void add_watch(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"watch", "TARGET... [NAME|PATTERN...]",
                            "events as they happen and changes of polled values, until stopped",
                            "spindle watch station3\n"
@@ -421,7 +422,7 @@ void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
             accept_unverified_words);
 }
 
-void add_remote_start(CLI::App& app, Draft& draft) {
+void add_remote_start(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
       "remote-start", "TARGET [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
@@ -433,7 +434,7 @@ void add_remote_start(CLI::App& app, Draft& draft) {
               bind_remote_start);
 }
 
-void add_remote_stop(CLI::App& app, Draft& draft) {
+void add_remote_stop(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"remote-stop",
                            "TARGET...",
                            "stop now; never asks",
@@ -448,12 +449,12 @@ void add_remote_stop(CLI::App& app, Draft& draft) {
                 bind.required("TARGET", options.targets, target_words);
                 bind.option("--stop", "HOW", options.stop, one_of(stop_modes),
                             "how a motor stops: decelerate (default) or instant");
-                bind.flag("--broadcast", options.reach, commands::Reach::everybody,
+                bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
                           "everybody on the serial line (unit=0): sent, not acknowledged");
               });
 }
 
-void add_alarms(CLI::App& app, Draft& draft) {
+void add_alarms(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"alarms", "TARGET [--reset]",
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
@@ -470,7 +471,7 @@ void add_alarms(CLI::App& app, Draft& draft) {
               });
 }
 
-void add_backup(CLI::App& app, Draft& draft) {
+void add_backup(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
                            "every stored parameter into a file that people can read and git can "
                            "compare",
@@ -509,7 +510,7 @@ std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
   return std::nullopt;
 }
 
-void add_diff(CLI::App& app, Draft& draft) {
+void add_diff(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"diff", "A {B|--dir FOLDER} [NAME|PATTERN...] [--ignore PATTERN]",
                            "compare tools, backup files and defaults by parameter name",
                            "spindle diff station3 station3.yaml\n"
@@ -533,7 +534,7 @@ void add_diff(CLI::App& app, Draft& draft) {
       });
 }
 
-void add_restore(CLI::App& app, Draft& draft) {
+void add_restore(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"restore", "TARGET {FILE|--dir FOLDER} [NAME|PATTERN...]",
                            "plan, confirm, write what differs, verify; put back if it fails",
                            "spindle restore station3 station3.yaml --dry-run\n"
@@ -624,7 +625,7 @@ void bind_simulated_work(Binder& bind, sim::BmOptions& bm) {
   });
 }
 
-void add_simulate(CLI::App& app, Draft& draft) {
+void add_simulate(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
       "simulate", "PROFILE [--listen URL]",
       "a simulated tool to learn on, script against and test with",
@@ -650,7 +651,7 @@ void add_simulate(CLI::App& app, Draft& draft) {
               });
 }
 
-void add_profile_commands(CLI::App& profile, Draft& draft) {
+void add_profile_commands(CLI::App& profile, ParseState& draft) {
   using Options = commands::ProfileNameOptions;
   const auto list = [](const Options&, Context& context) {
     return commands::profile_list(context);
@@ -670,7 +671,7 @@ void add_profile_commands(CLI::App& profile, Draft& draft) {
               draft.options.profile_check, commands::profile_check, bind_name);
 }
 
-void add_profile(CLI::App& app, Draft& draft) {
+void add_profile(CLI::App& app, ParseState& draft) {
   using Options = commands::ProfileNameOptions;
   constexpr Words words = {"profile", "list|show|check [PROFILE]",
                            "the catalogue files: which exist, what they say, whether one is valid",
@@ -684,7 +685,7 @@ void add_profile(CLI::App& app, Draft& draft) {
               [&draft](Binder& bind, Options&) { add_profile_commands(bind.command(), draft); });
 }
 
-void add_tools(CLI::App& app, Draft& draft) {
+void add_tools(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"tools", "[--check]",
                            "the named tools of the tools file, with endpoints and profiles",
                            "spindle tools\n"
@@ -703,7 +704,7 @@ void add_tools(CLI::App& app, Draft& draft) {
               });
 }
 
-void build(CLI::App& app, Draft& draft) {
+void build(CLI::App& app, ParseState& draft) {
   app.set_help_flag();
   app.allow_extras();
   app.require_subcommand(0, 1);
@@ -733,7 +734,7 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
   return names;
 }
 
-Error unexpected_argument(const CLI::App& app, const Draft& draft, const std::string& extra) {
+Error unexpected_argument(const CLI::App& app, const ParseState& draft, const std::string& extra) {
   const std::string command = draft.chosen == nullptr ? "" : path_of(draft.chosen);
   if (extra.size() > 1 && extra.front() == '-') {
     const std::string name = extra.substr(0, extra.find('='));
@@ -793,7 +794,7 @@ std::vector<OptionDescription> options_of(const CLI::App& app) {
   return options;
 }
 
-std::vector<CommandDescription> commands_of(const CLI::App& app, const Draft& draft) {
+std::vector<CommandDescription> commands_of(const CLI::App& app, const ParseState& draft) {
   std::vector<CommandDescription> commands;
   for (const CLI::App* command : app.get_subcommands({})) {
     const Words& words = draft.words.at(command);
@@ -809,11 +810,11 @@ std::vector<CommandDescription> commands_of(const CLI::App& app, const Draft& dr
   return commands;
 }
 
-Description description_of(const CLI::App& app, const Draft& draft) {
+Description description_of(const CLI::App& app, const ParseState& draft) {
   return {.common = options_of(app), .commands = commands_of(app, draft)};
 }
 
-std::string help_of(const CLI::App& app, const Draft& draft) {
+std::string help_of(const CLI::App& app, const ParseState& draft) {
   const Description description = description_of(app, draft);
   if (draft.chosen == nullptr) return program_help(description);
   const CommandDescription* command = find_command(description, path_of(draft.chosen));
@@ -861,7 +862,7 @@ bool names_tools(const CLI::App& command) {
   return !takes_words;
 }
 
-Result<Invocation> invocation_of(const CLI::App& app, Draft& draft) {
+Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   const auto extra = first_extra(app);
   // Where a command is misspelt, the program's help would hide it.
   const bool misspelt = extra && draft.chosen == nullptr;
@@ -910,7 +911,7 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
 
 Description describe_grammar() {
   CLI::App app;
-  Draft draft;
+  ParseState draft;
   draft.extent = Extent::whole;
   build(app, draft);
   return description_of(app, draft);
@@ -918,7 +919,7 @@ Description describe_grammar() {
 
 Result<Invocation> parse(const std::vector<std::string>& arguments) {
   CLI::App app;
-  Draft draft;
+  ParseState draft;
   build(app, draft);
   try {
     auto words = with_one_output_option(arguments);

@@ -80,7 +80,8 @@ Result<void> ask_for_hazards(const std::vector<ActionRequest>& requests, const T
                              const Context& context) {
   Question question;
   for (const ActionRequest& request : requests) {
-    const bool is_asked = request.action.hazard != Hazard::none || target.reach == Reach::everybody;
+    const bool is_asked =
+        request.action.hazard != Hazard::none || target.addressing == Addressing::broadcast;
     if (is_asked) question.add(request);
   }
   return question.ask(target.shown, context);
@@ -113,7 +114,7 @@ void tell_notes(const ActionRequest& request, const Target& target, const Contex
   if (!action.note.empty()) {
     context.renderer.note(fmt::format("{}: {}: {}", target.shown, action.name, action.note));
   }
-  if (target.reach == Reach::everybody && action.prepare) {
+  if (target.addressing == Addressing::broadcast && action.prepare) {
     context.renderer.note(fmt::format("{}: {}: every motor on the line is stopped for it",
                                       target.shown, action.name));
   }

@@ -11,7 +11,7 @@
 namespace spindle::commands {
 namespace {
 
-using catalogue::CommandRegisterFacts;
+using catalogue::CommandRegisterSpec;
 using catalogue::Parameter;
 using catalogue::Profile;
 using catalogue::StopMode;
@@ -55,7 +55,7 @@ class RegisterSetup final : public MotorSetup {
   }
 
  private:
-  [[nodiscard]] const CommandRegisterFacts& facts() const { return plan_->model->facts(); }
+  [[nodiscard]] const CommandRegisterSpec& facts() const { return plan_->model->facts(); }
 
   Result<void> write_settings() {
     for (const auto& [parameter, value] : plan_->settings) {
@@ -147,7 +147,7 @@ Result<RegisterPlan> make_plan(const RemoteStartOptions& options, const Profile&
   RegisterPlan plan;
   plan.options = options;
   plan.model = std::make_unique<const CommandRegister>(std::move(*model));
-  const CommandRegisterFacts& facts = plan.model->facts();
+  const CommandRegisterSpec& facts = plan.model->facts();
   if (!facts.enable.parameter.empty()) {
     auto enable = profile.find(facts.enable.parameter);
     if (!enable) return tl::unexpected(std::move(enable.error()));

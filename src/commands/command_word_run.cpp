@@ -14,7 +14,7 @@
 namespace spindle::commands {
 namespace {
 
-using catalogue::CommandWordFacts;
+using catalogue::CommandWordSpec;
 using catalogue::Profile;
 
 /// A shorter one could bite while this program only waits for an answer.
@@ -57,7 +57,7 @@ Result<WordPlan> make_plan(const RemoteStartOptions& options, const Profile& pro
   WordPlan plan;
   plan.options = options;
   plan.motor = std::make_unique<const device::CommandWord>(std::move(*motor));
-  const CommandWordFacts& run = plan.motor->facts();
+  const CommandWordSpec& run = plan.motor->facts();
   plan.operation = options.operation.value_or(run.preferred);
   if (plan.operation < run.first || plan.operation > run.last) {
     return tl::unexpected(

@@ -12,7 +12,7 @@
 
 namespace spindle::commands {
 
-using catalogue::CommandWordFacts;
+using catalogue::CommandWordSpec;
 using catalogue::Parameter;
 using catalogue::Value;
 
@@ -57,7 +57,7 @@ Result<void> WordSetup::prepare() {
 }
 
 Result<void> WordSetup::read_settings() {
-  const CommandWordFacts& run = facts();
+  const CommandWordSpec& run = facts();
   std::vector<std::string> names = {run.command, run.mode,
                                     catalogue::numbered_name(run.deceleration, plan_->operation)};
   for (const catalogue::Text* name : {&run.analog, &run.watchdog}) {
@@ -158,7 +158,7 @@ Result<void> WordSetup::check_inputs() const {
 }
 
 Result<void> WordSetup::check_analog() const {
-  const CommandWordFacts& run = facts();
+  const CommandWordSpec& run = facts();
   const bool from_outside =
       !run.analog.empty() && found_.analog != run.digital && plan_->operation <= run.analog_to;
   if (!from_outside) return {};

@@ -51,7 +51,7 @@ class WordSetup final : public MotorSetup {
     Duration stopping = {};
   };
 
-  [[nodiscard]] const catalogue::CommandWordFacts& facts() const { return plan_->motor->facts(); }
+  [[nodiscard]] const catalogue::CommandWordSpec& facts() const { return plan_->motor->facts(); }
   /// The word of the profile that starts the run, and the same word for this driver.
   [[nodiscard]] std::uint16_t standard_word() const;
   [[nodiscard]] std::uint16_t start_word() const {

@@ -64,7 +64,7 @@ Result<void> require_answer(std::string_view what, const Context& context) {
 
 Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context& context) {
   const auto identity = tool.device.identity();
-  tool.device.hang_up();
+  tool.device.disconnect();
   if (auto agreed = ask_consent(what, context); !agreed) return agreed;
   const Target known = known_target(tool);
   auto profile = load_profile(known, context);

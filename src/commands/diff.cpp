@@ -56,7 +56,7 @@ class Diff final : public Verb<Counterpart, DiffResult> {
     auto own = read_tool(tool, context);
     if (!own) return tl::unexpected(std::move(own.error()));
     auto other = plan.content ? Result<SideContent>(*plan.content) : [&] {
-      tool.device.hang_up();  // the other one may be on the same line
+      tool.device.disconnect();  // the other one may be on the same line
       return read_tool(*plan.side.target, context);
     }();
     if (!other) return tl::unexpected(std::move(other.error()));
@@ -136,7 +136,7 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
 }
 
 Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {
-  auto targets = resolve_one_or_group(options.a, Reach::one, context);
+  auto targets = resolve_one_or_group(options.a, Addressing::unicast, context);
   if (!targets) return tl::unexpected(std::move(targets.error()));
   auto paths = check_names_only(options.patterns, context).and_then([&] {
     return paths_in_folder(targets->tools, options.folder);

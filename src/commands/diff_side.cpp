@@ -56,7 +56,7 @@ Result<SideContent> read_tool(const Target& target, const Context& context) {
 Result<SideContent> read_file(const DiffSide& side, const Context& context) {
   auto profile = context.profiles.load(profile_of(side, context));
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto snapshot = files::understand_backup(*side.file, *profile);
+  auto snapshot = files::resolve_backup(*side.file, *profile);
   if (!snapshot) return tl::unexpected(std::move(snapshot.error()));
   return SideContent{std::move(*snapshot), {}, std::move(*profile)};
 }

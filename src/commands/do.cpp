@@ -70,8 +70,8 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
   return finish(listing, outcome, listed(outcome, target.shown), context);
 }
 
-Summary summary_of(const Outcome& outcome, Reach reach, const std::string& target) {
-  const bool everybody = reach == Reach::everybody;
+Summary summary_of(const Outcome& outcome, Addressing addressing, const std::string& target) {
+  const bool everybody = reach == Addressing::broadcast;
   return {.counts = {{everybody ? "sent" : "done", count(outcome.succeeded())},
                      {"failed", count(outcome.failed())}},
           .sentence = fmt::format("{} {}, {} failed", outcome.succeeded(),
@@ -120,12 +120,12 @@ class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
       }
       outcome.succeed();
     }
-    return finish(listing, outcome, summary_of(outcome, tool.target.reach, tool.target.shown),
+    return finish(listing, outcome, summary_of(outcome, tool.target.addressing, tool.target.shown),
                   context);
   }
 
   [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
-    Summary summary = summary_of(all.outcome, Reach::one, {});
+    Summary summary = summary_of(all.outcome, Addressing::unicast, {});
     summary.sentence += " on " + counted(all.tools, "tool");
     return summary;
   }
@@ -162,7 +162,7 @@ Result<Outcome> list_all_actions(const Targets& targets, const DoOptions& option
 }  // namespace
 
 Result<Outcome> perform(const DoOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, options.reach, context)
+  return resolve_one_or_group(options.target, options.addressing, context)
       .and_then([&](const Targets& targets) {
         if (options.actions.empty()) return list_all_actions(targets, options, context);
         return run_verb(Do(options, targets.is_group), targets, options.jobs, context);

@@ -7,10 +7,11 @@
 
 namespace spindle::commands {
 
-Result<Targets> resolve_one_or_group(const std::string& text, Reach reach, const Context& context) {
+Result<Targets> resolve_one_or_group(const std::string& text, Addressing addressing,
+                                     const Context& context) {
   auto tools = resolve_compatible_targets({text}, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
-  if (reach == Reach::everybody && tools->size() > 1) {
+  if (reach == Addressing::broadcast && tools->size() > 1) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("--broadcast is for everybody on one serial line, and '{}' is "
@@ -18,8 +19,9 @@ Result<Targets> resolve_one_or_group(const std::string& text, Reach reach, const
                                      text, tools->size()),
               .hint = "name the line, as in rtu:///dev/ttyUSB0?unit=0, or leave out --broadcast"});
   }
-  for (Target& target : *tools) target.reach = reach;
-  return Targets{.tools = std::move(*tools), .is_group = names_group(text) && reach == Reach::one};
+  for (Target& target : *tools) target.addressing = reach;
+  return Targets{.tools = std::move(*tools),
+                 .is_group = names_group(text) && reach == Addressing::unicast};
 }
 
 Targets reopening(Targets targets) {

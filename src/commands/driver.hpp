@@ -20,7 +20,8 @@
 namespace spindle::commands {
 
 /// What one name, @group or URL means; a broadcast has one target, which is everybody.
-Result<Targets> resolve_one_or_group(const std::string& text, Reach reach, const Context& context);
+Result<Targets> resolve_one_or_group(const std::string& text, Addressing addressing,
+                                     const Context& context);
 
 /// The same targets, whose connections are opened once more where the tools close them.
 Targets reopening(Targets targets);

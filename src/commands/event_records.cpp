@@ -124,7 +124,7 @@ std::string NewsRecords::error_text(std::int64_t code) const {
   return known == nullptr ? std::string() : known->text.to_string();
 }
 
-Record NewsRecords::event(const device::EventNews& news) const {
+Record NewsRecords::event(const device::ToolEvent& news) const {
   Record record = blank("event", news.time);
   const EventKind kind = kind_of(news.block);
   record.fields.reserve(keys_.size() + 7);
@@ -157,7 +157,7 @@ Record NewsRecords::event(const device::EventNews& news) const {
   return record;
 }
 
-Record NewsRecords::value(const device::ValueNews& news, const std::string& type,
+Record NewsRecords::value(const device::PolledValue& news, const std::string& type,
                           WallTime time) const {
   const catalogue::Parameter& parameter = *news.parameter;
   Record record = blank(type, time);
@@ -179,11 +179,11 @@ Record NewsRecords::value(const device::ValueNews& news, const std::string& type
   return record;
 }
 
-Record NewsRecords::motor(const device::MotorNews& news) const {
+Record NewsRecords::motor(const device::MotorTransition& news) const {
   return motor_record(news, *target_, tables_);
 }
 
-Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {
+Record NewsRecords::gap(const device::EventGap& news, WallTime time) const {
   Record record = blank("gap", time);
   record.fields = {
       {"missed", news.missed ? number(*news.missed) : Cell()},
@@ -193,7 +193,7 @@ Record NewsRecords::gap(const device::GapNews& news, WallTime time) const {
   return record;
 }
 
-Record NewsRecords::lag(const device::LagNews& news, WallTime time) const {
+Record NewsRecords::lag(const device::PollLag& news, WallTime time) const {
   const auto text_of = [](Duration duration) {
     return fmt::format("{} ms", std::chrono::round<std::chrono::milliseconds>(duration).count());
   };
@@ -208,7 +208,7 @@ Record NewsRecords::lag(const device::LagNews& news, WallTime time) const {
   return record;
 }
 
-Record NewsRecords::link(const device::LinkNews& news, WallTime time) const {
+Record NewsRecords::link(const device::LinkChange& news, WallTime time) const {
   Record record = blank("link", time);
   const Tone tone = news.state == device::LinkState::lost ? Tone::bad : Tone::plain;
   std::string text = news.state == device::LinkState::connected

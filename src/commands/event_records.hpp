@@ -21,14 +21,14 @@ class NewsRecords {
   NewsRecords(const Target& target, const catalogue::Profile& profile,
               catalogue::CodeTables tables);
 
-  [[nodiscard]] report::Record event(const device::EventNews& news) const;
+  [[nodiscard]] report::Record event(const device::ToolEvent& news) const;
   /// `type` is "change" or "sample".
-  [[nodiscard]] report::Record value(const device::ValueNews& news, const std::string& type,
+  [[nodiscard]] report::Record value(const device::PolledValue& news, const std::string& type,
                                      WallTime time) const;
-  [[nodiscard]] report::Record motor(const device::MotorNews& news) const;
-  [[nodiscard]] report::Record gap(const device::GapNews& news, WallTime time) const;
-  [[nodiscard]] report::Record lag(const device::LagNews& news, WallTime time) const;
-  [[nodiscard]] report::Record link(const device::LinkNews& news, WallTime time) const;
+  [[nodiscard]] report::Record motor(const device::MotorTransition& news) const;
+  [[nodiscard]] report::Record gap(const device::EventGap& news, WallTime time) const;
+  [[nodiscard]] report::Record lag(const device::PollLag& news, WallTime time) const;
+  [[nodiscard]] report::Record link(const device::LinkChange& news, WallTime time) const;
 
   /// What an event says; `other` where the profile does not know.
   [[nodiscard]] catalogue::EventKind kind_of(const Registers& block) const;

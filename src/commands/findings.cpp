@@ -16,7 +16,7 @@ using report::Record;
 
 const std::array<Column, 2> finding_columns = {{{"PLACE", "place"}, {"FINDING", "message"}}};
 
-Record finding_record(const files::Finding& finding, const Clock& clock) {
+Record finding_record(const files::Diagnostic& finding, const Clock& clock) {
   return {.type = "finding",
           .target = {},
           .time = clock.wall(),
@@ -29,12 +29,12 @@ Record finding_record(const files::Finding& finding, const Clock& clock) {
 
 }  // namespace
 
-Result<Outcome> tell_findings(const std::vector<files::Finding>& findings, const std::string& name,
-                              std::string_view what, Context& context) {
+Result<Outcome> tell_findings(const std::vector<files::Diagnostic>& findings,
+                              const std::string& name, std::string_view what, Context& context) {
   Outcome outcome;
   outcome.succeed();
   Listing listing(context, finding_columns);
-  for (const files::Finding& finding : findings) {
+  for (const files::Diagnostic& finding : findings) {
     listing.add(finding_record(finding, context.clock));
   }
   if (findings.empty()) {

@@ -49,9 +49,10 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
 }  // namespace
 
 Result<Outcome> get(const GetOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, Reach::one, context).and_then([&](Targets targets) {
-    return run_verb(Get(options), reopening(std::move(targets)), options.jobs, context);
-  });
+  return resolve_one_or_group(options.target, Addressing::unicast, context)
+      .and_then([&](Targets targets) {
+        return run_verb(Get(options), reopening(std::move(targets)), options.jobs, context);
+      });
 }
 
 }  // namespace spindle::commands

@@ -108,7 +108,7 @@ device::RunGuard::Reopen GuardedRun::reopener() {
 std::pair<Result<void>, device::StopReport> GuardedRun::run(
     device::GuardedMotion motion, const std::function<void()>& begin,
     const std::function<Result<void>()>& follow) {
-  if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
+  if (context_->uninterruptible.refuse_suspend) context_->uninterruptible.refuse_suspend();
   out_.emplace(context_->io, context_->interrupt);
   device::RunGuard guard(tool_->device, std::move(motion), reopener(),
                          context_->uninterruptible.clock);

@@ -20,7 +20,7 @@ report::Cell number_or_null(const std::optional<Decimal>& number) {
 }
 
 /// What people read beside the kind.
-std::string words_of(const device::MotorNews& news, const catalogue::CodeTables& tables) {
+std::string words_of(const device::MotorTransition& news, const catalogue::CodeTables& tables) {
   switch (news.event) {
     case MotorEvent::alarm:
       return code_words(news.state.alarm, tables.error);
@@ -42,7 +42,7 @@ std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts) {
   return fmt::format("{:02X}h{}{}", code, meaning.empty() ? "" : " ", meaning);
 }
 
-report::Record motor_record(const device::MotorNews& news, const Target& target,
+report::Record motor_record(const device::MotorTransition& news, const Target& target,
                             const catalogue::CodeTables& tables) {
   const device::MotorState& state = news.state;
   const bool bad = news.event == MotorEvent::alarm || news.event == MotorEvent::warning;

@@ -25,7 +25,7 @@ inline constexpr auto motor_event_words =
 std::string code_words(std::int64_t code, const catalogue::CodeTexts& texts);
 
 /// The `event` record of something that was seen to happen to a motor.
-report::Record motor_record(const device::MotorNews& news, const Target& target,
+report::Record motor_record(const device::MotorTransition& news, const Target& target,
                             const catalogue::CodeTables& tables);
 
 /// What can be read of a motor, in words: whether it runs, its alarm, and the setting that its run

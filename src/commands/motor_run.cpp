@@ -72,7 +72,7 @@ class MotorRun final : public ToolRun {
       if (read) guarded_->show_running(elapsed, speed_in_words(state));
       return read;
     };
-    following_.hear = [this](const device::MotorNews& news) { tell(news); };
+    following_.hear = [this](const device::MotorTransition& news) { tell(news); };
     const auto& limit = plan_->options.limit;
     if (limit) following_.deadline = context().clock.now() + *limit;
   }
@@ -131,14 +131,14 @@ class MotorRun final : public ToolRun {
     return fmt::format(", {} {}", state.feedback_speed->to_string(), plan_->speed_unit);
   }
 
-  void tell(const device::MotorNews& news) {
+  void tell(const device::MotorTransition& news) {
     news_.push_back(news);
     listing_->add(motor_record(news, tool().target, tables_));
   }
 
   [[nodiscard]] bool has_told(device::MotorEvent event) const {
     return std::any_of(news_.begin(), news_.end(),
-                       [&](const device::MotorNews& news) { return news.event == event; });
+                       [&](const device::MotorTransition& news) { return news.event == event; });
   }
 
   /// Why it did not run to its end as it should.
@@ -178,7 +178,7 @@ class MotorRun final : public ToolRun {
 
   [[nodiscard]] std::string alarm_words() const {
     std::int64_t code = 0;
-    for (const device::MotorNews& news : news_) {
+    for (const device::MotorTransition& news : news_) {
       if (news.event == device::MotorEvent::alarm) code = news.state.alarm;
     }
     return code_words(code, tables_.error);
@@ -193,7 +193,7 @@ class MotorRun final : public ToolRun {
   Listing* listing_ = nullptr;
   device::MotorFollowOptions following_ = {};
   std::optional<MotorEnding> ending_ = std::nullopt;  ///< empty: it could not be followed
-  std::vector<device::MotorNews> news_ = {};
+  std::vector<device::MotorTransition> news_ = {};
 };
 
 /// Asks with what the driver itself says; what would keep it from running is told first.

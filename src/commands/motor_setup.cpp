@@ -102,14 +102,14 @@ std::vector<Left> MotorSetup::put_back() {
   std::vector<Left> left;
   add_left(left);
   if (changer_.sent().empty()) return left;
-  if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
+  if (context_->uninterruptible.refuse_suspend) context_->uninterruptible.refuse_suspend();
   begin_put_back();
   device::Rollback rollback(
       tool_->device, [this](Duration patience) { return uninterruptible_line_.connect(patience); },
       context_->uninterruptible.clock);
   for (const device::PutBackReport& report : changer_.put_back(rollback)) {
-    const bool as_before =
-        report.result == device::PutBack::done || report.result == device::PutBack::kept;
+    const bool as_before = report.result == device::RollbackResult::done ||
+                           report.result == device::RollbackResult::kept;
     if (!as_before) left.push_back(left_of(report.write, report.trouble));
   }
   return left;
@@ -118,7 +118,7 @@ std::vector<Left> MotorSetup::put_back() {
 std::vector<Left> MotorSetup::left() const {
   std::vector<Left> left;
   add_left(left);
-  for (const device::TriedWrite& write : changer_.sent()) {
+  for (const device::JournalEntry& write : changer_.sent()) {
     left.push_back(left_of(write, "the motor may still run"));
   }
   return left;
@@ -126,7 +126,7 @@ std::vector<Left> MotorSetup::left() const {
 
 std::string MotorSetup::left_note(const Parameter& /*parameter*/) const { return {}; }
 
-Left MotorSetup::left_of(const device::TriedWrite& write, std::string trouble) const {
+Left MotorSetup::left_of(const device::JournalEntry& write, std::string trouble) const {
   return {.name = write.parameter.name,
           .set = value_in_words(write.parameter, write.tried),
           .before = value_in_words(write.parameter, write.before),

@@ -110,7 +110,7 @@ class MotorSetup {
   [[nodiscard]] virtual std::string left_note(const catalogue::Parameter& parameter) const;
 
  private:
-  [[nodiscard]] Left left_of(const device::TriedWrite& write, std::string trouble) const;
+  [[nodiscard]] Left left_of(const device::JournalEntry& write, std::string trouble) const;
 
   const device::MotorMonitor* monitor_;
   OpenTool* tool_;

@@ -22,7 +22,7 @@ namespace {
 using catalogue::StopMode;
 
 /// The answer is of no interest here, so hardly waited for.
-constexpr int haste = 5;
+constexpr int hurry_divisor = 5;
 
 /// On a line that several share each waits for those before it, and one that is not there costs
 /// timeouts. So all motors are told to stop before any is asked whether it stands still. Only who
@@ -35,7 +35,7 @@ void tell_to_stop(const std::vector<Target>& targets, const std::vector<std::siz
     const auto model = device::RunModel::of(*profile);
     if (!model || !device::has_motor(*profile)) continue;
     Context hurried = context;
-    hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / haste;
+    hurried.common.timeout = context.common.timeout.value_or(profile->link.answer) / hurry_divisor;
     hurried.common.retries = 0;
     auto device = connect_device(targets[index], *profile, hurried);
     if (!device) continue;
@@ -108,8 +108,8 @@ std::optional<Error> fault_of_file(const RemoteStopOptions& options, const Conte
 }
 
 /// `unproven`: so many were acknowledged, and nothing that can be read proves them.
-Summary summary_of(const Outcome& outcome, Reach reach, std::size_t unproven) {
-  const bool everybody = reach == Reach::everybody;
+Summary summary_of(const Outcome& outcome, Addressing addressing, std::size_t unproven) {
+  const bool everybody = reach == Addressing::broadcast;
   const std::size_t stopped = everybody ? 0 : outcome.succeeded() - unproven;
   const std::size_t sent = everybody ? outcome.succeeded() : unproven;
   Summary summary;
@@ -136,7 +136,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   // No wrong name keeps another tool running, and no fault of the tools file.
   auto [targets, faults] = resolve_each_target(options.targets, context);
   for (Target& target : targets) {
-    target.reach = options.reach;
+    target.addressing = options.addressing;
     target.endpoint.claim = link::Claim::beside;
   }
   const Context calm = uninterruptible_context(context);
@@ -167,7 +167,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
     failure ? fail(*failure) : outcome.succeed();
   }
   std::for_each(faults.begin(), faults.end(), fail);
-  return finish(listing, outcome, summary_of(outcome, options.reach, unproven), context);
+  return finish(listing, outcome, summary_of(outcome, options.addressing, unproven), context);
 }
 
 }  // namespace spindle::commands

@@ -169,7 +169,7 @@ Result<Backups> find_backups(const std::vector<Target>& tools, const RestoreOpti
 
 /// One file is the backup of one tool.
 Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
-  auto targets = resolve_one_or_group(options.target, Reach::one, context);
+  auto targets = resolve_one_or_group(options.target, Addressing::unicast, context);
   if (!targets || !options.folder.empty()) return targets;
   if (targets->tools.size() > 1) {
     return tl::unexpected(

@@ -49,7 +49,7 @@ Result<RestoreTask> plan_by_profile(const files::BackupFile& file, const Restore
   if (auto storing = check_storing(options.storing, profile); !storing) {
     return tl::unexpected(std::move(storing.error()));
   }
-  auto backup = files::understand_backup(file, profile);
+  auto backup = files::resolve_backup(file, profile);
   if (!backup) return tl::unexpected(std::move(backup.error()));
   auto selection = catalogue::Selection::make(options.patterns, {}, profile);
   if (!selection) return tl::unexpected(std::move(selection.error()));

@@ -18,7 +18,7 @@ using catalogue::PlannedWrite;
 using catalogue::Skip;
 using catalogue::Snapshot;
 using catalogue::Value;
-using device::PutBack;
+using device::RollbackResult;
 
 Error about(const Parameter& parameter, std::string message) {
   return {.code = Errc::mismatch,
@@ -189,7 +189,7 @@ void RestoreRun::roll_back() {
   device::Rollback rollback(tool_->device, reopener(), context_->uninterruptible.clock);
   const auto reports = changer_.put_back(rollback);
   const bool complete = std::all_of(reports.begin(), reports.end(), [](const auto& report) {
-    return report.result == PutBack::done || report.result == PutBack::kept;
+    return report.result == RollbackResult::done || report.result == RollbackResult::kept;
   });
   if (!complete) outcome_ = {};  // what the tool holds matters more than why it came to that
   for (const device::PutBackReport& report : reports) report_put_back(report);
@@ -198,8 +198,8 @@ void RestoreRun::roll_back() {
 
 void RestoreRun::report_put_back(const device::PutBackReport& report) {
   const auto& [parameter, before, tried, doubt] = report.write;
-  if (report.result == PutBack::kept) return;
-  if (report.result == PutBack::done) {
+  if (report.result == RollbackResult::kept) return;
+  if (report.result == RollbackResult::done) {
     ++counts_.rolled_back;
     note(parameter, report.found.value_or(tried), Ending::rolled_back, before);
     return;
@@ -209,7 +209,7 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
                                                      tried.to_string(), before.to_string());
   Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
                                              before.to_string(), holds, report.trouble));
-  if (report.result == PutBack::unknown) error.code = Errc::no_answer;
+  if (report.result == RollbackResult::unknown) error.code = Errc::no_answer;
   error.hint = fmt::format("{} puts everything back, {} finishes the restore",
                            command_for(tool_->target, *context_, saved_), command_to_finish());
   fail(error);

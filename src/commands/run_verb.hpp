@@ -147,7 +147,8 @@ auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) c
   if (!profile) return tl::unexpected(std::move(profile.error()));
   Target known = target;
   if (!target.profile.empty()) {
-    if (auto meant = check_reach(target, *profile); !meant) return tl::unexpected(meant.error());
+    if (auto meant = check_addressing(target, *profile); !meant)
+      return tl::unexpected(meant.error());
   } else {
     auto tool = open_tool(target, Profile(), Need::named_registers, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));

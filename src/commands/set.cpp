@@ -36,7 +36,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   Result<Plan> examine(OpenTool& tool, Plan plan, Context& /*context*/) const override {
-    auto steps = options_->reach == Reach::everybody
+    auto steps = options_->addressing == Addressing::broadcast
                      ? steps_for_everybody(plan.assignments)
                      : check_against_tool(plan.assignments, tool.device);
     if (!steps) return tl::unexpected(std::move(steps.error()));
@@ -49,7 +49,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     if (is_dry_run()) return {};
     if (is_group_) return ask_for_group(planned, of, context);
     std::vector<std::string_view> what;
-    if (options_->reach == Reach::everybody) what.emplace_back("set");
+    if (options_->addressing == Addressing::broadcast) what.emplace_back("set");
     if (stores()) what.emplace_back(store_action);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
@@ -61,7 +61,8 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   [[nodiscard]] bool needs_tool(const Plan& plan) const override {
-    return !is_dry_run() && (stores() || plan.changes() || options_->reach == Reach::everybody);
+    return !is_dry_run() &&
+           (stores() || plan.changes() || options_->addressing == Addressing::broadcast);
   }
 
   Result<Done> conclude(const Target& target, const Plan& plan, Context& context) const override {
@@ -85,7 +86,8 @@ class Set final : public Verb<SetPlan, SetResult> {
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
     SetWriter writer(tool, options_->storing, context);
     if (!is_group_) tell_risks(plan.steps, tool.target, context);
-    return options_->reach == Reach::everybody ? writer.send(plan.steps) : writer.write(plan.steps);
+    return options_->addressing == Addressing::broadcast ? writer.send(plan.steps)
+                                                         : writer.write(plan.steps);
   }
 
   /// Nothing was written to this tool; its summary says so, too.
@@ -166,7 +168,7 @@ class Set final : public Verb<SetPlan, SetResult> {
 /// and each is opened again to be written if it is still as it was shown: no line is held while the
 /// user thinks about the question.
 Result<Outcome> set(const SetOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, options.reach, context)
+  return resolve_one_or_group(options.target, options.addressing, context)
       .and_then([&](Targets targets) {
         const Set verb(options, targets.is_group);
         return run_verb(verb, reopening(std::move(targets)), options.jobs, context);

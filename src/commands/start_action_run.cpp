@@ -63,7 +63,7 @@ class StartActionRun final : public ToolRun {
                          .profiles.load_code_tables(tool().profile->path)
                          .value_or(catalogue::CodeTables()));
     follower_.emplace(tool().device, plan_->start, context().clock,
-                      [this](const device::EventNews& event) { tell(event); });
+                      [this](const device::ToolEvent& event) { tell(event); });
     return setup_.look().and_then([&] { return setup_.select(); }).and_then([&] {
       return follower_->prepare();
     });
@@ -110,7 +110,7 @@ class StartActionRun final : public ToolRun {
 
  private:
   /// What happens to the tool between its start and its end.
-  void tell(const device::EventNews& event) {
+  void tell(const device::ToolEvent& event) {
     if (listing_ != nullptr) listing_->add(records_->event(event));
   }
 
@@ -132,7 +132,7 @@ class StartActionRun final : public ToolRun {
   }
 
   /// The event of the run: the one that ended it, or the one that our stop caused.
-  std::optional<device::EventNews> find_result(const device::StopReport& stop) {
+  std::optional<device::ToolEvent> find_result(const device::StopReport& stop) {
     if (ended_ && ended_->event) return std::move(ended_->event);
     if (stop.result == device::StopResult::unconfirmed) return std::nullopt;
     auto late = follower_->late_event();
@@ -175,7 +175,7 @@ class StartActionRun final : public ToolRun {
   Listing* listing_ = nullptr;
   device::FollowOptions limits_ = {};
   std::optional<device::FollowedRun> ended_ = std::nullopt;  ///< empty: it could not be followed
-  std::optional<device::EventNews> event_ = std::nullopt;
+  std::optional<device::ToolEvent> event_ = std::nullopt;
 };
 
 /// Before the tool was asked anything.

@@ -140,7 +140,7 @@ std::vector<Left> StartActionSetup::put_back() {
       left.push_back(left_of(*selected, before ? "no command selects that" : ""));
       continue;
     }
-    if (context_->uninterruptible.stay_awake) context_->uninterruptible.stay_awake();
+    if (context_->uninterruptible.refuse_suspend) context_->uninterruptible.refuse_suspend();
     work::LoggedChange change{.name = request.action.name,
                               .register_address = request.action.address.value,
                               .old_value = Decimal(request.value),
@@ -151,8 +151,8 @@ std::vector<Left> StartActionSetup::put_back() {
         [this](Duration patience) { return uninterruptible_line_.connect(patience); },
         context_->uninterruptible.clock);
     if (report.found) change.old_value = Decimal(*report.found);
-    const bool done =
-        report.result == device::PutBack::done || report.result == device::PutBack::kept;
+    const bool done = report.result == device::RollbackResult::done ||
+                      report.result == device::RollbackResult::kept;
     change.result = done ? "rolled-back" : "not-rolled-back";
     log_->end(id, change);
     if (!done) left.push_back(left_of(*selected, report.trouble));

@@ -16,7 +16,7 @@ namespace spindle::commands {
 
 /// Everything about the run of such a tool that is decided before it is touched.
 struct StartActionPlan {
-  catalogue::StartActionFacts facts;
+  catalogue::StartActionSpec facts;
   std::vector<ActionRequest> selections;  ///< what may be selected before, as far as it was given
   catalogue::Action start;
 };

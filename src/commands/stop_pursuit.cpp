@@ -35,7 +35,7 @@ StopPursuit::StopPursuit(const Target& target, StopMode mode, const Context& con
     : target_(target),
       mode_(mode),
       wanted_connect_(context.common.connect_timeout),
-      usual_(wanted_connect_.value_or(catalogue::LinkFacts().connect)),
+      usual_(wanted_connect_.value_or(catalogue::LinkSpec().connect)),
       context_(context),
       guard_(
           motion(), [this](Duration patience) { return open(patience); }, context_.clock,
@@ -114,7 +114,7 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
 
 Result<device::Device> StopPursuit::connect_unknown() {
   const CommonOptions usual = context_.common;
-  const Duration patience = usual.timeout.value_or(catalogue::LinkFacts().answer);
+  const Duration patience = usual.timeout.value_or(catalogue::LinkSpec().answer);
   context_.common.retries = 0;  // a question that got lost is asked on a new connection
   if (++questions_ <= soon_repeated) context_.common.timeout = std::min(patience, soon);
   auto tool = open_tool(target_, Profile(), Need::named_registers, context_);
@@ -150,7 +150,7 @@ Result<StopResult> StopPursuit::stop(device::Device& device, Clock& clock) {
 }
 
 Result<StopResult> StopPursuit::send_stop(device::Device& device, Clock& clock) {
-  if (target_.reach == Reach::everybody && device::has_motor(*profile_)) {
+  if (target_.addressing == Addressing::broadcast && device::has_motor(*profile_)) {
     return broadcast_stop(device, *model_, mode_).map([] { return StopResult::sent; });
   }
   if (!std::exchange(was_observed_, true)) stopper_->observe(device);

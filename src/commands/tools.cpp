@@ -51,7 +51,7 @@ class ToolsCheck {
   ToolsCheck(files::CheckedTools checked, const Context& context)
       : checked_(std::move(checked)), context_(&context) {}
 
-  std::vector<files::Finding> run() {
+  std::vector<files::Diagnostic> run() {
     for (const files::Tool& tool : checked_.tools.tools) check(tool);
     auto findings = std::move(checked_.findings);
     std::stable_sort(findings.begin(), findings.end(), [](const auto& a, const auto& b) {

@@ -69,7 +69,7 @@ void watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, W
   };
   const auto plan = [&](const catalogue::Profile& profile) { return plan_watch(options, profile); };
   device::Watcher watcher(open, plan, options.reconnection, context.clock,
-                          [&](const device::News& news) { return stream.tell(news, voice); });
+                          [&](const device::WatchEvent& news) { return stream.tell(news, voice); });
   const auto of_tool = [&](Error error) {
     if (is_about_tool(error)) return with_target(std::move(error), tool.target());
     error.asked_of = tool.target().shown;

@@ -12,12 +12,12 @@
 namespace spindle::commands {
 namespace {
 
-using device::Heed;
+using device::WatchControl;
 
 /// Whether the tool gave it away: then it is told, or lost.
-bool is_only_here(const device::News& news) {
-  const auto* event = std::get_if<device::EventNews>(&news);
-  const auto* gap = std::get_if<device::GapNews>(&news);
+bool is_only_here(const device::WatchEvent& news) {
+  const auto* event = std::get_if<device::ToolEvent>(&news);
+  const auto* gap = std::get_if<device::EventGap>(&news);
   return (event != nullptr && event->is_only_here) || (gap != nullptr && gap->is_only_here);
 }
 
@@ -34,12 +34,12 @@ WatchStream::WatchStream(const WatchOptions& options, std::size_t tools,
       started_(context.clock.now()),
       last_event_(started_) {}
 
-Heed WatchStream::tell(const device::News& news, Voice& voice) {
+WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   const std::lock_guard lock(mutex_);
-  if (ended_ && !is_only_here(news)) return Heed::stop;
+  if (ended_ && !is_only_here(news)) return WatchControl::stop;
   if (out_.is_full()) {
     drop(news, voice.dropped);
-    return Heed::go_on;
+    return WatchControl::go_on;
   }
   status_.clear();
   tell_dropped(voice);
@@ -47,7 +47,7 @@ Heed WatchStream::tell(const device::News& news, Voice& voice) {
   show_status();
   const bool counted = options_->count > 0 && heard_ >= options_->count;
   if (counted || !listing_.open()) end();
-  return ended_ ? Heed::stop : Heed::go_on;
+  return ended_ ? WatchControl::stop : WatchControl::go_on;
 }
 
 /// How the watch of one tool ended. `unreached` says why there never was a link to it.
@@ -99,7 +99,7 @@ Result<Outcome> WatchStream::finish() {
   return out_.drain().map([&](std::size_t) { return outcome_; });
 }
 
-report::Record WatchStream::record_of(const device::EventNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::ToolEvent& news, const NewsRecords& records) {
   report::Record record = records.event(news);
   if (news.standing == device::Standing::remembered) {
     ++counts_.remembered;
@@ -114,35 +114,36 @@ report::Record WatchStream::record_of(const device::EventNews& news, const NewsR
   return record;
 }
 
-report::Record WatchStream::record_of(const device::MotorNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::MotorTransition& news,
+                                      const NewsRecords& records) {
   ++counts_.events;
   hear();
   return records.motor(news);
 }
 
-report::Record WatchStream::record_of(const device::ValueNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::PolledValue& news, const NewsRecords& records) {
   const bool sample = options_->samples == device::Samples::all;
   ++(sample ? counts_.samples : counts_.changes);
   hear();
   return records.value(news, sample ? "sample" : "change", context_->clock.wall());
 }
 
-report::Record WatchStream::record_of(const device::GapNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::EventGap& news, const NewsRecords& records) {
   ++counts_.gaps;
   return records.gap(news, context_->clock.wall());
 }
 
-report::Record WatchStream::record_of(const device::LagNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::PollLag& news, const NewsRecords& records) {
   counts_.missed_intervals += news.missed;
   return records.lag(news, context_->clock.wall());
 }
 
-report::Record WatchStream::record_of(const device::LinkNews& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::LinkChange& news, const NewsRecords& records) {
   note_link(news);
   return records.link(news, context_->clock.wall());
 }
 
-void WatchStream::note_link(const device::LinkNews& news) {
+void WatchStream::note_link(const device::LinkChange& news) {
   if (news.state == device::LinkState::lost) {
     ++counts_.losses;
     --connected_;
@@ -156,15 +157,15 @@ void WatchStream::hear() {
   last_event_ = context_->clock.now();
 }
 
-void WatchStream::drop(const device::News& news, Dropped& dropped) {
+void WatchStream::drop(const device::WatchEvent& news, Dropped& dropped) {
   ++dropped.records;
-  if (const auto* link = std::get_if<device::LinkNews>(&news)) note_link(*link);
+  if (const auto* link = std::get_if<device::LinkChange>(&news)) note_link(*link);
   std::optional<std::uint32_t> events = 0;
-  if (std::holds_alternative<device::EventNews>(news) ||
-      std::holds_alternative<device::MotorNews>(news)) {
+  if (std::holds_alternative<device::ToolEvent>(news) ||
+      std::holds_alternative<device::MotorTransition>(news)) {
     events = 1;
   }
-  if (const auto* gap = std::get_if<device::GapNews>(&news)) events = gap->missed;
+  if (const auto* gap = std::get_if<device::EventGap>(&news)) events = gap->missed;
   if (!events) dropped.events.reset();
   if (dropped.events) *dropped.events += *events;
 }

@@ -37,7 +37,7 @@ class WatchStream {
   WatchStream& operator=(const WatchStream&) = delete;
 
   /// What a tool has to tell. Once the watch has ended, only what would be lost is still told.
-  device::Heed tell(const device::News& news, Voice& voice);
+  device::WatchControl tell(const device::WatchEvent& news, Voice& voice);
 
   /// How the watch of one tool ended. `unreached` says why there never was a link to it.
   void leave(const Result<void>& watched, const std::optional<Error>& unreached, Voice& voice);
@@ -62,15 +62,15 @@ class WatchStream {
     std::size_t missed_intervals = 0;
   };
 
-  report::Record record_of(const device::EventNews& news, const NewsRecords& records);
-  report::Record record_of(const device::MotorNews& news, const NewsRecords& records);
-  report::Record record_of(const device::ValueNews& news, const NewsRecords& records);
-  report::Record record_of(const device::GapNews& news, const NewsRecords& records);
-  report::Record record_of(const device::LagNews& news, const NewsRecords& records);
-  report::Record record_of(const device::LinkNews& news, const NewsRecords& records);
-  void note_link(const device::LinkNews& news);
+  report::Record record_of(const device::ToolEvent& news, const NewsRecords& records);
+  report::Record record_of(const device::MotorTransition& news, const NewsRecords& records);
+  report::Record record_of(const device::PolledValue& news, const NewsRecords& records);
+  report::Record record_of(const device::EventGap& news, const NewsRecords& records);
+  report::Record record_of(const device::PollLag& news, const NewsRecords& records);
+  report::Record record_of(const device::LinkChange& news, const NewsRecords& records);
+  void note_link(const device::LinkChange& news);
   void hear();
-  void drop(const device::News& news, Dropped& dropped);
+  void drop(const device::WatchEvent& news, Dropped& dropped);
   void tell_dropped(Voice& voice);
   void show_status();
   void end();

@@ -67,8 +67,8 @@ Result<void> WatchedTool::do_without_profile(Error why, const Context& context) 
 Result<device::Watcher::Link> WatchedTool::open(Duration patience,
                                                 const device::OpenTransport& open_transport) {
   Context hurried = with_lines(*context_, open_transport);
-  const catalogue::LinkFacts facts =
-      known_ == nullptr ? catalogue::LinkFacts() : known_->profile.link;
+  const catalogue::LinkSpec facts =
+      known_ == nullptr ? catalogue::LinkSpec() : known_->profile.link;
   const Duration usual = hurried.common.connect_timeout.value_or(facts.connect);
   hurried.common.connect_timeout = std::min(usual, patience);
   if (known_ == nullptr) {
@@ -96,13 +96,13 @@ Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& t
   auto resolved = resolve_targets(targets, context);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
   std::vector<WatchedTool> tools;
-  std::vector<catalogue::LinkFacts> facts;
+  std::vector<catalogue::LinkSpec> facts;
   tools.reserve(resolved->size());
   for (const Target& target : *resolved) {
     auto tool = WatchedTool::make(target, names, shelf, context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     const KnownProfile* known = tool->known();
-    facts.push_back(known == nullptr ? catalogue::LinkFacts() : known->profile.link);
+    facts.push_back(known == nullptr ? catalogue::LinkSpec() : known->profile.link);
     tools.push_back(std::move(*tool));
   }
   return check_same_settings(*resolved, facts).map([&] { return std::move(tools); });

@@ -36,7 +36,7 @@ class Undo {
  private:
   Result<void> connect(TimePoint deadline) {
     if (lost_) {
-      device_->hang_up();
+      device_->disconnect();
       auto opened = (*reopen_)(std::max(deadline - calm_->now(), pause));
       if (!opened) return tl::unexpected(std::move(opened.error()));
       *device_ = std::move(*opened);
@@ -65,10 +65,11 @@ class Undo {
     if (!now) return refused_or(std::move(now.error()));
     if (!report_.found) report_.found = *now;
     if (*now == action_->before) {
-      return ended(*report_.found == action_->before ? PutBack::kept : PutBack::done, {});
+      return ended(*report_.found == action_->before ? RollbackResult::kept : RollbackResult::done,
+                   {});
     }
     if (*now != action_->done) {
-      return ended(PutBack::refused, fmt::format("it was changed to {} meanwhile", *now));
+      return ended(RollbackResult::refused, fmt::format("it was changed to {} meanwhile", *now));
     }
     auto sent = device_->send(action_->action, action_->before);
     if (!sent) return refused_or(std::move(sent.error()));
@@ -76,14 +77,14 @@ class Undo {
     while (true) {
       now = shown();
       if (!now) return refused_or(std::move(now.error()));
-      if (*now == action_->before) return ended(PutBack::done, {});
+      if (*now == action_->before) return ended(RollbackResult::done, {});
       const TimePoint next = calm_->now() + confirm_interval;
       if (next > deadline || !calm_->sleep_until(next)) break;
     }
-    return ended(PutBack::refused, "the tool acknowledged it, and does not show it");
+    return ended(RollbackResult::refused, "the tool acknowledged it, and does not show it");
   }
 
-  UndoReport ended(PutBack result, std::string trouble) {
+  UndoReport ended(RollbackResult result, std::string trouble) {
     report_.result = result;
     report_.trouble = std::move(trouble);
     return report_;
@@ -91,7 +92,7 @@ class Undo {
 
   Result<UndoReport> refused_or(Error error) {
     if (!is_refusal(error)) return tl::unexpected(std::move(error));
-    return ended(PutBack::refused, message_of(error));
+    return ended(RollbackResult::refused, message_of(error));
   }
 
   const DoneAction* action_;

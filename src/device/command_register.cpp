@@ -8,7 +8,7 @@
 namespace spindle::device {
 namespace {
 
-using catalogue::CommandRegisterFacts;
+using catalogue::CommandRegisterSpec;
 using catalogue::StopMode;
 
 /// What a reading before a stop may cost.
@@ -16,7 +16,7 @@ constexpr Duration hurried_answer = std::chrono::milliseconds(200);
 
 }  // namespace
 
-CommandRegister::CommandRegister(const CommandRegisterFacts& facts, catalogue::Parameter command)
+CommandRegister::CommandRegister(const CommandRegisterSpec& facts, catalogue::Parameter command)
     : facts_(facts), command_(std::move(command)) {}
 
 CommandRegister::CommandRegister(CommandRegister&& other) noexcept
@@ -26,7 +26,7 @@ CommandRegister::CommandRegister(CommandRegister&& other) noexcept
       monitor_(std::move(other.monitor_)) {}
 
 Result<CommandRegister> CommandRegister::of(const catalogue::Profile& profile) {
-  const CommandRegisterFacts& facts = *profile.run->command_register();
+  const CommandRegisterSpec& facts = *profile.run->command_register();
   auto command = profile.find(facts.command);
   if (!command) return tl::unexpected(std::move(command.error()));
   CommandRegister model(facts, std::move(*command));
@@ -35,7 +35,7 @@ Result<CommandRegister> CommandRegister::of(const catalogue::Profile& profile) {
     if (!stop) return tl::unexpected(std::move(stop.error()));
     model.stop_ = std::move(*stop);
   }
-  const catalogue::MonitorFacts& monitor = facts.monitor;
+  const catalogue::MonitorSpec& monitor = facts.monitor;
   if (monitor.status.empty() && monitor.command_speed.empty() && monitor.feedback_speed.empty()) {
     return model;
   }
@@ -50,7 +50,7 @@ std::unique_ptr<Stopper> CommandRegister::stopper(StopMode mode) const {
 }
 
 std::uint32_t CommandRegister::enabling_bit() const {
-  const catalogue::EnableFacts& enable = facts_.enable;
+  const catalogue::EnableSpec& enable = facts_.enable;
   return enable.bit && enable.parameter == facts_.command ? std::uint32_t{1} << *enable.bit : 0;
 }
 

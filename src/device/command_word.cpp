@@ -9,7 +9,7 @@
 namespace spindle::device {
 namespace {
 
-using catalogue::CommandWordFacts;
+using catalogue::CommandWordSpec;
 using catalogue::Parameter;
 using catalogue::RunWords;
 using catalogue::StopMode;
@@ -30,7 +30,7 @@ std::uint16_t joined(unsigned a, unsigned b) { return static_cast<std::uint16_t>
 
 }  // namespace
 
-CommandWord::CommandWord(const CommandWordFacts& facts, MotorMonitor monitor)
+CommandWord::CommandWord(const CommandWordSpec& facts, MotorMonitor monitor)
     : facts_(facts), monitor_(std::move(monitor)) {}
 
 CommandWord::CommandWord(CommandWord&& other) noexcept
@@ -40,7 +40,7 @@ CommandWord::CommandWord(CommandWord&& other) noexcept
       command_register_(other.command_register_) {}
 
 Result<CommandWord> CommandWord::of(const catalogue::Profile& profile) {
-  const CommandWordFacts* facts = profile.run ? profile.run->word() : nullptr;
+  const CommandWordSpec* facts = profile.run ? profile.run->word() : nullptr;
   if (facts == nullptr) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "this product has no motor that a command word runs",
@@ -126,7 +126,7 @@ void CommandWordStopper::observe(Device& device) {
 
 /// Nothing more is asked of a motor that stands still: the word without any bit is right for it.
 void CommandWordStopper::observe_run(Device& device) {
-  const CommandWordFacts& facts = motor_->facts();
+  const CommandWordSpec& facts = motor_->facts();
   const auto read = [&](const std::vector<std::string>& names) -> std::vector<std::int64_t> {
     auto wanted = device.profile().select(names);
     if (!wanted) return {};
@@ -160,7 +160,7 @@ void CommandWordStopper::observe_run(Device& device) {
 /// After the stop was sent: a stop does not wait for it.
 void CommandWordStopper::read_stopping(Device& device) {
   if (std::exchange(knows_stopping_, true)) return;
-  const CommandWordFacts& facts = motor_->facts();
+  const CommandWordSpec& facts = motor_->facts();
   const auto operation = static_cast<std::uint16_t>(
       (started_by_ & facts.select) >> static_cast<unsigned>(std::countr_zero(facts.select)));
   const auto time =
@@ -172,7 +172,7 @@ void CommandWordStopper::read_stopping(Device& device) {
 
 /// In bits of the profile.
 std::uint16_t CommandWordStopper::standard_word() const {
-  const CommandWordFacts& facts = motor_->facts();
+  const CommandWordSpec& facts = motor_->facts();
   if (harder_) return facts.instant_always;
   const bool gently = mode_ == StopMode::decelerate;
   const unsigned operation = unsigned{started_by_} & facts.select;
@@ -202,7 +202,7 @@ Result<StopResult> CommandWordStopper::stop(Device& device, Clock& clock) {
 }
 
 Duration longest_stop(const catalogue::Profile& profile) {
-  const CommandWordFacts* facts = profile.run ? profile.run->word() : nullptr;
+  const CommandWordSpec* facts = profile.run ? profile.run->word() : nullptr;
   if (facts == nullptr) return {};
   const auto time = profile.find(catalogue::numbered_name(facts->deceleration, facts->first));
   if (!time || !time->range.maximum) return {};

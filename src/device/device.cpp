@@ -111,7 +111,7 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
 
 /// A profile without rules gives more than the standard asks for, because there are devices that do
 /// not hear what the standard allows.
-Duration gap_of(const catalogue::SerialFacts& serial, unsigned baud) {
+Duration gap_of(const catalogue::SerialSpec& serial, unsigned baud) {
   constexpr int caution = 3;
   return serial.gap_at(baud).value_or(caution * modbus::standard_silence(baud));
 }
@@ -143,7 +143,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
   session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
   session.first_transaction = transaction_at(now);
   if (session.rules.framing == modbus::Framing::rtu) {
-    const catalogue::SerialFacts& serial = profile.link.serial;
+    const catalogue::SerialSpec& serial = profile.link.serial;
     const auto line = link::serial_settings(endpoint, serial.line);
     session.gap = endpoint.gap.value_or(gap_of(serial, line.baud));
     session.broadcast_gap = session.gap + serial.broadcast_pause;
@@ -213,7 +213,7 @@ Error without_knowledge(Error write, const Value& before, const Value& value) {
 }
 
 /// What is left of a connection that was ended from this side.
-class HungUp final : public link::Transport {
+class ClosedTransport final : public link::Transport {
  public:
   Result<void> send(ByteView /*bytes*/, TimePoint /*deadline*/) override {
     return tl::unexpected(Error{.code = Errc::closed});
@@ -241,7 +241,7 @@ bool is_refusal(const Error& error) {
          !is_exception(error, modbus::ExceptionCode::gateway_target_failed_to_respond);
 }
 
-modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts) {
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkSpec& facts) {
   switch (endpoint.medium) {
     case link::Medium::tcp:
       return modbus::Framing::tcp;
@@ -254,7 +254,7 @@ modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::Link
   return facts.framing;
 }
 
-link::SpontaneousShape shape_of(const catalogue::EventFacts& events) {
+link::SpontaneousShape shape_of(const catalogue::EventSpec& events) {
   return {events.function, static_cast<std::uint8_t>(2 * events.count)};
 }
 
@@ -341,8 +341,8 @@ Result<Bytes> Device::report_server_id() {
       [this](Error error) { return located(std::move(error)); });
 }
 
-void Device::hang_up() {
-  session_ = std::make_unique<link::Session>(std::make_unique<HungUp>(), session_->clock(),
+void Device::disconnect() {
+  session_ = std::make_unique<link::Session>(std::make_unique<ClosedTransport>(), session_->clock(),
                                              session_->options());
   client_ = link::Client(*session_, limits_, retries_);
 }
@@ -872,7 +872,7 @@ Result<std::uint16_t> Device::event_number() {
 }
 
 Result<Registers> Device::event_block() {
-  const catalogue::EventFacts& events = *profile_->events;
+  const catalogue::EventSpec& events = *profile_->events;
   const auto table = catalogue::table_of(events);
   // What is read in one piece looks like a frame that was sent unasked.
   const unsigned unlike = catalogue::sends_unasked(*profile_) ? events.count - 1U : events.count;

@@ -38,33 +38,33 @@ bool is_before(std::uint16_t number, std::uint16_t other) {
   return number != other && static_cast<std::uint16_t>(other - number) < half;
 }
 
-std::optional<GapNews> gap_of(const Tracked& tracked, EventOrigin origin) {
+std::optional<EventGap> gap_of(const Tracked& tracked, EventOrigin origin) {
   switch (tracked.novelty) {
-    case Novelty::restart:
-      return GapNews{std::nullopt, "the tool counts its events anew: it was restarted"};
-    case Novelty::doubtful:
-      return GapNews{
+    case Sequence::restart:
+      return EventGap{std::nullopt, "the tool counts its events anew: it was restarted"};
+    case Sequence::doubtful:
+      return EventGap{
           std::nullopt,
           "the tool may have been restarted while no client was connected, and count its "
           "events anew"};
-    case Novelty::wrap:
-      return GapNews{tracked.missed, "the tool's event counter began again behind 65535"};
-    case Novelty::jump:
+    case Sequence::wrap:
+      return EventGap{tracked.missed, "the tool's event counter began again behind 65535"};
+    case Sequence::jump:
       break;
-    case Novelty::baseline:
-    case Novelty::repeat:
-    case Novelty::next:
+    case Sequence::baseline:
+    case Sequence::repeat:
+    case Sequence::next:
       return std::nullopt;
   }
   switch (origin) {
     case EventOrigin::catch_up:
-      return GapNews{tracked.missed, "events while no client was connected"};
+      return EventGap{tracked.missed, "events while no client was connected"};
     case EventOrigin::poll:
-      return GapNews{tracked.missed, "events came faster than they were polled"};
+      return EventGap{tracked.missed, "events came faster than they were polled"};
     case EventOrigin::push:
       break;
   }
-  return GapNews{tracked.missed, "the tool's event counter jumped"};
+  return EventGap{tracked.missed, "the tool's event counter jumped"};
 }
 
 /// A tool that counts its events: polled, and its frames heard where it sends any.
@@ -132,7 +132,7 @@ Result<void> CounterSource::poll() {
   if (*fetched == Fetched::yes) return {};
   const auto missed = static_cast<std::uint16_t>(*number - tracker_.last().value_or(*number));
   tracker_.set_baseline(*number);
-  tell_(GapNews{missed, "events came faster than they could be read"});
+  tell_(EventGap{missed, "events came faster than they could be read"});
   return {};
 }
 
@@ -174,11 +174,11 @@ void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime t
   if (!tracked.is_new()) return;
   if (const auto gap = gap_of(tracked, origin)) tell_(*gap);
   // Since it was restarted the tool has had no event; what stands in its registers is none.
-  const bool restarted = tracked.novelty == Novelty::restart;
+  const bool restarted = tracked.novelty == Sequence::restart;
   const bool pushed = origin == EventOrigin::push;
   if (restarted && number == 0 && (!pushed || EventTracker::is_blank(block))) return;
   const Standing standing = restarted && !pushed ? Standing::remembered : Standing::result;
-  tell_(EventNews{origin, block, time, standing});
+  tell_(ToolEvent{origin, block, time, standing});
 }
 
 /// A tool that sends its events unasked, where it has to be told so again and again.
@@ -263,9 +263,9 @@ Result<void> FlagSource::attach(Device& device, Duration /*unseen*/) {
     seen_ = std::move(*block);
     return look(EventOrigin::catch_up);
   }
-  tell_(GapNews{std::nullopt,
-                "the tool does not count its results: of those while the link was lost only the "
-                "last one can be known"});
+  tell_(EventGap{std::nullopt,
+                 "the tool does not count its results: of those while the link was lost only the "
+                 "last one can be known"});
   return look(EventOrigin::catch_up).and_then([this] {
     return look_behind(EventOrigin::catch_up, {});
   });
@@ -301,15 +301,15 @@ Result<void> FlagSource::take_result(EventOrigin origin) {
     block = device_->event_block();
   }
   if (!block) {
-    tell_(GapNews{
+    tell_(EventGap{
         std::nullopt,
         fmt::format("there is a result, and it could not be read: {}", message_of(block.error())),
         true});
   } else if (told_ == *block) {
-    tell_(GapNews{1,
-                  "the result that was read is the one before: another came before it was read, "
-                  "or both are equal",
-                  true});
+    tell_(EventGap{1,
+                   "the result that was read is the one before: another came before it was read, "
+                   "or both are equal",
+                   true});
   } else {
     tell(origin, std::move(*block));
   }
@@ -327,7 +327,7 @@ Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doub
     tell(origin, std::move(*block));
     return {};
   }
-  if (!doubt.empty()) tell_(GapNews{std::nullopt, doubt, true});
+  if (!doubt.empty()) tell_(EventGap{std::nullopt, doubt, true});
   if (!block) return tl::unexpected(std::move(block.error()));
   return {};
 }
@@ -335,7 +335,7 @@ Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doub
 void FlagSource::tell(EventOrigin origin, Registers block) {
   seen_ = block;
   told_ = block;
-  tell_(EventNews{
+  tell_(ToolEvent{
       .source = origin, .block = std::move(block), .time = clock_->wall(), .is_only_here = true});
 }
 

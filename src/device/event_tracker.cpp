@@ -34,24 +34,24 @@ bool EventTracker::may_be_counted_anew(std::uint16_t number) const {
 }
 
 Tracked EventTracker::judge(std::uint16_t number, RegisterView block) const {
-  if (!last_) return {Novelty::baseline};
+  if (!last_) return {Sequence::baseline};
   const std::uint32_t step = (number + numbers - *last_) % numbers;
   if (step == 0) {
     const bool other = last_block_ && !are_equal(*last_block_, block);
-    return {other ? Novelty::restart : Novelty::repeat};
+    return {other ? Sequence::restart : Sequence::repeat};
   }
   const bool wrapped = number < *last_;
-  if (wrapped && (step > wrap_reach || is_blank(block))) return {Novelty::restart};
-  if (may_be_counted_anew(number)) return {Novelty::doubtful};
-  if (wrapped) return {Novelty::wrap, step - 1};
-  return step == 1 ? Tracked{Novelty::next} : Tracked{Novelty::jump, step - 1};
+  if (wrapped && (step > wrap_reach || is_blank(block))) return {Sequence::restart};
+  if (may_be_counted_anew(number)) return {Sequence::doubtful};
+  if (wrapped) return {Sequence::wrap, step - 1};
+  return step == 1 ? Tracked{Sequence::next} : Tracked{Sequence::jump, step - 1};
 }
 
 Tracked EventTracker::track(std::uint16_t number, RegisterView block) {
   const bool known = std::any_of(recent_.begin(), recent_.end(), [&](const Registers& earlier) {
     return are_equal(earlier, block);
   });
-  if (known) return {Novelty::repeat};
+  if (known) return {Sequence::repeat};
   const Tracked tracked = judge(number, block);
   unseen_.reset();
   last_ = number;

@@ -6,7 +6,7 @@
 namespace spindle::device {
 namespace {
 
-using catalogue::MonitorFacts;
+using catalogue::MonitorSpec;
 
 bool has_bit(std::int64_t word, std::optional<std::uint8_t> bit) {
   return bit && ((static_cast<std::uint64_t>(word) >> *bit) & 1U) != 0;
@@ -17,7 +17,7 @@ bool holds(const catalogue::List<std::int64_t>& values, std::int64_t value) {
 }
 
 /// The speed that says that a motor runs whose status does not.
-const catalogue::Text& telling_speed(const MonitorFacts& facts) {
+const catalogue::Text& telling_speed(const MonitorSpec& facts) {
   return facts.feedback_speed.empty() ? facts.command_speed : facts.feedback_speed;
 }
 
@@ -35,8 +35,7 @@ std::vector<MotorEvent> events_between(const MotorState& before, const MotorStat
   return events;
 }
 
-Result<MotorMonitor> MotorMonitor::of(const MonitorFacts& facts,
-                                      const catalogue::Profile& profile) {
+Result<MotorMonitor> MotorMonitor::of(const MonitorSpec& facts, const catalogue::Profile& profile) {
   MotorMonitor monitor;
   monitor.facts_ = facts;
   for (const catalogue::Text* name : {&facts.status, &facts.command_speed, &facts.feedback_speed,

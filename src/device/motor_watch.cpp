@@ -65,8 +65,8 @@ bool MotorWatch::knows_running() const {
                      [this](const std::string& name) { return motor_.tells_running(name); });
 }
 
-Result<std::vector<MotorNews>> MotorWatch::take_turn(Device& device) {
-  if (pieces_.empty()) return std::vector<MotorNews>();
+Result<std::vector<MotorTransition>> MotorWatch::take_turn(Device& device) {
+  if (pieces_.empty()) return std::vector<MotorTransition>();
   const auto readings = device.read_each(next_piece(), Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
   return take(device, *readings);
@@ -106,10 +106,11 @@ Result<MotorState> MotorWatch::look(Device& device) const {
 
 /// What happened is told with the speed and load that are read at once. They may say already what
 /// happened behind it: a speed that was reached, but is no longer, is then not told.
-Result<std::vector<MotorNews>> MotorWatch::take(Device& device, std::span<const Reading> readings) {
+Result<std::vector<MotorTransition>> MotorWatch::take(Device& device,
+                                                      std::span<const Reading> readings) {
   auto now = with(readings);
   if (!now) return tl::unexpected(std::move(now.error()));
-  std::vector<MotorNews> news;
+  std::vector<MotorTransition> news;
   if (says_the_same(state_, *now)) return news;
   const Clock& clock = device.session().clock();
   const WallTime time = clock.wall();

@@ -17,7 +17,7 @@ constexpr unsigned silences_allowed = 2;
 
 }  // namespace
 
-std::vector<PutBackReport> Rollback::run(std::span<const TriedWrite> writes,
+std::vector<PutBackReport> Rollback::run(std::span<const JournalEntry> writes,
                                          const RollbackObserver& observer) {
   std::vector<PutBackReport> reports;
   reports.reserve(writes.size());
@@ -51,13 +51,13 @@ PutBackReport Rollback::put_back(Attempt attempt, TimePoint& deadline) {
 /// worked, so what was there at first is kept. Before a write is over that may act late, the
 /// reading proves nothing: the old value is written behind it.
 Result<PutBackReport> Rollback::try_once(Attempt& attempt) {
-  const TriedWrite& write = *attempt.write;
+  const JournalEntry& write = *attempt.write;
   PutBackReport report{.write = write};
   const auto readings = device_->read_each({write.parameter}, Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
   const auto& value = readings->front().value;
   if (!value) {
-    report.result = PutBack::refused;
+    report.result = RollbackResult::refused;
     report.trouble = message_of(value.error());
     return report;
   }
@@ -65,21 +65,22 @@ Result<PutBackReport> Rollback::try_once(Attempt& attempt) {
   report.found = attempt.found;
   report.now = *value;
   if (*value == write.before && write.doubt == Doubt::none) {
-    report.result = attempt.begun ? PutBack::done : PutBack::kept;
+    report.result = attempt.begun ? RollbackResult::done : RollbackResult::kept;
     return report;
   }
   if (!attempt.begun && attempt.observer->begin) attempt.observer->begin(write);
   attempt.begun = true;
   auto put_back = write_back(report);
   const bool overtaken = write.doubt == Doubt::may_act_late && put_back &&
-                         put_back->result == PutBack::refused && put_back->now == write.tried;
+                         put_back->result == RollbackResult::refused &&
+                         put_back->now == write.tried;
   if (!overtaken) return put_back;
   report.now = write.tried;  // it acted behind the old value, so it is over
   return write_back(std::move(report));
 }
 
 Result<PutBackReport> Rollback::write_back(PutBackReport report) {
-  const TriedWrite& write = report.write;
+  const JournalEntry& write = report.write;
   const Proof proof =
       write.doubt == Doubt::may_act_late ? Proof::after_settling : Proof::first_right;
   const Written written = device_->write(write.parameter, *report.now, write.before, proof);
@@ -89,7 +90,7 @@ Result<PutBackReport> Rollback::write_back(PutBackReport report) {
     return tl::unexpected(*written.error);
   }
   report.now = written.now;
-  report.result = written.done() ? PutBack::done : PutBack::refused;
+  report.result = written.done() ? RollbackResult::done : RollbackResult::refused;
   if (!written.done()) {
     report.trouble = written.error->code == Errc::mismatch
                          ? "the tool acknowledged its old value, but does not hold it"
@@ -100,7 +101,7 @@ Result<PutBackReport> Rollback::write_back(PutBackReport report) {
 
 Result<void> Rollback::connect(TimePoint deadline) {
   if (lost_) {
-    device_->hang_up();
+    device_->disconnect();
     auto opened = reopen_(std::max(deadline - calm_->now(), pause));
     if (!opened) return tl::unexpected(std::move(opened.error()));
     *device_ = std::move(*opened);

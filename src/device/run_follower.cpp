@@ -111,32 +111,33 @@ Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
   return RunEnding::ignored;
 }
 
-Result<std::optional<EventNews>> RunFollower::next_result(TimePoint until) {
+Result<std::optional<ToolEvent>> RunFollower::next_result(TimePoint until) {
   // Frames without end must not keep it; what is left of them is there for the next who listens.
   do {
     auto frame = device_->session().next_spontaneous(until);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     if (!*frame) return std::nullopt;
-    auto result = sift({EventOrigin::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
+    auto result =
+        filter_result({EventOrigin::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
     if (result) return result;
   } while (clock_->now() < until);
   return std::nullopt;
 }
 
-Result<std::optional<EventNews>> RunFollower::fetch_result() {
+Result<std::optional<ToolEvent>> RunFollower::fetch_result() {
   auto block = device_->last_event();
   if (!block) return tl::unexpected(std::move(block.error()));
   if (!*block) return std::nullopt;
-  return sift({EventOrigin::catch_up, std::move(**block), clock_->wall()});
+  return filter_result({EventOrigin::catch_up, std::move(**block), clock_->wall()});
 }
 
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:
 /// loosening ends neither well nor badly.
-std::optional<EventNews> RunFollower::sift(EventNews event) {
+std::optional<ToolEvent> RunFollower::filter_result(ToolEvent event) {
   const Tracked tracked = tracker_.track(layout_.number_of(event.block), event.block);
   // A tool that was switched off and on has had no event at all, or one that it remembers: none
   // that says how this run ended.
-  const bool restarted = tracked.novelty == Novelty::restart;
+  const bool restarted = tracked.novelty == Sequence::restart;
   if (!tracked.is_new() || restarted || EventTracker::is_blank(event.block)) return std::nullopt;
   if (hear_) hear_(event);
   const auto kind = layout_.kind_of(event.block);
@@ -145,7 +146,7 @@ std::optional<EventNews> RunFollower::sift(EventNews event) {
   return std::nullopt;
 }
 
-Result<std::optional<EventNews>> RunFollower::late_event() {
+Result<std::optional<ToolEvent>> RunFollower::late_event() {
   auto event = next_result(clock_->now() + event_grace);
   if (!event || !*event) event = fetch_result();
   if (event && !*event) return std::exchange(other_, std::nullopt);

@@ -111,14 +111,14 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt) {
   }
   link::Session& session = device_->session();
   session.shield();
-  session.waive_proofs();
+  session.skip_verification();
   session.set_answer_timeout(patience_of(attempt));
   device_->set_retries(0);  // it is better to send the stop again
   return motion_.stop(*device_, *calm_);
 }
 
 Result<void> RunGuard::reopen(Duration patience) {
-  if (device_ != nullptr) device_->hang_up();
+  if (device_ != nullptr) device_->disconnect();
   auto opened = reopen_(patience);
   if (!opened) return tl::unexpected(std::move(opened.error()));
   if (device_ == nullptr) {

@@ -21,7 +21,7 @@ class ActionStopper final : public Stopper {
 }  // namespace
 
 Result<StartAction> StartAction::of(const catalogue::Profile& profile) {
-  const catalogue::StartActionFacts& facts = *profile.run->action();
+  const catalogue::StartActionSpec& facts = *profile.run->action();
   auto start = profile.find_action(facts.start);
   if (!start) return tl::unexpected(std::move(start.error()));
   return StartAction(facts, std::move(*start));

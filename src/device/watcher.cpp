@@ -136,13 +136,13 @@ void Watcher::tell_trouble(const Error& error) {
   trouble_ = error;
   if (link_) {
     hear_waiting();  // what had arrived before the line broke is still true
-    tell(LinkNews{LinkState::lost, 0, message_of(error)});
+    tell(LinkChange{LinkState::lost, 0, message_of(error)});
     attempts_ = 0;
   } else {
     ++attempts_;
     if (reconnection_ == Reconnection::forever) {
       const LinkState state = reached_ ? LinkState::reconnecting : LinkState::connecting;
-      tell(LinkNews{state, attempts_, message_of(error)});
+      tell(LinkChange{state, attempts_, message_of(error)});
     }
   }
   const bool lasted = link_ && served_ && now - connected_at_ >= long_enough;
@@ -173,7 +173,7 @@ Result<void> Watcher::learn(const catalogue::Profile& profile) {
   if (plan_.motor) motor_.emplace(*plan_.motor, plan_.values);
   profile_ = &profile;
   source_ = EventSource::make(profile, plan_.events, *clock_, [this](const auto& news) {
-    if (std::holds_alternative<EventNews>(news)) served_ = true;
+    if (std::holds_alternative<ToolEvent>(news)) served_ = true;
     std::visit([this](const auto& one) { tell(one); }, news);
   });
   return {};
@@ -191,10 +191,11 @@ void Watcher::compare_identity(const std::string& identity) {
   if (source_ && !std::exchange(caveat_told_, true) && !source_->caveat().empty()) {
     message += fmt::format("; {}", source_->caveat());
   }
-  tell(LinkNews{LinkState::connected, attempts_, message});
+  tell(LinkChange{LinkState::connected, attempts_, message});
   if (!other) return;
   if (source_) {
-    tell(GapNews{std::nullopt, "what the tool of before did after its link was lost is not known"});
+    tell(
+        EventGap{std::nullopt, "what the tool of before did after its link was lost is not known"});
     source_->forget();
   }
   previous_.assign(plan_.values.size(), std::nullopt);
@@ -265,7 +266,7 @@ void Watcher::tell_lag(TimePoint now) {
   const Duration achieved = beat_.polls == 0
                                 ? plan_.interval
                                 : (now - beat_.since) / std::max<std::int64_t>(beat_.polls, 1);
-  tell(LagNews{beat_.missed, plan_.interval, achieved});
+  tell(PollLag{beat_.missed, plan_.interval, achieved});
   beat_ = {.since = now};
   lag_told_at_ = now;
 }
@@ -364,9 +365,9 @@ Result<void> Watcher::look_between() {
   return told;
 }
 
-Result<void> Watcher::tell_motor(Result<std::vector<MotorNews>> news) {
+Result<void> Watcher::tell_motor(Result<std::vector<MotorTransition>> news) {
   if (!news) return tl::unexpected(std::move(news.error()));
-  for (const MotorNews& one : *news) tell(one);
+  for (const MotorTransition& one : *news) tell(one);
   return {};
 }
 
@@ -376,7 +377,8 @@ void Watcher::tell_reading(std::size_t index, Reading& reading) {
   const bool wanted = plan_.samples == Samples::all || changed ||
                       (!previous && plan_.samples == Samples::changes_and_first);
   if (wanted) {
-    tell(ValueNews{&plan_.values[index], std::move(*reading.registers), *reading.value, previous});
+    tell(
+        PolledValue{&plan_.values[index], std::move(*reading.registers), *reading.value, previous});
   }
   previous = std::move(*reading.value);
 }
@@ -393,8 +395,8 @@ void Watcher::hear(const link::Spontaneous& frame) {
   source_->handle(frame);
 }
 
-void Watcher::tell(const News& news) {
-  if (!stopped_ && tell_(news) == Heed::stop) stopped_ = true;
+void Watcher::tell(const WatchEvent& news) {
+  if (!stopped_ && tell_(news) == WatchControl::stop) stopped_ = true;
 }
 
 // ---- leaving ----

@@ -148,7 +148,7 @@ std::string lines_of_missing(const Snapshot& snapshot) {
 
 Place place_of(const YamlNode& node) { return {node.at.line, node.at.column}; }
 
-std::optional<Registers> read_raw(const YamlNode& node, Findings& findings) {
+std::optional<Registers> read_raw(const YamlNode& node, Diagnostics& findings) {
   Registers raw;
   const auto add = [&](const YamlNode& item) {
     const auto number = to_unsigned(item, last_register, findings);
@@ -174,7 +174,7 @@ BackupLine read_place(YamlMap& map) {
   return line;
 }
 
-void read_entry(const YamlNode& node, BackupFile& file, Findings& findings) {
+void read_entry(const YamlNode& node, BackupFile& file, Diagnostics& findings) {
   YamlMap map(node, findings);
   BackupLine line = read_place(map);
   const YamlNode* raw = map.get("raw");
@@ -197,7 +197,7 @@ void read_entry(const YamlNode& node, BackupFile& file, Findings& findings) {
   file.lines.push_back(std::move(line));
 }
 
-void read_missing(const YamlNode& node, BackupFile& file, Findings& findings) {
+void read_missing(const YamlNode& node, BackupFile& file, Diagnostics& findings) {
   YamlMap map(node, findings);
   BackupLine line = read_place(map);
   line.missing = map.word("why", "reason", missing_words, Need::required);
@@ -207,7 +207,7 @@ void read_missing(const YamlNode& node, BackupFile& file, Findings& findings) {
 
 /// Reads a list line by line; returns how many lines it has.
 template <typename Read>
-std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Findings& findings) {
+std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Diagnostics& findings) {
   if (list == nullptr || list->kind == YamlNode::Kind::nothing) return 0;
   if (!expect(*list, YamlNode::Kind::sequence, findings)) return 0;
   for (const YamlNode& node : list->items) read(node, file, findings);
@@ -215,13 +215,13 @@ std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Findin
 }
 
 /// Bytes in hexadecimal digits, separated by one blank or more.
-Bytes read_hex(const YamlNode& node, Findings& findings) {
+Bytes read_hex(const YamlNode& node, Diagnostics& findings) {
   std::vector<std::string_view> words = split(node.text, ' ');
   std::erase(words, "");
   return to_bytes(node, words, findings);
 }
 
-SnapshotIdentity read_identity(const YamlNode& node, Findings& findings) {
+SnapshotIdentity read_identity(const YamlNode& node, Diagnostics& findings) {
   YamlMap map(node, findings);
   SnapshotIdentity identity;
   assign(identity.model, map.text("model"));
@@ -233,14 +233,14 @@ SnapshotIdentity read_identity(const YamlNode& node, Findings& findings) {
   return identity;
 }
 
-void read_profile_facts(const YamlNode& node, Snapshot& head, Findings& findings) {
+void read_profile_facts(const YamlNode& node, Snapshot& head, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(head.profile, map.text("id", Need::required));
   assign(head.fingerprint, map.text("fingerprint", Need::required));
   map.finish();
 }
 
-bool has_form(const YamlNode& document, Findings& findings) {
+bool has_form(const YamlNode& document, Diagnostics& findings) {
   if (!expect(document, YamlNode::Kind::map, findings)) return false;
   const YamlNode* named = document.find("kind");
   if (named == nullptr || named->text != kind) {
@@ -286,7 +286,7 @@ Position end_of(std::string_view text, std::size_t file) {
 }
 
 void read_document(const YamlNode& document, std::string_view text, BackupFile& file,
-                   Findings& findings) {
+                   Diagnostics& findings) {
   if (!has_form(document, findings)) return;
   if (document.find("end") == nullptr) {
     findings.add(end_of(text, document.at.file),
@@ -331,7 +331,7 @@ class Names {
   }
 
   /// The stored parameter that a line means; a finding where there is none.
-  const Parameter* find(const BackupLine& line, const Position& at, Findings& findings) const {
+  const Parameter* find(const BackupLine& line, const Position& at, Diagnostics& findings) const {
     if (const auto named = by_name_.find(line.name); named != by_name_.end()) {
       return at_its_register(*named->second, line, at, findings) ? named->second : nullptr;
     }
@@ -360,7 +360,7 @@ class Names {
 
  private:
   bool at_its_register(const Parameter& parameter, const BackupLine& line, const Position& at,
-                       Findings& findings) const {
+                       Diagnostics& findings) const {
     if (parameter.address.value == line.address && parameter.table == line.table) return true;
     findings.add(at, fmt::format("'{}' is register {} ({}) in profile {}, not {} ({})", line.name,
                                  parameter.address.value, catalogue::to_text(parameter.table),
@@ -385,7 +385,7 @@ bool says(std::string_view text, const Value& value, const Parameter& parameter)
 
 /// The registers that a line stands for; a finding where it is not clear.
 std::optional<Registers> registers_of(const BackupLine& line, const Parameter& parameter,
-                                      const Position& at, Findings& findings) {
+                                      const Position& at, Diagnostics& findings) {
   if (!line.raw) {
     auto registers =
         catalogue::parse_value(parameter, *line.value).and_then([&](const Value& value) {
@@ -456,7 +456,7 @@ class Understanding {
   }
 
   Names names_;
-  Findings findings_ = {};
+  Diagnostics findings_ = {};
   std::size_t file_;
   Snapshot snapshot_;
   std::set<std::string> seen_ = {};
@@ -485,7 +485,7 @@ std::string render_backup(const Snapshot& snapshot) {
 }
 
 Result<BackupFile> read_backup(std::string_view text, const std::string& path) {
-  Findings findings;
+  Diagnostics findings;
   const std::size_t number = findings.add_file(path);
   BackupFile file{.path = path};
   const std::vector<YamlNode> documents = parse_yaml(text, number, Documents::all, findings);
@@ -501,7 +501,7 @@ Result<BackupFile> read_backup(std::string_view text, const std::string& path) {
   return file;
 }
 
-Result<Snapshot> understand_backup(const BackupFile& file, const Profile& profile) {
+Result<Snapshot> resolve_backup(const BackupFile& file, const Profile& profile) {
   return Understanding(file, profile).run(file.lines);
 }
 

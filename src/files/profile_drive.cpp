@@ -26,7 +26,8 @@ constexpr auto code_table_words =
 
 class DriveRules {
  public:
-  DriveRules(const ProfileDraft& draft, Findings& findings) : draft_(draft), findings_(findings) {}
+  DriveRules(const ProfileDraft& draft, Diagnostics& findings)
+      : draft_(draft), findings_(findings) {}
 
   void check() {
     if (draft_.profile.refusals) check_refusals(*draft_.profile.refusals);
@@ -54,7 +55,7 @@ class DriveRules {
     return parameter;
   }
 
-  void check_refusals(const catalogue::RefusalFacts& refusals) {
+  void check_refusals(const catalogue::RefusalSpec& refusals) {
     require(refusals.parameter, draft_.refusals.of("parameter"));
     for (const std::int64_t code : refusals.busy) {
       if (refusals.codes.contains(code)) continue;
@@ -170,12 +171,12 @@ class DriveRules {
   }
 
   const ProfileDraft& draft_;
-  Findings& findings_;
+  Diagnostics& findings_;
 };
 
 }  // namespace
 
-void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_refusals(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [refusals, need] = section_of(draft.profile.refusals);
   assign(refusals.parameter, map.text("parameter", need));
@@ -196,7 +197,7 @@ void read_refusals(const YamlNode& node, ProfileDraft& draft, Findings& findings
   map.finish();
 }
 
-void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
   std::vector<catalogue::AlarmList> lists;
   for (const YamlNode& item : node.items) {
@@ -213,11 +214,11 @@ void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Findings& findi
   draft.profile.alarm_lists = std::move(lists);
 }
 
-void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   assign(draft.profile.alarm_reset, to_text(node, findings));
 }
 
-void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_watched(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
   std::vector<catalogue::Text> names;
   for (const YamlNode& item : node.items) {
@@ -226,7 +227,7 @@ void read_watched(const YamlNode& node, ProfileDraft& draft, Findings& findings)
   draft.profile.watched = std::move(names);
 }
 
-void check_drive_rules(const ProfileDraft& draft, Findings& findings) {
+void check_drive_rules(const ProfileDraft& draft, Diagnostics& findings) {
   DriveRules(draft, findings).check();
 }
 

@@ -50,7 +50,7 @@ struct Template {
   Origin origin = {};
 };
 
-std::vector<Label> read_labels(const YamlNode& map, Findings& findings) {
+std::vector<Label> read_labels(const YamlNode& map, Diagnostics& findings) {
   std::vector<Label> labels;
   expect(map, YamlNode::Kind::map, findings);
   for (const YamlEntry& entry : map.entries) {
@@ -100,7 +100,7 @@ void read_limits(YamlMap& map, Parameter& parameter) {
 }
 
 void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
-                    std::vector<catalogue::BitName>& bits, Findings& findings) {
+                    std::vector<catalogue::BitName>& bits, Diagnostics& findings) {
   constexpr std::uint64_t highest_bit = 31;
   expect(node, YamlNode::Kind::map, findings);
   for (const YamlEntry& entry : node.entries) {
@@ -115,7 +115,7 @@ void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
 }
 
 void read_bits_by(const YamlNode& by, Parameter& parameter, std::vector<catalogue::BitName>& bits,
-                  Findings& findings) {
+                  Diagnostics& findings) {
   YamlMap choice(by, findings);
   assign(parameter.bits_by, choice.text("parameter", Need::required));
   const YamlNode* names = choice.get("names", Need::required);
@@ -245,7 +245,7 @@ std::string substitute(std::string text, std::uint64_t number) {
 }
 
 void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draft,
-                   Findings& findings) {
+                   Diagnostics& findings) {
   std::vector<Parameter>& parameters = draft.read_parameters;
   const auto [known, is_new] = draft.parameter_index.try_emplace(parameter.name, parameters.size());
   if (is_new) {
@@ -262,7 +262,7 @@ void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draf
 
 /// Adds repetition `step` (from 0) of an entry. False when there is none, or no room for it.
 bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& draft,
-                    Findings& findings) {
+                    Diagnostics& findings) {
   const std::uint64_t n = entry.numbers.from + step;
   if (n > entry.numbers.to) return false;
   const std::uint64_t address = entry.parameter.address.value + step * entry.stride;
@@ -284,14 +284,15 @@ bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& dra
   return true;
 }
 
-bool add_step(const Template& entry, std::uint64_t step, ProfileDraft& draft, Findings& findings) {
+bool add_step(const Template& entry, std::uint64_t step, ProfileDraft& draft,
+              Diagnostics& findings) {
   if (entry.repeated) return add_repetition(entry, step, draft, findings);
   if (step == 0) add_parameter(entry.parameter, entry.origin, draft, findings);
   return false;
 }
 
 /// The fields of the first repetition, then those of the second: one preset stands together.
-void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Findings& findings) {
+void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Diagnostics& findings) {
   bool any = true;
   for (std::uint64_t step = 0; any; ++step) {
     any = false;
@@ -300,7 +301,7 @@ void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Find
 }
 
 void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft,
-                std::vector<Template>& entries, Findings& findings) {
+                std::vector<Template>& entries, Diagnostics& findings) {
   const std::size_t before = findings.told();
   YamlMap map(node, findings, group);
   Origin origin{.entry = &node, .group = group, .layer = draft.layers};
@@ -315,7 +316,7 @@ void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft
 }
 
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
-                Findings& findings) {
+                Diagnostics& findings) {
   YamlMap group(node, findings);
   for (const std::string_view key :
        {"name",     "n",        "stride",  "table",  "encoding", "scale",    "unit",
@@ -406,7 +407,7 @@ Action read_action(YamlMap& map) {
   return action;
 }
 
-void add_action(Action action, const Origin& origin, ProfileDraft& draft, Findings& findings) {
+void add_action(Action action, const Origin& origin, ProfileDraft& draft, Diagnostics& findings) {
   std::vector<Action>& actions = draft.read_actions;
   const auto known = std::find_if(actions.begin(), actions.end(),
                                   [&](const Action& other) { return other.name == action.name; });
@@ -426,7 +427,7 @@ void add_action(Action action, const Origin& origin, ProfileDraft& draft, Findin
 
 }  // namespace
 
-void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
+void read_parameters(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings) {
   if (!expect(list, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
   for (const YamlNode& node : list.items) {
     if (const YamlNode* fields = node.find("fields")) {
@@ -439,7 +440,7 @@ void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findin
   }
 }
 
-void read_actions(const YamlNode& list, ProfileDraft& draft, Findings& findings) {
+void read_actions(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings) {
   expect(list, YamlNode::Kind::sequence, findings);
   for (const YamlNode& node : list.items) {
     const std::size_t before = findings.told();

@@ -24,7 +24,7 @@ Section<Facts> section_of(std::optional<Facts>& facts) {
 
 /// Lays the lists `parameters` and `actions` over the draft; a name of an earlier layer is
 /// replaced, a name of the same layer is a finding.
-void read_parameters(const YamlNode& list, ProfileDraft& draft, Findings& findings);
-void read_actions(const YamlNode& list, ProfileDraft& draft, Findings& findings);
+void read_parameters(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings);
+void read_actions(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings);
 
 }  // namespace spindle::files

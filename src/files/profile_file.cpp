@@ -36,7 +36,7 @@ Need need_of(bool inherited) { return inherited ? Need::optional : Need::require
 // ---- register areas ----
 
 std::optional<Area> read_area(const YamlNode& node, modbus::RegisterTable table,
-                              Findings& findings) {
+                              Diagnostics& findings) {
   Area area{.table = table};
   std::optional<NumberRange> range;
   if (node.kind == YamlNode::Kind::map) {
@@ -54,7 +54,7 @@ std::optional<Area> read_area(const YamlNode& node, modbus::RegisterTable table,
 }
 
 /// {holding: [1..725, {at: 564..568, note: "..."}], input: [...]}
-std::optional<std::vector<Area>> read_areas(const YamlNode* node, Findings& findings) {
+std::optional<std::vector<Area>> read_areas(const YamlNode* node, Diagnostics& findings) {
   if (node == nullptr) return std::nullopt;
   YamlMap map(*node, findings);
   std::vector<Area> areas;
@@ -71,7 +71,8 @@ std::optional<std::vector<Area>> read_areas(const YamlNode* node, Findings& find
 
 // ---- link ----
 
-std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node, Findings& findings) {
+std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node,
+                                                         Diagnostics& findings) {
   if (node == nullptr || !expect(*node, YamlNode::Kind::sequence, findings)) return std::nullopt;
   std::vector<catalogue::GapRule> gaps;
   for (const YamlNode& item : node->items) {
@@ -86,7 +87,7 @@ std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node, F
   return gaps;
 }
 
-void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings& findings) {
+void read_serial(const YamlNode& node, catalogue::SerialSpec& serial, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(serial.line.baud, map.number<unsigned>("baud"));
   assign(serial.line.parity, map.word("parity", "parity", modbus::parity_words));
@@ -96,9 +97,9 @@ void read_serial(const YamlNode& node, catalogue::SerialFacts& serial, Findings&
   map.finish();
 }
 
-void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_link(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
-  catalogue::LinkFacts& link = draft.profile.link;
+  catalogue::LinkSpec& link = draft.profile.link;
   assign(link.framing, map.word("framing", "framing", framing_words,
                                 need_of(draft.link.entry != nullptr || draft.incomplete)));
   assign(link.port, map.number<std::uint16_t>("port"));
@@ -127,7 +128,7 @@ void read_link(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
 
 template <typename Number>
 void read_names(const YamlNode* node, catalogue::Table<Number, catalogue::Text>& table,
-                Findings& findings) {
+                Diagnostics& findings) {
   if (node == nullptr) return;
   std::map<Number, catalogue::Text> names = table.to_map();
   expect(*node, YamlNode::Kind::map, findings);
@@ -151,8 +152,8 @@ std::optional<catalogue::Slice> read_slice(YamlMap& map, std::string_view key,
                           static_cast<std::uint8_t>(range->to - range->from + 1)};
 }
 
-void read_long_serial(const YamlNode& node, catalogue::IdentityFacts& identity,
-                      Findings& findings) {
+void read_long_serial(const YamlNode& node, catalogue::IdentitySpec& identity,
+                      Diagnostics& findings) {
   YamlMap map(node, findings);
   const Need need = need_of(identity.long_serial_bytes != 0);
   assign(identity.long_serial_bytes, map.number<std::uint8_t>("from-bytes", need));
@@ -162,7 +163,7 @@ void read_long_serial(const YamlNode& node, catalogue::IdentityFacts& identity,
   map.finish();
 }
 
-void read_total(const YamlNode& node, catalogue::IdentityFacts& identity, Findings& findings) {
+void read_total(const YamlNode& node, catalogue::IdentitySpec& identity, Diagnostics& findings) {
   YamlMap map(node, findings);
   const Need need = need_of(identity.total_bytes != 0);
   assign(identity.total_bytes, map.number<std::uint8_t>("from-bytes", need));
@@ -170,7 +171,7 @@ void read_total(const YamlNode& node, catalogue::IdentityFacts& identity, Findin
   map.finish();
 }
 
-void read_identity(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_identity(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [identity, need] = section_of(draft.profile.identity);
   assign(identity.minimum_bytes, map.number<std::uint8_t>("minimum-bytes", need));
@@ -193,7 +194,7 @@ constexpr auto source_words =
                                        {"counter", catalogue::EventModel::counter},
                                        {"flag", catalogue::EventModel::flag}});
 
-void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
+void read_arm(const YamlNode& node, catalogue::EventSpec& events, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [arm, need] = section_of(events.arm);
   assign(arm.address, map.number<std::uint16_t>("register", need));
@@ -205,7 +206,7 @@ void read_arm(const YamlNode& node, catalogue::EventFacts& events, Findings& fin
 }
 
 std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at,
-                                            Findings& findings) {
+                                            Diagnostics& findings) {
   const auto kind = catalogue::event_kind_words.find(name);
   if (!kind) {
     findings.add_once(at, unknown_word("event kind", name, catalogue::event_kind_words.words()));
@@ -213,7 +214,7 @@ std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at
   return kind;
 }
 
-void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& findings) {
+void read_kinds(const YamlNode* node, catalogue::EventSpec& events, Diagnostics& findings) {
   catalogue::Table<std::int64_t, catalogue::Text> names;
   read_names(node, names, findings);
   std::map<std::int64_t, catalogue::EventKind> kinds = events.kinds.to_map();
@@ -224,7 +225,7 @@ void read_kinds(const YamlNode* node, catalogue::EventFacts& events, Findings& f
   events.kinds = std::move(kinds);
 }
 
-void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings& findings) {
+void read_columns(const YamlNode& node, catalogue::EventSpec& events, Diagnostics& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
   std::vector<catalogue::EventColumn> columns;
   for (const YamlNode& item : node.items) {
@@ -239,7 +240,7 @@ void read_columns(const YamlNode& node, catalogue::EventFacts& events, Findings&
   events.columns = std::move(columns);
 }
 
-void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_events(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [events, need] = section_of(draft.profile.events);
   assign(events.model, map.word("source", "source of events", source_words));
@@ -257,7 +258,7 @@ void read_events(const YamlNode& node, ProfileDraft& draft, Findings& findings) 
   map.finish();
 }
 
-void read_limits(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_limits(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [limits, need] = section_of(draft.profile.limits);
   assign(limits.minimum_offset, map.number<std::uint16_t>("minimum-offset", need));
@@ -267,7 +268,7 @@ void read_limits(const YamlNode& node, ProfileDraft& draft, Findings& findings) 
   map.finish();
 }
 
-void read_numbered(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_numbered(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [numbered, need] = section_of(draft.profile.numbered);
   assign(numbered.prefix, map.text("prefix", need));
@@ -293,7 +294,7 @@ struct Provenance {
 };
 
 std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& from,
-                                       Findings& findings) {
+                                       Diagnostics& findings) {
   CodeText code{.text = {}, .remedy = {}, .evidence = from.evidence, .source = from.source};
   if (node.kind != YamlNode::Kind::map) {
     auto text = to_text(node, findings);
@@ -313,7 +314,8 @@ std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& f
 
 using Codes = std::map<std::int64_t, CodeText>;
 
-void read_code_map(const YamlNode& node, const Provenance& from, Codes& codes, Findings& findings) {
+void read_code_map(const YamlNode& node, const Provenance& from, Codes& codes,
+                   Diagnostics& findings) {
   expect(node, YamlNode::Kind::map, findings);
   std::vector<std::int64_t> seen;
   for (const YamlEntry& entry : node.entries) {
@@ -333,7 +335,7 @@ void read_code_map(const YamlNode& node, const Provenance& from, Codes& codes, F
   }
 }
 
-void read_code_maps(const YamlNode& node, Codes& codes, Findings& findings) {
+void read_code_maps(const YamlNode& node, Codes& codes, Diagnostics& findings) {
   if (node.kind != YamlNode::Kind::sequence) {
     read_code_map(node, {}, codes, findings);
     return;
@@ -352,7 +354,7 @@ void read_code_maps(const YamlNode& node, Codes& codes, Findings& findings) {
 
 }  // namespace
 
-void read_codes(const YamlNode& node, catalogue::CodeTexts& table, Findings& findings) {
+void read_codes(const YamlNode& node, catalogue::CodeTexts& table, Diagnostics& findings) {
   Codes codes = table.to_map();
   read_code_maps(node, codes, findings);
   table = std::move(codes);
@@ -360,7 +362,7 @@ void read_codes(const YamlNode& node, catalogue::CodeTexts& table, Findings& fin
 
 namespace {
 
-using ReadSection = void (*)(const YamlNode&, ProfileDraft&, Findings&);
+using ReadSection = void (*)(const YamlNode&, ProfileDraft&, Diagnostics&);
 
 /// Reads a section that may be left out, and remembers where it stands.
 void read_section(YamlMap& map, std::string_view key, ReadSection read, Origin& origin,
@@ -391,8 +393,8 @@ void erase_half_read(std::vector<Entry>& entries, std::vector<Origin>& origins) 
 
 // ---- simulation ----
 
-void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& facts,
-                             Findings& findings) {
+void read_simulated_identity(const YamlNode& node, catalogue::SimulationSpec& facts,
+                             Diagnostics& findings) {
   YamlMap map(node, findings);
   if (const YamlNode* bytes = map.get("bytes", Need::required)) {
     Bytes identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
@@ -413,10 +415,10 @@ void read_simulated_identity(const YamlNode& node, catalogue::SimulationFacts& f
   map.finish();
 }
 
-std::vector<catalogue::SimulationFacts::Value> read_raw_values(const YamlNode& node,
-                                                               Findings& findings) {
+std::vector<catalogue::SimulationSpec::Value> read_raw_values(const YamlNode& node,
+                                                              Diagnostics& findings) {
   expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationFacts::Value> values;
+  std::vector<catalogue::SimulationSpec::Value> values;
   for (const YamlEntry& entry : node.entries) {
     const auto raw = parse_integer(entry.value.text);
     if (raw) {
@@ -428,10 +430,10 @@ std::vector<catalogue::SimulationFacts::Value> read_raw_values(const YamlNode& n
   return values;
 }
 
-void read_simulated_limits(const YamlNode& node, catalogue::SimulationFacts& facts,
-                           Findings& findings) {
+void read_simulated_limits(const YamlNode& node, catalogue::SimulationSpec& facts,
+                           Diagnostics& findings) {
   expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationFacts::Limits> limits;
+  std::vector<catalogue::SimulationSpec::Limits> limits;
   for (const YamlEntry& entry : node.entries) {
     const auto range = to_range(entry.value, last_register, findings);
     if (!range) continue;
@@ -441,10 +443,10 @@ void read_simulated_limits(const YamlNode& node, catalogue::SimulationFacts& fac
   facts.limits = std::move(limits);
 }
 
-void read_simulated_events(const YamlNode& node, catalogue::SimulationFacts& facts,
-                           Findings& findings) {
+void read_simulated_events(const YamlNode& node, catalogue::SimulationSpec& facts,
+                           Diagnostics& findings) {
   expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationFacts::Event> events;
+  std::vector<catalogue::SimulationSpec::Event> events;
   for (const YamlEntry& entry : node.entries) {
     const auto kind = to_kind(entry.key, entry.key_at, findings);
     expect(entry.value, YamlNode::Kind::sequence, findings);
@@ -457,7 +459,7 @@ void read_simulated_events(const YamlNode& node, catalogue::SimulationFacts& fac
 }
 
 void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry, std::int64_t raw,
-                       Findings& findings) {
+                       Diagnostics& findings) {
   const auto meant = profile.describe({entry.key});
   if (!meant) {
     findings.add(entry.key_at, message_of(meant.error()));
@@ -549,7 +551,7 @@ void ProfileDraft::finish() {
   if (!alarm_reset.sound) profile.alarm_reset = {};
 }
 
-ProfileHead read_head(const YamlNode& document, Findings& findings) {
+ProfileHead read_head(const YamlNode& document, Diagnostics& findings) {
   ProfileHead head;
   if (!expect(document, YamlNode::Kind::map, findings)) return head;
   YamlMap map(document, findings);
@@ -566,7 +568,7 @@ ProfileHead read_head(const YamlNode& document, Findings& findings) {
   return head;
 }
 
-void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findings) {
+void read_profile(const YamlNode& document, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(document, findings);
   catalogue::Profile& profile = draft.profile;
   draft.top = {.entry = &document, .layer = draft.layers};
@@ -594,7 +596,8 @@ void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findi
   ++draft.layers;
 }
 
-const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Findings& findings) {
+const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part,
+                          Diagnostics& findings) {
   const YamlNode* found = nullptr;
   for (std::size_t i = 1; i < documents.size(); ++i) {
     YamlMap map(documents[i], findings);
@@ -611,7 +614,7 @@ const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Fin
   return found;
 }
 
-void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Findings& findings) {
+void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Diagnostics& findings) {
   YamlMap map(document, findings);
   map.allow("part");
   if (const YamlNode* node = map.get("error-codes", Need::required)) {
@@ -623,8 +626,8 @@ void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Finding
   map.finish();
 }
 
-catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& findings) {
-  catalogue::SimulationFacts facts;
+catalogue::SimulationSpec read_simulation(const YamlNode& document, Diagnostics& findings) {
+  catalogue::SimulationSpec facts;
   YamlMap map(document, findings);
   map.allow("part");
   if (const YamlNode* node = map.get("identity")) {
@@ -650,7 +653,7 @@ catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& f
 }
 
 void check_simulation(const catalogue::Profile& profile, const YamlNode& document,
-                      Findings& findings) {
+                      Diagnostics& findings) {
   const auto check_values = [&](const YamlNode& values) {
     for (const YamlEntry& entry : values.entries) {
       const auto raw = parse_integer(entry.value.text).value_or(0);

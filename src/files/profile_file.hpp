@@ -69,29 +69,29 @@ struct ProfileHead {
 };
 
 /// Also checks the format number.
-ProfileHead read_head(const YamlNode& document, Findings& findings);
+ProfileHead read_head(const YamlNode& document, Diagnostics& findings);
 
 /// Lays one first document over the draft. Missing, unknown and ill-typed keys are findings.
-void read_profile(const YamlNode& document, ProfileDraft& draft, Findings& findings);
+void read_profile(const YamlNode& document, ProfileDraft& draft, Diagnostics& findings);
 
 /// What the documents behind the first are about.
 enum class Part : std::uint8_t { texts, simulation };
 
 /// The document of this part, among those behind the first; null when there is none. Documents
 /// of unknown parts, and second ones of the same part, are findings.
-const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Findings& findings);
+const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part, Diagnostics& findings);
 
 /// `part: texts`, laid over what is there.
-void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Findings& findings);
+void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Diagnostics& findings);
 
 /// A map of codes, or a list of such maps with the evidence that each shares.
-void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Findings& findings);
+void read_codes(const YamlNode& node, catalogue::CodeTexts& codes, Diagnostics& findings);
 
 /// `part: simulation`.
-catalogue::SimulationFacts read_simulation(const YamlNode& document, Findings& findings);
+catalogue::SimulationSpec read_simulation(const YamlNode& document, Diagnostics& findings);
 
 /// Simulation patterns must mean something, and start values fit: only check() pays for this.
 void check_simulation(const catalogue::Profile& profile, const YamlNode& document,
-                      Findings& findings);
+                      Diagnostics& findings);
 
 }  // namespace spindle::files

@@ -70,7 +70,7 @@ std::string no_such_parameter(const ProfileDraft& draft, const std::string& name
 
 // ---- names ----
 
-void id_is_the_file_name(const ProfileDraft& draft, Findings& findings) {
+void id_is_the_file_name(const ProfileDraft& draft, Diagnostics& findings) {
   const catalogue::Profile& profile = draft.profile;
   const std::string stem = std::filesystem::path(profile.path.view()).stem().string();
   if (!is_catalogue_name(profile.id)) {
@@ -84,7 +84,7 @@ void id_is_the_file_name(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void names_have_the_pattern(const ProfileDraft& draft, Findings& findings) {
+void names_have_the_pattern(const ProfileDraft& draft, Diagnostics& findings) {
   const auto check = [&](const std::string& name, const Origin& origin) {
     if (is_catalogue_name(name)) return;
     findings.add_once(origin.of("name"),
@@ -99,7 +99,7 @@ void names_have_the_pattern(const ProfileDraft& draft, Findings& findings) {
                   [&](const Action& action, const Origin& origin) { check(action.name, origin); });
 }
 
-void names_are_no_numbers(const ProfileDraft& draft, Findings& findings) {
+void names_are_no_numbers(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.numbered) return;
   const std::string_view prefix = draft.profile.numbered->prefix;
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
@@ -113,7 +113,7 @@ void names_are_no_numbers(const ProfileDraft& draft, Findings& findings) {
 
 // ---- registers ----
 
-void registers_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
+void registers_are_in_the_table(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (span_of(parameter, 0).last <= last_register) return;
     findings.add_once(origin.of("register"),
@@ -121,7 +121,7 @@ void registers_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void overlaps_are_declared(const ProfileDraft& draft, Findings& findings) {
+void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
   std::vector<Span> spans;
   spans.reserve(draft.parameters.size());
   for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
@@ -149,7 +149,7 @@ void overlaps_are_declared(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void pairs_are_even(const ProfileDraft& draft, Findings& findings) {
+void pairs_are_even(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.link.even_pairs) return;
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const bool pair = catalogue::register_count(parameter.encoding.kind) == 2;
@@ -160,7 +160,7 @@ void pairs_are_even(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void input_registers_are_read_only(const ProfileDraft& draft, Findings& findings) {
+void input_registers_are_read_only(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (parameter.table != RegisterTable::input || parameter.access == Access::read_only) return;
     findings.add_once(origin.of("access"),
@@ -170,7 +170,7 @@ void input_registers_are_read_only(const ProfileDraft& draft, Findings& findings
 
 // ---- values ----
 
-void ranges_fit(const ProfileDraft& draft, Findings& findings) {
+void ranges_fit(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const auto& [minimum, maximum] = parameter.range;
     if (minimum && maximum && *minimum > *maximum) {
@@ -188,7 +188,7 @@ void ranges_fit(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void defaults_fit(const ProfileDraft& draft, Findings& findings) {
+void defaults_fit(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (!parameter.default_value) return;
     const auto value = catalogue::parse_value(parameter, parameter.default_value->to_string());
@@ -198,7 +198,7 @@ void defaults_fit(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void read_only_has_no_default(const ProfileDraft& draft, Findings& findings) {
+void read_only_has_no_default(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (!parameter.default_value || parameter.access == Access::read_write) return;
     findings.add_once(origin.of("default"),
@@ -206,7 +206,7 @@ void read_only_has_no_default(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void settling_ends(const ProfileDraft& draft, Findings& findings) {
+void settling_ends(const ProfileDraft& draft, Diagnostics& findings) {
   constexpr Duration longest = std::chrono::seconds(30);
   const auto too_long = [&](const Duration& settle, const std::string& what) {
     return fmt::format("{}'settle' is {}, longer than {}", what, to_text(settle), to_text(longest));
@@ -226,7 +226,7 @@ void settling_ends(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void read_only_is_never_cloned(const ProfileDraft& draft, Findings& findings) {
+void read_only_is_never_cloned(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const bool marked = parameter.cloning == catalogue::Cloning::never;
     if (!marked || parameter.access == Access::read_write) return;
@@ -237,7 +237,7 @@ void read_only_is_never_cloned(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void secrets_are_stored(const ProfileDraft& draft, Findings& findings) {
+void secrets_are_stored(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const bool marked = parameter.secrecy == catalogue::Secrecy::secret;
     if (!marked || parameter.table == RegisterTable::holding) return;
@@ -272,7 +272,7 @@ std::string fault_of(const catalogue::List<Label>& labels, const Parameter& para
   return {};
 }
 
-void labels_are_unique(const ProfileDraft& draft, Findings& findings) {
+void labels_are_unique(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (parameter.labels.empty()) return;
     Parameter plain{.name = {},
@@ -296,7 +296,7 @@ void labels_are_unique(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void entries_have_a_source(const ProfileDraft& draft, Findings& findings) {
+void entries_have_a_source(const ProfileDraft& draft, Diagnostics& findings) {
   const auto check = [&](const std::string& name, const std::string& source, const Origin& origin) {
     if (source.empty())
       findings.add_once(origin.of("source"), fmt::format("{} has no source", name));
@@ -311,7 +311,7 @@ void entries_have_a_source(const ProfileDraft& draft, Findings& findings) {
 
 // ---- actions ----
 
-void actions_stay_off_parameters(const ProfileDraft& draft, Findings& findings) {
+void actions_stay_off_parameters(const ProfileDraft& draft, Diagnostics& findings) {
   const auto& numbered = draft.profile.numbered;
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     if (!numbered || numbered->table != RegisterTable::holding) return;
@@ -325,7 +325,7 @@ void actions_stay_off_parameters(const ProfileDraft& draft, Findings& findings) 
   });
 }
 
-void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
+void confirmations_exist(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     if (action.confirm.empty()) {
       if (action.confirm_value) {
@@ -340,7 +340,7 @@ void confirmations_exist(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void what_actions_tell_exists(const ProfileDraft& draft, Findings& findings) {
+void what_actions_tell_exists(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     if (action.tells.empty()) return;
     for (const std::uint16_t value : {action.minimum, action.maximum}) {
@@ -351,7 +351,7 @@ void what_actions_tell_exists(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void effects_are_of_values(const ProfileDraft& draft, Findings& findings) {
+void effects_are_of_values(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     for (const Label& effect : action.effects) {
       const bool given = action.value
@@ -366,9 +366,9 @@ void effects_are_of_values(const ProfileDraft& draft, Findings& findings) {
 
 // ---- sections ----
 
-void link_is_usable(const ProfileDraft& draft, Findings& findings) {
+void link_is_usable(const ProfileDraft& draft, Diagnostics& findings) {
   if (draft.link.entry == nullptr || !draft.link.sound) return;
-  const catalogue::LinkFacts& link = draft.profile.link;
+  const catalogue::LinkSpec& link = draft.profile.link;
   const auto check = [&](std::string_view key, std::uint16_t value, std::uint16_t most) {
     if (value >= 1 && value <= most) return;
     findings.add_once(draft.link.of(key), fmt::format("{} must be 1 to {}", key, most));
@@ -392,9 +392,9 @@ void link_is_usable(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void identity_slices_fit(const ProfileDraft& draft, Findings& findings) {
+void identity_slices_fit(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.identity) return;
-  const catalogue::IdentityFacts& facts = *draft.profile.identity;
+  const catalogue::IdentitySpec& facts = *draft.profile.identity;
   const auto check = [&](std::string_view key, const catalogue::Slice& slice, unsigned bytes) {
     if (unsigned{slice.offset} + slice.size <= bytes) return;
     findings.add_once(draft.identity.of(key),
@@ -409,9 +409,9 @@ void identity_slices_fit(const ProfileDraft& draft, Findings& findings) {
   check("total", facts.total, facts.total_bytes);
 }
 
-void event_block_is_legal(const ProfileDraft& draft, Findings& findings) {
+void event_block_is_legal(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
-  const catalogue::EventFacts& events = *draft.profile.events;
+  const catalogue::EventSpec& events = *draft.profile.events;
   const auto is = [&](modbus::FunctionCode code) {
     return events.function == static_cast<std::uint8_t>(code);
   };
@@ -428,9 +428,9 @@ void event_block_is_legal(const ProfileDraft& draft, Findings& findings) {
 }
 
 /// Each source has keys of its own.
-void event_source_is_complete(const ProfileDraft& draft, Findings& findings) {
+void event_source_is_complete(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
-  const catalogue::EventFacts& events = *draft.profile.events;
+  const catalogue::EventSpec& events = *draft.profile.events;
   const bool pushes = events.model == catalogue::EventModel::push;
   const bool flags = events.model == catalogue::EventModel::flag;
   const auto add = [&](std::string_view key, std::string message) {
@@ -453,7 +453,7 @@ void event_source_is_complete(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void event_flag_is_consumed(const ProfileDraft& draft, Findings& findings) {
+void event_flag_is_consumed(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events || draft.profile.events->flag.empty()) return;
   const std::string& name = draft.profile.events->flag;
   if (draft.lacks(name)) findings.add_once(draft.events.of("flag"), no_such_parameter(draft, name));
@@ -509,7 +509,7 @@ std::string other_reader(const ProfileDraft& draft, const Span& span) {
   return {};
 }
 
-void consumed_registers_have_one_reader(const ProfileDraft& draft, Findings& findings) {
+void consumed_registers_have_one_reader(const ProfileDraft& draft, Diagnostics& findings) {
   for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
     const Parameter& parameter = draft.profile.parameters[i];
     if (parameter.reading != catalogue::Reading::consumes) continue;
@@ -523,9 +523,9 @@ void consumed_registers_have_one_reader(const ProfileDraft& draft, Findings& fin
   }
 }
 
-void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings) {
+void event_fields_are_in_the_block(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
-  const catalogue::EventFacts& events = *draft.profile.events;
+  const catalogue::EventSpec& events = *draft.profile.events;
   const auto table =
       events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers)
           ? RegisterTable::holding
@@ -546,7 +546,7 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Findings& findings
   for (const catalogue::EventColumn& column : events.columns) check("columns", column.parameter);
 }
 
-void arming_is_no_parameter(const ProfileDraft& draft, Findings& findings) {
+void arming_is_no_parameter(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events || !draft.profile.events->arm) return;
   const modbus::RegisterAddress address{draft.profile.events->arm->address};
   if (!draft.profile.writable(address)) return;
@@ -554,7 +554,7 @@ void arming_is_no_parameter(const ProfileDraft& draft, Findings& findings) {
                     fmt::format("register {} arms events, but is also a parameter", address.value));
 }
 
-void alarm_reset_is_an_action(const ProfileDraft& draft, Findings& findings) {
+void alarm_reset_is_an_action(const ProfileDraft& draft, Diagnostics& findings) {
   const std::string& name = draft.profile.alarm_reset;
   if (name.empty() || draft.incomplete) return;
   std::vector<std::string> names;
@@ -566,9 +566,9 @@ void alarm_reset_is_an_action(const ProfileDraft& draft, Findings& findings) {
       fmt::format("'{}' is no action of this profile{}{}", name, hint.empty() ? "" : "; ", hint));
 }
 
-void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
+void limits_are_in_the_table(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.limits) return;
-  const catalogue::LimitFacts& limits = *draft.profile.limits;
+  const catalogue::LimitSpec& limits = *draft.profile.limits;
   if (limits.from > limits.to) {
     findings.add_once(draft.limits.of("from"), "limits begin behind their end");
   }
@@ -580,9 +580,9 @@ void limits_are_in_the_table(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void numbered_are_usable(const ProfileDraft& draft, Findings& findings) {
+void numbered_are_usable(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.numbered) return;
-  const catalogue::NumberedFacts& numbered = *draft.profile.numbered;
+  const catalogue::NumberedSpec& numbered = *draft.profile.numbered;
   const std::string_view prefix = numbered.prefix;
   if (prefix.empty() ||
       prefix.find_first_not_of("abcdefghijklmnopqrstuvwxyz") != std::string::npos) {
@@ -596,7 +596,7 @@ void numbered_are_usable(const ProfileDraft& draft, Findings& findings) {
   }
 }
 
-void exception_codes_fit(const ProfileDraft& draft, Findings& findings) {
+void exception_codes_fit(const ProfileDraft& draft, Diagnostics& findings) {
   for (const auto& [code, text] : draft.profile.exceptions) {
     if (code <= std::numeric_limits<std::uint8_t>::max()) continue;
     findings.add_once(draft.top.of("exceptions"),
@@ -613,7 +613,7 @@ std::string reason_of(const catalogue::Danger& danger) {
 }
 
 /// A hazard is one of a write.
-void read_only_has_no_hazard(const ProfileDraft& draft, Findings& findings) {
+void read_only_has_no_hazard(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const bool declared = parameter.hazard != catalogue::Hazard::none;
     if (!declared || parameter.access == Access::read_write) return;
@@ -622,7 +622,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-using Rule = void (*)(const ProfileDraft&, Findings&);
+using Rule = void (*)(const ProfileDraft&, Diagnostics&);
 
 constexpr std::array<Rule, 32> rules = {
     id_is_the_file_name,
@@ -672,7 +672,7 @@ bool is_catalogue_name(std::string_view text) {
   return is_word_character(before);
 }
 
-void check_guards(const ProfileDraft& draft, Findings& findings) {
+void check_guards(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     if (catalogue::moves_without_end(action)) {
       findings.add_once(
@@ -703,7 +703,7 @@ void check_guards(const ProfileDraft& draft, Findings& findings) {
   });
 }
 
-void check_rules(const ProfileDraft& draft, Findings& findings) {
+void check_rules(const ProfileDraft& draft, Diagnostics& findings) {
   for (const Rule rule : rules) rule(draft, findings);
   check_drive_rules(draft, findings);
   check_run_rules(draft, findings);

@@ -10,10 +10,10 @@ bool is_catalogue_name(std::string_view text);
 
 /// Every rule that a profile must keep, beyond the shape of its files. Runs on every load; adds a
 /// finding for each breach. What could not be read is to be left out before.
-void check_rules(const ProfileDraft& draft, Findings& findings);
+void check_rules(const ProfileDraft& draft, Diagnostics& findings);
 
 /// What may move a tool and is guarded by nothing but a refusal: no reason not to load a profile,
 /// so only a check pays for it.
-void check_guards(const ProfileDraft& draft, Findings& findings);
+void check_guards(const ProfileDraft& draft, Diagnostics& findings);
 
 }  // namespace spindle::files

@@ -11,20 +11,20 @@
 namespace spindle::files {
 namespace {
 
-using catalogue::CommandRegisterFacts;
-using catalogue::CommandWordFacts;
-using catalogue::MonitorFacts;
-using catalogue::RunFacts;
+using catalogue::CommandRegisterSpec;
+using catalogue::CommandWordSpec;
+using catalogue::MonitorSpec;
 using catalogue::RunKind;
+using catalogue::RunSpec;
 using catalogue::RunWords;
-using catalogue::StartActionFacts;
+using catalogue::StartActionSpec;
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 
 /// What may be selected before a start, as options behind two hyphens.
 constexpr std::array<std::string_view, 2> selectable = {"preset", "direction"};
 
-RunWords read_words(const YamlNode& node, Findings& findings) {
+RunWords read_words(const YamlNode& node, Diagnostics& findings) {
   YamlMap map(node, findings);
   RunWords words;
   assign(words.forward, map.number<std::uint16_t>("forward", Need::required));
@@ -35,7 +35,7 @@ RunWords read_words(const YamlNode& node, Findings& findings) {
   return words;
 }
 
-void read_modes(const YamlNode& node, CommandWordFacts& run, Findings& findings) {
+void read_modes(const YamlNode& node, CommandWordSpec& run, Diagnostics& findings) {
   if (!expect(node, YamlNode::Kind::map, findings)) return;
   std::map<std::int64_t, RunWords> modes = run.modes.to_map();
   for (const YamlEntry& entry : node.entries) {
@@ -49,7 +49,7 @@ void read_modes(const YamlNode& node, CommandWordFacts& run, Findings& findings)
   run.modes = std::move(modes);
 }
 
-void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
+void read_functions(const YamlNode& node, catalogue::InputSpec& inputs, Diagnostics& findings) {
   expect(node, YamlNode::Kind::sequence, findings);
   std::vector<catalogue::InputFunction> functions;
   for (const YamlNode& item : node.items) {
@@ -66,7 +66,7 @@ void read_functions(const YamlNode& node, catalogue::InputFacts& inputs, Finding
   inputs.functions = std::move(functions);
 }
 
-void read_inputs(const YamlNode& node, catalogue::InputFacts& inputs, Findings& findings) {
+void read_inputs(const YamlNode& node, catalogue::InputSpec& inputs, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(inputs.parameter, map.text("parameter", Need::required));
   if (const auto bits = map.range("bits", last_register, Need::required)) {
@@ -79,7 +79,7 @@ void read_inputs(const YamlNode& node, catalogue::InputFacts& inputs, Findings& 
   map.finish();
 }
 
-void read_command(const YamlNode& node, CommandWordFacts& run, Need need, Findings& findings) {
+void read_command(const YamlNode& node, CommandWordSpec& run, Need need, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(run.command, map.text("parameter", need));
   assign(run.mode, map.text("mode", need));
@@ -110,7 +110,7 @@ void read_codes_of_status(YamlMap& map, std::string_view key,
 }
 
 /// Of a command word all is needed but load and warning; of a command register nothing is.
-void read_status(const YamlNode& node, MonitorFacts& monitor, Need need, Findings& findings) {
+void read_status(const YamlNode& node, MonitorSpec& monitor, Need need, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(monitor.status, map.text("parameter", need));
   const YamlNode* running = map.get("running", need);
@@ -132,7 +132,7 @@ void read_status(const YamlNode& node, MonitorFacts& monitor, Need need, Finding
   map.finish();
 }
 
-void read_operation(const YamlNode& node, CommandWordFacts& run, Need need, Findings& findings) {
+void read_operation(const YamlNode& node, CommandWordSpec& run, Need need, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(run.speed, map.text("speed", need));
   assign(run.acceleration, map.text("acceleration", need));
@@ -152,8 +152,8 @@ void read_operation(const YamlNode& node, CommandWordFacts& run, Need need, Find
   map.finish();
 }
 
-void read_command_word(YamlMap& map, CommandWordFacts& word, Need need) {
-  Findings& findings = map.findings();
+void read_command_word(YamlMap& map, CommandWordSpec& word, Need need) {
+  Diagnostics& findings = map.findings();
   if (const YamlNode* part = map.get("command", need)) read_command(*part, word, need, findings);
   if (const YamlNode* part = map.get("status", need)) {
     read_status(*part, word.monitor, need, findings);
@@ -165,7 +165,7 @@ void read_command_word(YamlMap& map, CommandWordFacts& word, Need need) {
   assign(word.group, map.text("group"));
 }
 
-void read_selections(const YamlNode& node, StartActionFacts& facts, Findings& findings) {
+void read_selections(const YamlNode& node, StartActionSpec& facts, Diagnostics& findings) {
   YamlMap map(node, findings);
   std::vector<catalogue::StartOption> selections;
   for (const std::string_view option : selectable) {
@@ -177,14 +177,14 @@ void read_selections(const YamlNode& node, StartActionFacts& facts, Findings& fi
   map.finish();
 }
 
-void read_start_action(YamlMap& map, StartActionFacts& facts, Need need) {
+void read_start_action(YamlMap& map, StartActionSpec& facts, Need need) {
   assign(facts.start, map.text("start", need));
   if (const YamlNode* part = map.get("select")) read_selections(*part, facts, map.findings());
   assign(facts.alarm, map.text("alarm"));
 }
 
-void read_command_values(const YamlNode& node, CommandRegisterFacts& facts, Need need,
-                         Findings& findings) {
+void read_command_values(const YamlNode& node, CommandRegisterSpec& facts, Need need,
+                         Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(facts.command, map.text("parameter", need));
   assign(facts.forward, map.number<std::uint32_t>("forward", need));
@@ -194,7 +194,7 @@ void read_command_values(const YamlNode& node, CommandRegisterFacts& facts, Need
   map.finish();
 }
 
-void read_enable(const YamlNode& node, catalogue::EnableFacts& enable, Findings& findings) {
+void read_enable(const YamlNode& node, catalogue::EnableSpec& enable, Diagnostics& findings) {
   YamlMap map(node, findings);
   enable = {};
   assign(enable.parameter, map.text("parameter", Need::required));
@@ -204,15 +204,15 @@ void read_enable(const YamlNode& node, catalogue::EnableFacts& enable, Findings&
   map.finish();
 }
 
-void read_stop(const YamlNode& node, CommandRegisterFacts& facts, Findings& findings) {
+void read_stop(const YamlNode& node, CommandRegisterSpec& facts, Diagnostics& findings) {
   YamlMap map(node, findings);
   assign(facts.stop_register, map.text("parameter", Need::required));
   assign(facts.stop_value, map.number<std::uint32_t>("value", Need::required));
   map.finish();
 }
 
-void read_command_register(YamlMap& map, CommandRegisterFacts& facts, Need need) {
-  Findings& findings = map.findings();
+void read_command_register(YamlMap& map, CommandRegisterSpec& facts, Need need) {
+  Diagnostics& findings = map.findings();
   if (const YamlNode* part = map.get("command", need)) {
     read_command_values(*part, facts, need, findings);
   }
@@ -226,17 +226,17 @@ void read_command_register(YamlMap& map, CommandRegisterFacts& facts, Need need)
 }
 
 /// A profile of another model than its base has nothing of the base's.
-Need begin_model(RunFacts& run, RunKind kind, Need need) {
+Need begin_model(RunSpec& run, RunKind kind, Need need) {
   if (run.kind() == kind) return need;
   switch (kind) {
     case RunKind::start_action:
-      run.model = StartActionFacts{};
+      run.model = StartActionSpec{};
       break;
     case RunKind::command_word:
-      run.model = CommandWordFacts{};
+      run.model = CommandWordSpec{};
       break;
     case RunKind::command_register:
-      run.model = CommandRegisterFacts{};
+      run.model = CommandRegisterSpec{};
       break;
   }
   return Need::required;
@@ -244,7 +244,7 @@ Need begin_model(RunFacts& run, RunKind kind, Need need) {
 
 }  // namespace
 
-void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
+void read_run(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(node, findings);
   auto [run, need] = section_of(draft.profile.run);
   const auto named = map.word("model", "run model", catalogue::run_words);
@@ -253,11 +253,11 @@ void read_run(const YamlNode& node, ProfileDraft& draft, Findings& findings) {
   assign(run.evidence, map.word("evidence", "evidence", catalogue::evidence_words, need));
   assign(run.source, map.text("source", need));
   assign(run.still_runs, map.text("still-runs"));
-  if (auto* word = std::get_if<CommandWordFacts>(&run.model)) read_command_word(map, *word, model);
-  if (auto* action = std::get_if<StartActionFacts>(&run.model)) {
+  if (auto* word = std::get_if<CommandWordSpec>(&run.model)) read_command_word(map, *word, model);
+  if (auto* action = std::get_if<StartActionSpec>(&run.model)) {
     read_start_action(map, *action, model);
   }
-  if (auto* values = std::get_if<CommandRegisterFacts>(&run.model)) {
+  if (auto* values = std::get_if<CommandRegisterSpec>(&run.model)) {
     read_command_register(map, *values, model);
   }
   map.finish();
@@ -274,10 +274,10 @@ void derive_run(ProfileDraft& draft) {
     start = &action;
   }
   if (start == nullptr) return;
-  draft.profile.run = RunFacts{.model = StartActionFacts{.start = start->name},
-                               .evidence = start->evidence,
-                               .source = start->source,
-                               .is_derived = true};
+  draft.profile.run = RunSpec{.model = StartActionSpec{.start = start->name},
+                              .evidence = start->evidence,
+                              .source = start->source,
+                              .is_derived = true};
 }
 
 }  // namespace spindle::files

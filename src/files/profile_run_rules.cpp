@@ -9,12 +9,12 @@ namespace spindle::files {
 namespace {
 
 using catalogue::Action;
-using catalogue::CommandRegisterFacts;
-using catalogue::CommandWordFacts;
-using catalogue::MonitorFacts;
+using catalogue::CommandRegisterSpec;
+using catalogue::CommandWordSpec;
+using catalogue::MonitorSpec;
 using catalogue::Parameter;
 using catalogue::RunWords;
-using catalogue::StartActionFacts;
+using catalogue::StartActionSpec;
 
 unsigned width_of(const Parameter& parameter) {
   constexpr unsigned bits = 16;
@@ -23,11 +23,11 @@ unsigned width_of(const Parameter& parameter) {
 
 class RunRules {
  public:
-  RunRules(const ProfileDraft& draft, Findings& findings) : draft_(draft), findings_(findings) {}
+  RunRules(const ProfileDraft& draft, Diagnostics& findings) : draft_(draft), findings_(findings) {}
 
   void check() {
     if (!draft_.profile.run) return;
-    const catalogue::RunFacts& run = *draft_.profile.run;
+    const catalogue::RunSpec& run = *draft_.profile.run;
     if (run.source.empty()) findings_.add_once(draft_.run.of("source"), "run has no source");
     if (const auto* facts = run.action()) check_start_action(*facts);
     if (const auto* facts = run.word()) check_command_word(*facts);
@@ -69,7 +69,7 @@ class RunRules {
 
   // ---- start-action ----
 
-  void check_start_action(const StartActionFacts& facts) {
+  void check_start_action(const StartActionSpec& facts) {
     const Position at = draft_.run.of("start");
     const Action* start = require_action(facts.start, at);
     if (start != nullptr && (!start->value || !start->stop_value)) {
@@ -85,10 +85,10 @@ class RunRules {
 
   // ---- command-word ----
 
-  void check_command_word(const CommandWordFacts& run) {
+  void check_command_word(const CommandWordSpec& run) {
     check_words(run, draft_.run.of("command"));
     check_operations(run, draft_.run.of("operation"));
-    const MonitorFacts& monitor = run.monitor;
+    const MonitorSpec& monitor = run.monitor;
     const Position status = draft_.run.of("status");
     for (const catalogue::Text* name :
          {&monitor.status, &monitor.command_speed, &monitor.feedback_speed, &monitor.alarm}) {
@@ -99,7 +99,7 @@ class RunRules {
     require_optional(run.group, draft_.run.of("group"));
   }
 
-  void check_words(const CommandWordFacts& run, const Position& at) {
+  void check_words(const CommandWordSpec& run, const Position& at) {
     require_writable(run.command, at);
     require(run.mode, at);
     if (run.modes.empty()) findings_.add_once(at, "there is no mode in which the motor runs");
@@ -117,8 +117,8 @@ class RunRules {
   }
 
   /// Every bit of a word has one function by which it is found on a driver.
-  void check_inputs(const CommandWordFacts& run, const Position& at) {
-    const catalogue::InputFacts& inputs = run.inputs;
+  void check_inputs(const CommandWordSpec& run, const Position& at) {
+    const catalogue::InputSpec& inputs = run.inputs;
     if (inputs.parameter.empty()) return;
     constexpr std::uint16_t highest_bit = 15;
     if (inputs.first > inputs.last || inputs.last > highest_bit) {
@@ -154,7 +154,7 @@ class RunRules {
     }
   }
 
-  void check_mode(std::int64_t mode, const RunWords& words, const CommandWordFacts& run,
+  void check_mode(std::int64_t mode, const RunWords& words, const CommandWordSpec& run,
                   const Position& at) {
     const unsigned all = unsigned{words.forward} | words.reverse | words.decelerate | words.instant;
     if ((all & run.select) != 0) {
@@ -171,7 +171,7 @@ class RunRules {
     if (!stops) findings_.add_once(at, fmt::format("mode {}: a stop equals a start", mode));
   }
 
-  void check_operations(const CommandWordFacts& run, const Position& at) {
+  void check_operations(const CommandWordSpec& run, const Position& at) {
     if (run.preferred < run.first || run.preferred > run.last) {
       findings_.add_once(at, "the preferred operation data is none of them");
     }
@@ -190,7 +190,7 @@ class RunRules {
 
   // ---- command-register ----
 
-  void check_command_register(const CommandRegisterFacts& facts) {
+  void check_command_register(const CommandRegisterSpec& facts) {
     check_values(facts, draft_.run.of("command"));
     check_enable(facts, draft_.run.of("enable"));
     const Position stop = draft_.run.of("stop");
@@ -222,7 +222,7 @@ class RunRules {
     }
   }
 
-  void check_values(const CommandRegisterFacts& facts, const Position& at) {
+  void check_values(const CommandRegisterSpec& facts, const Position& at) {
     const Parameter* command = require_writable(facts.command, at);
     for (const auto& value :
          {std::optional(facts.forward), facts.reverse, facts.stop, facts.instant}) {
@@ -240,8 +240,8 @@ class RunRules {
     if (facts.reverse == facts.forward) findings_.add_once(at, "forward and reverse are the same");
   }
 
-  void check_enable(const CommandRegisterFacts& facts, const Position& at) {
-    const catalogue::EnableFacts& enable = facts.enable;
+  void check_enable(const CommandRegisterSpec& facts, const Position& at) {
+    const catalogue::EnableSpec& enable = facts.enable;
     if (enable.parameter.empty()) return;
     const Parameter* parameter = require_writable(enable.parameter, at);
     check_fits(parameter, enable.value, at);
@@ -264,7 +264,7 @@ class RunRules {
 
   // ---- what a motor says ----
 
-  void check_monitor(const MonitorFacts& monitor, const Position& at) {
+  void check_monitor(const MonitorSpec& monitor, const Position& at) {
     for (const catalogue::Text* name : {&monitor.command_speed, &monitor.feedback_speed,
                                         &monitor.load, &monitor.alarm, &monitor.warning}) {
       require_optional(*name, at);
@@ -297,12 +297,12 @@ class RunRules {
   }
 
   const ProfileDraft& draft_;
-  Findings& findings_;
+  Diagnostics& findings_;
 };
 
 }  // namespace
 
-void check_run_rules(const ProfileDraft& draft, Findings& findings) {
+void check_run_rules(const ProfileDraft& draft, Diagnostics& findings) {
   RunRules(draft, findings).check();
 }
 

@@ -116,7 +116,7 @@ bool same_file(const std::string& a, const std::string& b) {
 }
 
 Result<const Layer*> read_layer(const std::string& path, Documents documents, const ReadText& read,
-                                Library& library, Findings& findings) {
+                                Library& library, Diagnostics& findings) {
   if (const auto known = library.find(path); known != library.end()) {
     const bool sound = known->second.sound;
     if (!sound) findings.add({findings.add_file(path), 1, 1}, "the file has faults of its own");
@@ -155,7 +155,7 @@ std::optional<Base> find_base(const Layer& layer, const Places& places, Tables t
 
 /// The next one of the chain; empty at its end, or after a finding.
 std::optional<Base> next_of(const Chain& chain, const Places& places, Tables tables,
-                            Findings& findings) {
+                            Diagnostics& findings) {
   const Layer& last = *chain.layers.back();
   const ProfileHead& head = last.head;
   if (head.extends.empty()) return std::nullopt;
@@ -182,7 +182,7 @@ std::optional<Base> next_of(const Chain& chain, const Places& places, Tables tab
 }
 
 Result<Chain> read_chain(const std::string& path, Documents documents, const Places& places,
-                         Tables tables, Library& library, Findings& findings) {
+                         Tables tables, Library& library, Diagnostics& findings) {
   Chain chain;
   std::optional<Base> next = Base{.path = path};
   while (next) {
@@ -202,7 +202,7 @@ Result<Chain> read_chain(const std::string& path, Documents documents, const Pla
 /// How much is asked of a profile: what it needs to be used, or to be called good.
 enum class Strictness : std::uint8_t { load, check };
 
-ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings) {
+ProfileDraft build(const Chain& chain, Strictness strictness, Diagnostics& findings) {
   ProfileDraft draft;
   std::vector<catalogue::Text> bases;
   for (const Layer* layer : chain.layers) {
@@ -233,7 +233,7 @@ ProfileDraft build(const Chain& chain, Strictness strictness, Findings& findings
   return draft;
 }
 
-catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
+catalogue::CodeTables collect_texts(const Chain& chain, Diagnostics& findings) {
   catalogue::CodeTables codes;
   if (chain.root != nullptr) codes = *chain.root->codes;
   for (auto layer = chain.layers.rbegin(); layer != chain.layers.rend(); ++layer) {
@@ -244,7 +244,7 @@ catalogue::CodeTables collect_texts(const Chain& chain, Findings& findings) {
   return codes;
 }
 
-const YamlNode* nearest_simulation(const Chain& chain, Findings& findings) {
+const YamlNode* nearest_simulation(const Chain& chain, Diagnostics& findings) {
   for (const Layer* layer : chain.layers) {
     if (const YamlNode* part = find_part(layer->documents, Part::simulation, findings)) return part;
   }
@@ -271,7 +271,7 @@ std::map<std::string, std::string> profile_files(const std::vector<std::string>&
 bool is_abstract(const std::string& path, const Places& places) {
   if (const ShippedProfile* shipped = shipped_as(path, places)) return shipped->is_abstract;
   Library library;
-  Findings findings;
+  Diagnostics findings;
   const auto layer = read_layer(path, Documents::first, places.read, library, findings);
   return layer && (*layer)->head.abstract;
 }
@@ -345,7 +345,7 @@ struct OpenChain {
   std::string path;
   Library library;
   Chain chain;  ///< points into the library
-  Findings findings;
+  Diagnostics findings;
 
   /// Error `bad_file` as soon as anything is wrong.
   [[nodiscard]] Result<void> check() const {
@@ -381,12 +381,12 @@ Result<AnyProfile> load_file(const std::string& path, const Places& places) {
   return AnyProfile{std::move(profile), open->chain.front().head.abstract};
 }
 
-Result<catalogue::SimulationFacts> load_simulation_of(const std::string& path,
-                                                      const Places& places) {
+Result<catalogue::SimulationSpec> load_simulation_of(const std::string& path,
+                                                     const Places& places) {
   auto open = open_chain(path, Documents::all, places, Tables::used);
   if (!open) return tl::unexpected(std::move(open.error()));
   const YamlNode* part = nearest_simulation(open->chain, open->findings);
-  catalogue::SimulationFacts facts;
+  catalogue::SimulationSpec facts;
   if (part != nullptr) {
     facts = read_simulation(*part, open->findings);
   } else if (open->chain.root != nullptr) {
@@ -428,7 +428,7 @@ struct ProfileStore::Memory {
   std::mutex mutex = {};
   // By the name that was asked for.
   Kept<AnyProfile> profiles = {};
-  Kept<catalogue::SimulationFacts> simulations = {};
+  Kept<catalogue::SimulationSpec> simulations = {};
   Kept<catalogue::CodeTables> codes = {};
 
   /// What is kept under this name, else what `make(located)` makes, which is kept.
@@ -466,7 +466,7 @@ Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
   });
 }
 
-Result<catalogue::SimulationFacts> ProfileStore::load_simulation(
+Result<catalogue::SimulationSpec> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
   return memory_->take(memory_->simulations, name_or_file, [&](const Located& located) {
     return located.shipped == nullptr ? load_simulation_of(located.path, memory_->places)
@@ -487,10 +487,11 @@ Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view na
   });
 }
 
-Result<std::vector<Finding>> ProfileStore::check(std::string_view name_or_file) const {
+Result<std::vector<Diagnostic>> ProfileStore::check(std::string_view name_or_file) const {
   auto located = locate(name_or_file, memory_->places);
   if (!located) return tl::unexpected(std::move(located.error()));
-  if (located->path.empty()) return std::vector<Finding>();  // it was checked when it was built in
+  if (located->path.empty())
+    return std::vector<Diagnostic>();  // it was checked when it was built in
   auto open = open_chain(located->path, Documents::all, memory_->places, Tables::not_used);
   if (!open) return tl::unexpected(std::move(open.error()));
   const ProfileDraft draft = build(open->chain, Strictness::check, open->findings);

@@ -28,7 +28,7 @@ bool is_tool_name(std::string_view text) {
          });
 }
 
-void check_name(const YamlEntry& entry, Findings& findings) {
+void check_name(const YamlEntry& entry, Diagnostics& findings) {
   if (is_tool_name(entry.key)) return;
   findings.add(entry.key_at,
                fmt::format("name '{}' is not made of the letters a to z and A to Z, digits, '_', "
@@ -36,7 +36,7 @@ void check_name(const YamlEntry& entry, Findings& findings) {
                            entry.key));
 }
 
-std::vector<std::string> read_words(const YamlNode& list, Findings& findings) {
+std::vector<std::string> read_words(const YamlNode& list, Diagnostics& findings) {
   std::vector<std::string> words;
   expect(list, YamlNode::Kind::sequence, findings);
   if (list.kind == YamlNode::Kind::scalar) words.push_back(list.text);  // what was meant by it
@@ -62,7 +62,7 @@ std::optional<std::string> read_torque_unit(YamlMap& map) {
   return std::nullopt;
 }
 
-Tool read_tool(const YamlEntry& entry, Findings& findings) {
+Tool read_tool(const YamlEntry& entry, Diagnostics& findings) {
   check_name(entry, findings);
   Tool tool;
   tool.name = entry.key;
@@ -90,7 +90,7 @@ std::vector<std::string> names_of(const Tools& tools) {
   return names;
 }
 
-void read_group(const YamlEntry& entry, Tools& tools, Findings& findings) {
+void read_group(const YamlEntry& entry, Tools& tools, Diagnostics& findings) {
   check_name(entry, findings);
   std::vector<std::string> members = read_words(entry.value, findings);
   if (entry.value.kind == YamlNode::Kind::sequence && members.empty()) {
@@ -106,7 +106,7 @@ void read_group(const YamlEntry& entry, Tools& tools, Findings& findings) {
   group.insert(group.end(), members.begin(), members.end());
 }
 
-void read_tools(const YamlNode& document, Tools& tools, Findings& findings) {
+void read_tools(const YamlNode& document, Tools& tools, Diagnostics& findings) {
   YamlMap map(document, findings);
   if (const YamlNode* list = map.get("tools", Need::required)) {
     expect(*list, YamlNode::Kind::map, findings);
@@ -129,7 +129,8 @@ std::string beside(const std::string& tools_file, std::string profile) {
 }
 
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, const ReadText& read, Findings& findings) {
+Result<Tools> read_tools_file(const std::string& path, const ReadText& read,
+                              Diagnostics& findings) {
   const auto text = read(path);
   if (!text) return tl::unexpected(text.error());
   const std::size_t file = findings.add_file(path);
@@ -144,7 +145,7 @@ Result<Tools> read_tools_file(const std::string& path, const ReadText& read, Fin
 }
 
 /// What is said of a file that has these faults.
-Error refusal_of(const Findings& findings) {
+Error refusal_of(const Diagnostics& findings) {
   Error error = findings.error();
   if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
   return error;
@@ -155,14 +156,14 @@ Error refusal_of(const Findings& findings) {
 bool may_name_tools(std::string_view word) { return word.starts_with('@') || is_tool_name(word); }
 
 Result<Tools> load_tools(const std::string& path, const ReadText& read) {
-  Findings findings;
+  Diagnostics findings;
   auto tools = read_tools_file(path, read, findings);
   if (!tools || findings.empty()) return tools;
   return tl::unexpected(refusal_of(findings));
 }
 
 Tools salvage_tools(const std::string& path, const ReadText& read) {
-  Findings findings;
+  Diagnostics findings;
   auto tools = read_tools_file(path, read, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
@@ -170,7 +171,7 @@ Tools salvage_tools(const std::string& path, const ReadText& read) {
 }
 
 Result<CheckedTools> check_tools(const std::string& path, const ReadText& read) {
-  Findings findings;
+  Diagnostics findings;
   auto tools = read_tools_file(path, read, findings);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   return CheckedTools{std::move(*tools), findings.list()};

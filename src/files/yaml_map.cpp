@@ -27,20 +27,20 @@ std::string_view describe(YamlNode::Kind kind) {
 
 }  // namespace
 
-bool expect(const YamlNode& node, YamlNode::Kind kind, Findings& findings) {
+bool expect(const YamlNode& node, YamlNode::Kind kind, Diagnostics& findings) {
   if (node.kind == kind) return true;
   findings.add(node.at,
                fmt::format("{} is expected here, not {}", describe(kind), describe(node.kind)));
   return false;
 }
 
-std::optional<std::string> to_text(const YamlNode& node, Findings& findings) {
+std::optional<std::string> to_text(const YamlNode& node, Diagnostics& findings) {
   if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
   return node.text;
 }
 
 std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t maximum,
-                                         Findings& findings) {
+                                         Diagnostics& findings) {
   if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
   const auto number = parse_unsigned(node.text, maximum);
   if (!number) {
@@ -51,7 +51,7 @@ std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t max
 }
 
 std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
-                                    Findings& findings) {
+                                    Diagnostics& findings) {
   if (!expect(node, YamlNode::Kind::scalar, findings)) return std::nullopt;
   const std::string_view text = node.text;
   const std::size_t dots = text.find("..");
@@ -67,7 +67,7 @@ std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
 }
 
 Bytes to_bytes(const YamlNode& node, const std::vector<std::string_view>& words,
-               Findings& findings) {
+               Diagnostics& findings) {
   constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
   Bytes bytes;
   if (!expect(node, YamlNode::Kind::scalar, findings)) return bytes;
@@ -101,7 +101,7 @@ std::string unknown_word(std::string_view what, std::string_view text,
   return fmt::format("unknown {} '{}'; known: {}", what, text, fmt::join(words, ", "));
 }
 
-YamlMap::YamlMap(const YamlNode& map, Findings& findings, const YamlNode* defaults)
+YamlMap::YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* defaults)
     : map_(map), defaults_(defaults), findings_(findings) {
   expect(map, YamlNode::Kind::map, findings);
 }

@@ -26,17 +26,17 @@ struct NumberRange {
 
 // ---- one value: the finding says what was expected; empty when it is not that ----
 
-std::optional<std::string> to_text(const YamlNode& node, Findings& findings);
+std::optional<std::string> to_text(const YamlNode& node, Diagnostics& findings);
 std::optional<std::uint64_t> to_unsigned(const YamlNode& node, std::uint64_t maximum,
-                                         Findings& findings);
+                                         Diagnostics& findings);
 /// "5" is 5..5.
 std::optional<NumberRange> to_range(const YamlNode& node, std::uint64_t maximum,
-                                    Findings& findings);
-bool expect(const YamlNode& node, YamlNode::Kind kind, Findings& findings);
+                                    Diagnostics& findings);
+bool expect(const YamlNode& node, YamlNode::Kind kind, Diagnostics& findings);
 /// The words of the value, each of which is to be a byte of two hexadecimal digits; no byte at all
 /// where one of them is not.
 Bytes to_bytes(const YamlNode& node, const std::vector<std::string_view>& words,
-               Findings& findings);
+               Diagnostics& findings);
 
 /// A whole integer with an optional minus sign, such as the key of a label.
 std::optional<std::int64_t> parse_integer(std::string_view text);
@@ -49,7 +49,7 @@ std::string unknown_word(std::string_view what, std::string_view text,
 class YamlMap {
  public:
   /// `defaults` is asked for keys that are not in the map itself; may be null.
-  YamlMap(const YamlNode& map, Findings& findings, const YamlNode* defaults = nullptr);
+  YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* defaults = nullptr);
 
   /// The value; null when it is not there, with a finding when it is required.
   const YamlNode* get(std::string_view key, Need need = Need::optional);
@@ -88,14 +88,14 @@ class YamlMap {
   void finish();
 
   [[nodiscard]] const YamlNode& node() const { return map_; }
-  [[nodiscard]] Findings& findings() const { return findings_; }
+  [[nodiscard]] Diagnostics& findings() const { return findings_; }
 
  private:
   std::optional<std::uint64_t> number_up_to(std::string_view key, std::uint64_t maximum, Need need);
 
   const YamlNode& map_;
   const YamlNode* defaults_;
-  Findings& findings_;
+  Diagnostics& findings_;
   std::vector<std::string_view> known_;
 };
 

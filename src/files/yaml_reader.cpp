@@ -129,7 +129,7 @@ bool is_null_word(std::string_view text) {
 /// Builds the tree from events; a collection is kept open on a stack until its end.
 class TreeBuilder {
  public:
-  TreeBuilder(Places& places, Findings& findings) : places_(places), findings_(findings) {}
+  TreeBuilder(Places& places, Diagnostics& findings) : places_(places), findings_(findings) {}
 
   [[nodiscard]] YamlNode take() { return std::move(root_); }
 
@@ -246,7 +246,7 @@ class TreeBuilder {
   }
 
   Places& places_;
-  Findings& findings_;
+  Diagnostics& findings_;
   YamlNode root_ = {};
   std::vector<Open> open_;
   std::size_t values_ = 0;
@@ -314,7 +314,7 @@ std::string_view cause_of(std::string_view complaint, const Places& places) {
                               : "something behind a finished value; quote the whole text";
 }
 
-void add_complaint(const Parser& parser, std::size_t file, Places& places, Findings& findings) {
+void add_complaint(const Parser& parser, std::size_t file, Places& places, Diagnostics& findings) {
   const yaml_parser_t& state = parser.state();
   if (!parser.sound() || state.error == YAML_MEMORY_ERROR || state.problem == nullptr) {
     findings.add({file, 1, 1}, "not valid YAML: the parser gave up");
@@ -325,8 +325,8 @@ void add_complaint(const Parser& parser, std::size_t file, Places& places, Findi
   findings.add(at, fmt::format("not valid YAML here: {}", cause_of(state.problem, places)));
 }
 
-void parse_documents(std::string_view text, std::size_t file, Documents wanted, Findings& findings,
-                     std::vector<YamlNode>& documents) {
+void parse_documents(std::string_view text, std::size_t file, Documents wanted,
+                     Diagnostics& findings, std::vector<YamlNode>& documents) {
   Parser parser(text);
   Places places(text, file);
   TreeBuilder builder(places, findings);
@@ -357,7 +357,7 @@ bool declares_tags(std::string_view text) {
 }
 
 /// Checked before the parser sees the text, so that what is wrong is told in our words.
-bool check_characters(std::string_view text, std::size_t file, Findings& findings) {
+bool check_characters(std::string_view text, std::size_t file, Diagnostics& findings) {
   Position at{file, 1, 1};
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint character = first_code_point(text.substr(i));
@@ -395,16 +395,16 @@ Error not_opened(const std::string& path, int code) {
 
 }  // namespace
 
-std::string Finding::to_string() const {
+std::string Diagnostic::to_string() const {
   return fmt::format("{}:{}:{}: {}", file, line, column, message);
 }
 
-std::size_t Findings::add_file(std::string path) {
+std::size_t Diagnostics::add_file(std::string path) {
   files_.push_back(std::move(path));
   return files_.size() - 1;
 }
 
-void Findings::add(const Position& at, std::string message) {
+void Diagnostics::add(const Position& at, std::string message) {
   ++told_;
   if (entries_.size() == most_findings) return;
   auto place = std::lower_bound(
@@ -416,7 +416,7 @@ void Findings::add(const Position& at, std::string message) {
   entries_.insert(place, {at, std::move(message)});
 }
 
-void Findings::add_once(const Position& at, std::string message) {
+void Diagnostics::add_once(const Position& at, std::string message) {
   const auto place = std::lower_bound(
       entries_.begin(), entries_.end(), at,
       [](const Entry& entry, const Position& position) { return entry.at < position; });
@@ -424,8 +424,8 @@ void Findings::add_once(const Position& at, std::string message) {
   if (place == entries_.end() || place->at != at) add(at, std::move(message));
 }
 
-std::vector<Finding> Findings::list() const {
-  std::vector<Finding> findings;
+std::vector<Diagnostic> Diagnostics::list() const {
+  std::vector<Diagnostic> findings;
   findings.reserve(entries_.size());
   for (const Entry& entry : entries_) {
     findings.push_back({files_.at(entry.at.file), entry.at.line, entry.at.column, entry.message});
@@ -433,10 +433,10 @@ std::vector<Finding> Findings::list() const {
   return findings;
 }
 
-Error Findings::error() const {
+Error Diagnostics::error() const {
   const Entry& first = entries_.front();
   const std::string& path = files_.at(first.at.file);
-  std::string message = Finding{path, first.at.line, first.at.column, first.message}.to_string();
+  std::string message = Diagnostic{path, first.at.line, first.at.column, first.message}.to_string();
   if (entries_.size() > 1) {
     message +=
         fmt::format(" (and {} more fault{})", entries_.size() - 1, entries_.size() == 2 ? "" : "s");
@@ -474,7 +474,7 @@ Result<std::string> read_text_file(const std::string& path) {
 }
 
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
-                                 Findings& findings) {
+                                 Diagnostics& findings) {
   std::vector<YamlNode> parsed;
   if (text.size() > largest_file) {
     findings.add({file, 1, 1}, fmt::format("larger than {} bytes", largest_file));

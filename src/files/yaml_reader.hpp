@@ -14,14 +14,14 @@ namespace spindle::files {
 /// A place in one of the files that are read together; line and column count from 1, columns in
 /// bytes as compilers do.
 struct Position {
-  std::size_t file = 0;  ///< as given by Findings::add_file()
+  std::size_t file = 0;  ///< as given by Diagnostics::add_file()
   int line = 1;
   int column = 1;
   friend auto operator<=>(const Position&, const Position&) = default;
 };
 
 /// Faults of several files, collected instead of stopping at the first. Keeps the first thousand.
-class Findings {
+class Diagnostics {
  public:
   /// The number by which positions name this file.
   std::size_t add_file(std::string path);
@@ -35,7 +35,7 @@ class Findings {
   /// How often something was told so far: grows with every fault, also with one told before.
   [[nodiscard]] std::size_t told() const { return told_; }
   /// Sorted by place.
-  [[nodiscard]] std::vector<Finding> list() const;
+  [[nodiscard]] std::vector<Diagnostic> list() const;
   /// The first finding as `bad_file`, and how many there are. Requires at least one.
   [[nodiscard]] Error error() const;
 
@@ -78,6 +78,6 @@ enum class Documents : std::uint8_t { first, all };
 /// returned; empty ones at the end are dropped. Time and memory are bounded whatever the text is:
 /// one that is too large, nested too deep or has too many values is a finding and is not read on.
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,
-                                 Findings& findings);
+                                 Diagnostics& findings);
 
 }  // namespace spindle::files

@@ -164,9 +164,9 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
-  if (options_.past == SessionOptions::Past::shared) doubt_answers(created_);
+  if (options_.past == SessionOptions::Past::shared) require_verification(created_);
   if (options_.past == SessionOptions::Past::doubtful) {
-    doubt_answers(created_);
+    require_verification(created_);
     others_late_until_ = past_until_ = doubtful_until_;
   }
   if (is_rtu()) {
@@ -252,7 +252,7 @@ Result<modbus::Pdu> Session::ask_behind_late(const modbus::Pdu& request) {
   last_round_trip_ = round_trip;
   if (counters_.strays == strays) return answer;
   quarantined_until_ = clock_->now() + options_.answer_timeout;
-  doubt_answers(*quarantined_until_);
+  require_verification(*quarantined_until_);
   return tl::unexpected(Error{.code = Errc::no_answer,
                               .message = "only the late answer to an earlier request came",
                               .hint = "a longer --timeout waits for a slow unit",
@@ -491,7 +491,7 @@ void Session::judge_noise(ByteView bytes) {
   if (!may_be_late()) find(Evidence::noise, "unexpected bytes");
 }
 
-void Session::doubt_answers(TimePoint since) {
+void Session::require_verification(TimePoint since) {
   doubtful_until_ = since + longest_doubt * options_.answer_timeout;
 }
 
@@ -527,7 +527,7 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
   if (!is_rtu()) return answer;
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
-    doubt_answers(*quarantined_until_);
+    require_verification(*quarantined_until_);
     buffer_.clear();
     if (unanswered_.size() == most_unanswered) unanswered_.erase(unanswered_.begin());
     unanswered_.push_back(outstanding.request);

@@ -20,10 +20,10 @@ Behind behind(const link::Endpoint& endpoint) {
 }  // namespace
 
 std::function<Result<std::unique_ptr<link::Transport>>(const link::Endpoint&,
-                                                       const catalogue::LinkFacts&, Duration)>
+                                                       const catalogue::LinkSpec&, Duration)>
 line_opener(Clock& clock, const Interrupt& interrupt) {
   return
-      [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
+      [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkSpec& facts,
                            Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
         if (endpoint.medium == link::Medium::serial) {
           return open_serial(endpoint.device, link::serial_settings(endpoint, facts.serial.line),

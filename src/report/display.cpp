@@ -34,7 +34,7 @@ constexpr std::string_view breaks_and_tabs = "\r\n\t";
 /// Appends the first character of `text` in a harmless form; returns how many bytes it took.
 std::size_t append_printable(std::string& out, std::string_view text) {
   const CodePoint character = first_code_point(text);
-  if (steers(character.value)) {
+  if (is_unsafe_on_terminal(character.value)) {
     const auto value = static_cast<std::uint32_t>(character.value);
     const bool is_byte = value <= 0xFF;
     const bool is_short = value <= 0xFFFF;
@@ -62,7 +62,7 @@ std::size_t display_width(std::string_view text) {
   std::size_t width = 0;
   while (!text.empty()) {
     const CodePoint character = first_code_point(text);
-    width += cells_of(character.value);
+    width += cell_width(character.value);
     text.remove_prefix(character.length);
   }
   return width;
@@ -77,7 +77,7 @@ std::string fitted(std::string_view text, std::size_t cells, Keep keep) {
   if (keep == Keep::end) {
     while (width > room) {
       const CodePoint character = first_code_point(text);
-      width -= cells_of(character.value);
+      width -= cell_width(character.value);
       text.remove_prefix(character.length);
     }
     return std::string(mark).append(text);
@@ -85,7 +85,7 @@ std::string fitted(std::string_view text, std::size_t cells, Keep keep) {
   std::size_t kept = 0;
   for (std::size_t taken = 0;;) {
     const CodePoint character = first_code_point(text.substr(kept));
-    taken += cells_of(character.value);
+    taken += cell_width(character.value);
     if (taken > room) break;
     kept += character.length;
   }

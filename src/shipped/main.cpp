@@ -34,7 +34,8 @@ bool is_sound(const files::ProfileStore& store, const std::string& path) {
     fmt::print(stderr, "{}: {}\n", path, message_of(findings.error()));
     return false;
   }
-  for (const files::Finding& finding : *findings) fmt::print(stderr, "{}\n", finding.to_string());
+  for (const files::Diagnostic& finding : *findings)
+    fmt::print(stderr, "{}\n", finding.to_string());
   return findings->empty();
 }
 

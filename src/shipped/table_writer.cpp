@@ -119,7 +119,7 @@ std::string TableWriter::constant(const T& value) {
 }
 
 std::string TableWriter::add(const catalogue::Profile& profile) { return constant(profile); }
-std::string TableWriter::add(const catalogue::SimulationFacts& facts) { return constant(facts); }
+std::string TableWriter::add(const catalogue::SimulationSpec& facts) { return constant(facts); }
 std::string TableWriter::add(const catalogue::CodeTables& tables) { return constant(tables); }
 
 }  // namespace spindle::shipped

@@ -14,7 +14,7 @@ class TableWriter {
  public:
   /// A constant of this type and value; what is returned is its name.
   std::string add(const catalogue::Profile& profile);
-  std::string add(const catalogue::SimulationFacts& facts);
+  std::string add(const catalogue::SimulationSpec& facts);
   std::string add(const catalogue::CodeTables& tables);
 
   /// A string literal.

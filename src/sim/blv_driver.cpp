@@ -26,7 +26,7 @@ class SimulatedBus final : public BlvBus {
     for (const Raised& warning : options.warnings) {
       trouble_.push_back({warning, &BusUnit::raise_warning});
     }
-    const catalogue::SerialFacts& serial = profile.link.serial;
+    const catalogue::SerialSpec& serial = profile.link.serial;
     const unsigned baud = options.baud == 0 ? serial.line.baud : options.baud;
     if (options.gaps == Gaps::enforced) gap_ = serial.gap_at(baud).value_or(Duration());
   }
@@ -146,7 +146,7 @@ class SimulatedBus final : public BlvBus {
 }  // namespace
 
 std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
-                                     const catalogue::SimulationFacts& start,
+                                     const catalogue::SimulationSpec& start,
                                      const BlvOptions& options) {
   return std::make_unique<SimulatedBus>(profile, options, [&](std::uint8_t address) {
     return std::make_unique<BlvUnit>(profile, start, address, options.configuring);
@@ -154,7 +154,7 @@ std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
 }
 
 std::unique_ptr<BlvBus> make_profile_bus(const catalogue::Profile& profile,
-                                         const catalogue::SimulationFacts& start,
+                                         const catalogue::SimulationSpec& start,
                                          const BlvOptions& options, const Bytes& identity) {
   return std::make_unique<SimulatedBus>(profile, options, [&](std::uint8_t address) {
     return std::make_unique<ProfileUnit>(profile, start, address, identity);

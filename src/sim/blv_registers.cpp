@@ -64,7 +64,7 @@ void write_raw(Registers& words, std::uint16_t first, Kind kind, std::uint32_t r
 }  // namespace
 
 BlvRegisters::BlvRegisters(const catalogue::Profile& profile,
-                           const catalogue::SimulationFacts& start, Layout layout)
+                           const catalogue::SimulationSpec& start, Layout layout)
     : layout_(layout),
       words_{Registers(room, 0), {}},
       holding_end_(layout == Layout::one_map ? map_end : 0) {
@@ -144,7 +144,7 @@ void BlvRegisters::add(const catalogue::Action& action, bool even_pairs) {
 }
 
 /// What has a name already keeps it.
-void BlvRegisters::add(const catalogue::NumberedFacts& facts) {
+void BlvRegisters::add(const catalogue::NumberedSpec& facts) {
   for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
     Place place{.table = facts.table, .cell = {.first = static_cast<std::uint16_t>(number)}};
     place.writable = facts.access == catalogue::Access::read_write;

@@ -26,7 +26,7 @@ class BlvRegisters {
     /// value, else at 0.
     exactly_as_named,
   };
-  BlvRegisters(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+  BlvRegisters(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
                Layout layout = Layout::one_map);
 
   /// Empty when a register does not exist.
@@ -93,7 +93,7 @@ class BlvRegisters {
   /// `is_word`: it is the word that commands the motor.
   void add(const catalogue::Parameter& parameter, bool is_word);
   void add(const catalogue::Action& action, bool even_pairs);
-  void add(const catalogue::NumberedFacts& facts);
+  void add(const catalogue::NumberedSpec& facts);
   void begin(const catalogue::Parameter& parameter);
   [[nodiscard]] bool exists(modbus::RegisterTable table, std::uint16_t first,
                             std::size_t quantity) const;

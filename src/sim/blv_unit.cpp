@@ -37,18 +37,18 @@ constexpr std::string_view alarms = "alarm.history";
 constexpr std::string_view warnings = "warning.history";
 constexpr std::string_view errors = "communication-error.history";
 
-catalogue::CommandWordFacts word_facts(const catalogue::Profile& profile) {
+catalogue::CommandWordSpec word_facts(const catalogue::Profile& profile) {
   const auto* facts = profile.run ? profile.run->word() : nullptr;
-  return facts == nullptr ? catalogue::CommandWordFacts{} : *facts;
+  return facts == nullptr ? catalogue::CommandWordSpec{} : *facts;
 }
 
 }  // namespace
 
-BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
                  std::uint8_t address, Duration configuring)
     : address_(address),
       run_(word_facts(profile)),
-      refusals_(profile.refusals.value_or(catalogue::RefusalFacts{})),
+      refusals_(profile.refusals.value_or(catalogue::RefusalSpec{})),
       permanent_alarms_(start.permanent_alarms.begin(), start.permanent_alarms.end()),
       max_read_(profile.link.max_read),
       max_write_(profile.link.max_write),
@@ -308,7 +308,7 @@ std::uint32_t BlvUnit::mask_of(const std::string& parameter, std::string_view bi
 
 std::uint16_t BlvUnit::standard_word() const {
   const auto word = static_cast<std::uint16_t>(registers_.get(run_.command));
-  const catalogue::InputFacts& inputs = run_.inputs;
+  const catalogue::InputSpec& inputs = run_.inputs;
   if (inputs.parameter.empty()) return word;
   std::vector<std::int64_t> numbers;
   for (std::uint16_t n = inputs.first; n <= inputs.last; ++n) {

@@ -17,7 +17,7 @@ namespace spindle::sim {
 class BlvUnit final : public BusUnit {
  public:
   /// `configuring`: how long Configuration takes.
-  BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+  BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
           std::uint8_t address, Duration configuring);
 
   [[nodiscard]] std::uint8_t address() const override { return address_; }
@@ -92,8 +92,8 @@ class BlvUnit final : public BusUnit {
   [[nodiscard]] std::optional<TimePoint> watchdog_due() const;
 
   std::uint8_t address_;
-  catalogue::CommandWordFacts run_;
-  catalogue::RefusalFacts refusals_;
+  catalogue::CommandWordSpec run_;
+  catalogue::RefusalSpec refusals_;
   std::vector<catalogue::Parameter> words_;  ///< with the names of bits
   std::vector<std::int64_t> permanent_alarms_;
   std::uint16_t max_read_;

@@ -7,7 +7,7 @@
 namespace spindle::sim {
 namespace {
 
-using catalogue::IdentityFacts;
+using catalogue::IdentitySpec;
 using catalogue::Slice;
 
 bool holds(ByteView bytes, Slice slice) {
@@ -47,18 +47,18 @@ std::uint64_t get_number(ByteView bytes, Slice slice) {
 
 enum class SerialForm : std::uint8_t { number, pairs };
 
-SerialForm form_of(const IdentityFacts& facts, std::size_t size) {
+SerialForm form_of(const IdentitySpec& facts, std::size_t size) {
   const bool is_long = facts.long_serial_bytes > 0 && size >= facts.long_serial_bytes;
   return is_long ? SerialForm::pairs : SerialForm::number;
 }
 
-std::uint64_t get_serial(const IdentityFacts& facts, ByteView bytes, SerialForm form) {
+std::uint64_t get_serial(const IdentitySpec& facts, ByteView bytes, SerialForm form) {
   const Slice slice = form == SerialForm::pairs ? facts.long_serial : facts.serial;
   if (!holds(bytes, slice)) return 0;
   return form == SerialForm::pairs ? get_pairs(bytes, slice) : get_number(bytes, slice);
 }
 
-void put_serial(const IdentityFacts& facts, Bytes& bytes, std::uint64_t serial) {
+void put_serial(const IdentitySpec& facts, Bytes& bytes, std::uint64_t serial) {
   if (form_of(facts, bytes.size()) == SerialForm::pairs) {
     put_pairs(bytes, facts.long_serial, serial);
   } else {
@@ -68,8 +68,8 @@ void put_serial(const IdentityFacts& facts, Bytes& bytes, std::uint64_t serial) 
 
 }  // namespace
 
-Bytes make_identity(const std::optional<IdentityFacts>& facts,
-                    const catalogue::SimulationFacts& start, const BmOptions& options) {
+Bytes make_identity(const std::optional<IdentitySpec>& facts,
+                    const catalogue::SimulationSpec& start, const BmOptions& options) {
   const std::size_t usual = start.identity_bytes > 0 ? start.identity_bytes : start.identity.size();
   Bytes identity(start.identity.begin(), start.identity.end());
   constexpr std::size_t most = modbus::max_pdu_size - 2;

@@ -10,7 +10,7 @@ namespace spindle::sim {
 /// or padded to the length asked for, with the options' numbers in the places that the profile
 /// names. The start state has its serial number in the form of its usual length; another length
 /// gets the same serial in its own form.
-Bytes make_identity(const std::optional<catalogue::IdentityFacts>& facts,
-                    const catalogue::SimulationFacts& start, const BmOptions& options);
+Bytes make_identity(const std::optional<catalogue::IdentitySpec>& facts,
+                    const catalogue::SimulationSpec& start, const BmOptions& options);
 
 }  // namespace spindle::sim

@@ -47,7 +47,7 @@ bool accepts(const catalogue::Action& action, std::uint16_t value) {
 
 class SimulatedBm final : public BmTool {
  public:
-  SimulatedBm(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+  SimulatedBm(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
               const BmOptions& options);
 
   std::optional<Pdu> answer(ConnectionId connection, modbus::UnitId unit, const Pdu& request,
@@ -135,7 +135,7 @@ class SimulatedBm final : public BmTool {
   unsigned triggers_ = 0;
 };
 
-SimulatedBm::SimulatedBm(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+SimulatedBm::SimulatedBm(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
                          const BmOptions& options)
     : registers_(profile, start),
       events_(profile),
@@ -456,7 +456,7 @@ void SimulatedBm::reboot(TimePoint now) {
 }  // namespace
 
 std::unique_ptr<BmTool> make_bm_tool(const catalogue::Profile& profile,
-                                     const catalogue::SimulationFacts& start,
+                                     const catalogue::SimulationSpec& start,
                                      const BmOptions& options) {
   return std::make_unique<SimulatedBm>(profile, start, options);
 }

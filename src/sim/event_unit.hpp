@@ -20,7 +20,7 @@ class EventUnit {
   /// Without events nothing ever happens.
   explicit EventUnit(const catalogue::Profile& profile) : facts_(profile.events) {}
 
-  [[nodiscard]] const std::optional<catalogue::EventFacts>& facts() const { return facts_; }
+  [[nodiscard]] const std::optional<catalogue::EventSpec>& facts() const { return facts_; }
 
   /// Whether the product has a word for it.
   [[nodiscard]] bool knows(catalogue::EventKind kind) const;
@@ -54,7 +54,7 @@ class EventUnit {
   void reboot(RegisterBank& bank);
 
  private:
-  std::optional<catalogue::EventFacts> facts_;
+  std::optional<catalogue::EventSpec> facts_;
   std::map<ConnectionId, TimePoint> armed_until_ = {};
   std::vector<Push> pushes_ = {};
 };

@@ -27,9 +27,9 @@ constexpr std::size_t mbap_protocol_at = 2;
 constexpr std::size_t mbap_length_at = 4;
 
 // The faults that strike one answer.
-class Strikes {
+class ActiveFaults {
  public:
-  Strikes(const FaultPlan& plan, std::uint32_t answer_number) {
+  ActiveFaults(const FaultPlan& plan, std::uint32_t answer_number) {
     for (const Fault& fault : plan) {
       if (fault.strikes(answer_number)) faults_.push_back(&fault);
     }
@@ -88,7 +88,7 @@ void lengthen(modbus::Pdu& pdu, std::uint16_t registers) {
   pdu.data.insert(pdu.data.end(), extra, 0);
 }
 
-void spoil_pdu(modbus::Pdu& pdu, const Strikes& strikes) {
+void spoil_pdu(modbus::Pdu& pdu, const ActiveFaults& strikes) {
   if (strikes.has(FaultKind::wrong_echo) && is_echo(pdu.function)) {
     const std::size_t value_at = pdu.data.size() - 2;
     set_u16(pdu.data, value_at, static_cast<std::uint16_t>(get_u16(pdu.data, value_at) + 1));
@@ -99,7 +99,7 @@ void spoil_pdu(modbus::Pdu& pdu, const Strikes& strikes) {
   }
 }
 
-void spoil_addressing(modbus::Adu& adu, const Strikes& strikes) {
+void spoil_addressing(modbus::Adu& adu, const ActiveFaults& strikes) {
   if (const Fault* fault = strikes.find(FaultKind::wrong_unit)) {
     adu.unit.value = static_cast<std::uint8_t>(number_of(*fault));
   }
@@ -108,7 +108,7 @@ void spoil_addressing(modbus::Adu& adu, const Strikes& strikes) {
   }
 }
 
-void spoil_header(Bytes& bytes, const Strikes& strikes) {
+void spoil_header(Bytes& bytes, const ActiveFaults& strikes) {
   if (const Fault* fault = strikes.find(FaultKind::wrong_protocol)) {
     set_u16(bytes, mbap_protocol_at, number_of(*fault));
   }
@@ -121,7 +121,7 @@ void spoil_header(Bytes& bytes, const Strikes& strikes) {
 }
 
 // Everything that replaces, cuts or repeats the finished frame.
-Bytes spoil_frame(Bytes bytes, const Strikes& strikes) {
+Bytes spoil_frame(Bytes bytes, const ActiveFaults& strikes) {
   if (strikes.has(FaultKind::lost) || strikes.has(FaultKind::close)) return {};
   if (const Fault* fault = strikes.find(FaultKind::garbage)) {
     bytes.assign(number_of(*fault), noise_byte);
@@ -139,7 +139,7 @@ Bytes spoil_frame(Bytes bytes, const Strikes& strikes) {
   return bytes;
 }
 
-Bytes spoiled(Framing framing, modbus::Adu adu, const Strikes& strikes) {
+Bytes spoiled(Framing framing, modbus::Adu adu, const ActiveFaults& strikes) {
   spoil_pdu(adu.pdu, strikes);
   spoil_addressing(adu, strikes);
   Bytes bytes = modbus::frame(framing, adu);
@@ -148,7 +148,7 @@ Bytes spoiled(Framing framing, modbus::Adu adu, const Strikes& strikes) {
   return spoil_frame(std::move(bytes), strikes);
 }
 
-bool closes(const Strikes& strikes) {
+bool closes(const ActiveFaults& strikes) {
   return strikes.has(FaultKind::close) || strikes.has(FaultKind::close_inside) ||
          strikes.has(FaultKind::close_after);
 }
@@ -259,7 +259,7 @@ void Peer::receive(ByteView bytes, TimePoint now) {
 }
 
 void Peer::echo(ByteView bytes, TimePoint now) {
-  const Strikes strikes(*faults_, counter_->value + 1);
+  const ActiveFaults strikes(*faults_, counter_->value + 1);
   if (!strikes.has(FaultKind::echo)) return;
   enqueue(
       {.due = now + time_on_the_wire(bytes.size()), .pieces = {Bytes(bytes.begin(), bytes.end())}});
@@ -301,7 +301,7 @@ bool Peer::take_request(TimePoint now) {
   if (framing_ == Framing::tcp) {
     ignore(inbox_,
            fmt::format("this is not Modbus TCP ({}), so the connection is closed", junk->reason));
-    hang_up(now);
+    disconnect(now);
     return false;
   }
   const std::size_t dropped = std::clamp<std::size_t>(junk->size, 1, inbox_.size());
@@ -321,7 +321,7 @@ std::optional<modbus::Pdu> Peer::respond(const modbus::Adu& request, const Fault
 }
 
 void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
-  const Strikes strikes(*faults_, counter_->value + 1);
+  const ActiveFaults strikes(*faults_, counter_->value + 1);
   unit_ = request.unit;
   const auto response = respond(request, strikes.find(FaultKind::exception), now);
   const bool broadcast = framing_ == Framing::rtu && request.unit == modbus::UnitId{};
@@ -378,7 +378,7 @@ void Peer::push(const modbus::Pdu& pdu, TimePoint now) {
   enqueue({.due = now, .pieces = {modbus::frame(framing_, {{push_transaction_++}, unit_, pdu})}});
 }
 
-void Peer::hang_up(TimePoint now) {
+void Peer::disconnect(TimePoint now) {
   deaf_ = true;
   inbox_.clear();
   enqueue({.due = std::max(now, in_order_from_), .ending = Ending::close});

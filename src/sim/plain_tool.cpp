@@ -30,7 +30,7 @@ std::string present_alarm(const catalogue::Profile& profile) {
 
 class SimulatedPlain final : public PlainTool {
  public:
-  SimulatedPlain(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+  SimulatedPlain(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
                  const PlainOptions& options);
 
   std::optional<Pdu> answer(ConnectionId connection, modbus::UnitId unit, const Pdu& request,
@@ -64,8 +64,8 @@ class SimulatedPlain final : public PlainTool {
   EventUnit events_;
   FaultyStore store_;
   catalogue::List<catalogue::Action> actions_;
-  catalogue::LinkFacts link_;
-  catalogue::List<catalogue::SimulationFacts::Event> told_;  ///< what events say, in turn
+  catalogue::LinkSpec link_;
+  catalogue::List<catalogue::SimulationSpec::Event> told_;  ///< what events say, in turn
   std::map<EventKind, std::size_t> turns_ = {};
   std::uint8_t limit_exception_;
   Bytes identity_;
@@ -77,7 +77,7 @@ class SimulatedPlain final : public PlainTool {
 };
 
 SimulatedPlain::SimulatedPlain(const catalogue::Profile& profile,
-                               const catalogue::SimulationFacts& start, const PlainOptions& options)
+                               const catalogue::SimulationSpec& start, const PlainOptions& options)
     : registers_(profile, start),
       events_(profile),
       store_(options.faults),
@@ -229,7 +229,7 @@ void SimulatedPlain::reboot(TimePoint now) {
 }  // namespace
 
 std::unique_ptr<PlainTool> make_plain_tool(const catalogue::Profile& profile,
-                                           const catalogue::SimulationFacts& start,
+                                           const catalogue::SimulationSpec& start,
                                            const PlainOptions& options) {
   return std::make_unique<SimulatedPlain>(profile, start, options);
 }

@@ -7,7 +7,7 @@
 namespace spindle::sim {
 namespace {
 
-using catalogue::CommandRegisterFacts;
+using catalogue::CommandRegisterSpec;
 using catalogue::Parameter;
 using modbus::ExceptionCode;
 using modbus::Pdu;
@@ -25,7 +25,7 @@ std::uint8_t code_of(ExceptionCode code) { return static_cast<std::uint8_t>(code
 
 }  // namespace
 
-ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
                          std::uint8_t address, Bytes identity)
     : address_(address),
       permanent_alarms_(start.permanent_alarms),
@@ -146,7 +146,7 @@ void ProfileUnit::act_on(const BlvRegisters::Cell& cell, std::uint32_t raw, Time
 // ---- the motor, in steps of its set-point ----
 
 bool ProfileUnit::is_enabled() const {
-  const catalogue::EnableFacts& enable = run_->enable;
+  const catalogue::EnableSpec& enable = run_->enable;
   if (enable.parameter.empty()) return true;
   const std::uint32_t value = number(enable.parameter);
   return enable.bit ? (value >> *enable.bit & 1U) != 0 : value == enable.value;
@@ -154,7 +154,7 @@ bool ProfileUnit::is_enabled() const {
 
 ProfileUnit::Wish ProfileUnit::wish() const {
   if (stopped_) return Wish::stop;
-  const catalogue::EnableFacts& enable = run_->enable;
+  const catalogue::EnableSpec& enable = run_->enable;
   std::uint32_t value = number(run_->command);
   if (enable.bit && enable.parameter == run_->command) value &= ~(std::uint32_t{1} << *enable.bit);
   if (value == run_->forward) return Wish::forward;
@@ -189,7 +189,7 @@ void ProfileUnit::obey(TimePoint now) {
 }
 
 std::int64_t ProfileUnit::status(TimePoint now) const {
-  const catalogue::MonitorFacts& monitor = run_->monitor;
+  const catalogue::MonitorSpec& monitor = run_->monitor;
   const bool moves = motor_.moves(now);
   if (!monitor.running) {
     const auto& values = moves ? monitor.running_values : monitor.stopped_values;

@@ -18,7 +18,7 @@ namespace spindle::sim {
 class ProfileUnit final : public BusUnit {
  public:
   /// `identity`: the bytes of its answer to FC 11h; empty: it has none.
-  ProfileUnit(const catalogue::Profile& profile, const catalogue::SimulationFacts& start,
+  ProfileUnit(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
               std::uint8_t address, Bytes identity);
 
   [[nodiscard]] std::uint8_t address() const override { return address_; }
@@ -52,7 +52,7 @@ class ProfileUnit final : public BusUnit {
 
   std::uint8_t address_;
   std::vector<catalogue::Parameter> parameters_;  ///< those that `run` names
-  std::optional<catalogue::CommandRegisterFacts> run_ = std::nullopt;
+  std::optional<catalogue::CommandRegisterSpec> run_ = std::nullopt;
   std::optional<catalogue::Action> alarm_reset_ = std::nullopt;
   catalogue::List<std::int64_t> permanent_alarms_;
   std::uint8_t limit_exception_;

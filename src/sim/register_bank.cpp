@@ -25,7 +25,7 @@ std::int64_t number_in(std::uint16_t word, Kind kind) {
 }  // namespace
 
 RegisterBank::RegisterBank(const catalogue::Profile& profile,
-                           const catalogue::SimulationFacts& start) {
+                           const catalogue::SimulationSpec& start) {
   named_.reserve(profile.parameters.size());
   for (const catalogue::Parameter& parameter : profile.parameters) add_parameter(parameter);
   std::sort(named_.begin(), named_.end(),
@@ -140,7 +140,7 @@ void RegisterBank::add_parameter(const catalogue::Parameter& parameter) {
 }
 
 // A register that has a name already keeps what its name says of it.
-void RegisterBank::add_numbered(const catalogue::NumberedFacts& facts) {
+void RegisterBank::add_numbered(const catalogue::NumberedSpec& facts) {
   numbered_ = facts;
   for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
     const auto address = static_cast<std::uint16_t>(number);
@@ -152,7 +152,7 @@ void RegisterBank::add_numbered(const catalogue::NumberedFacts& facts) {
   }
 }
 
-void RegisterBank::add_event_block(const catalogue::EventFacts& facts) {
+void RegisterBank::add_event_block(const catalogue::EventSpec& facts) {
   for (std::uint16_t i = 0; i < facts.count; ++i) {
     const auto address = static_cast<std::uint16_t>(facts.first + i);
     words(catalogue::table_of(facts)).put_if_absent(address, 0);
@@ -210,7 +210,7 @@ void RegisterBank::start_limits(const Place& place, std::int64_t minimum, std::i
   found->second.maximum = maximum;
 }
 
-void RegisterBank::add_mirrors(const catalogue::LimitFacts& facts) {
+void RegisterBank::add_mirrors(const catalogue::LimitSpec& facts) {
   for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
     const auto found = writable_.find(static_cast<std::uint16_t>(number));
     if (found == writable_.end()) continue;
@@ -223,7 +223,7 @@ void RegisterBank::add_mirrors(const catalogue::LimitFacts& facts) {
 }
 
 void RegisterBank::remove(const catalogue::Area& area,
-                          const std::optional<catalogue::LimitFacts>& limits) {
+                          const std::optional<catalogue::LimitSpec>& limits) {
   for (std::uint32_t number = area.from; number <= area.to; ++number) {
     const auto address = static_cast<std::uint16_t>(number);
     words(area.table).erase(address);

@@ -23,7 +23,7 @@ enum class WriteVerdict : std::uint8_t { allowed, no_such_register, outside_limi
 /// A hole has no mirrors either. Keeps no reference to the profile.
 class RegisterBank {
  public:
-  RegisterBank(const catalogue::Profile& profile, const catalogue::SimulationFacts& start);
+  RegisterBank(const catalogue::Profile& profile, const catalogue::SimulationSpec& start);
 
   /// Empty when one of the registers does not exist.
   [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
@@ -87,18 +87,18 @@ class RegisterBank {
   [[nodiscard]] const Words& words(modbus::RegisterTable table) const;
   [[nodiscard]] Words& words(modbus::RegisterTable table);
   void add_parameter(const catalogue::Parameter& parameter);
-  void add_numbered(const catalogue::NumberedFacts& facts);
-  void add_event_block(const catalogue::EventFacts& facts);
+  void add_numbered(const catalogue::NumberedSpec& facts);
+  void add_event_block(const catalogue::EventSpec& facts);
   [[nodiscard]] std::optional<Place> find(std::string_view name) const;
   [[nodiscard]] std::vector<Place> matching(std::string_view pattern) const;
   void add_numbered_matching(std::string_view pattern, std::vector<Place>& found) const;
   void start_value(const Place& place, std::int64_t raw);
   void start_limits(const Place& place, std::int64_t minimum, std::int64_t maximum);
-  void add_mirrors(const catalogue::LimitFacts& facts);
-  void remove(const catalogue::Area& area, const std::optional<catalogue::LimitFacts>& limits);
+  void add_mirrors(const catalogue::LimitSpec& facts);
+  void remove(const catalogue::Area& area, const std::optional<catalogue::LimitSpec>& limits);
 
   std::vector<Named> named_ = {};  ///< by name
-  std::optional<catalogue::NumberedFacts> numbered_ = std::nullopt;
+  std::optional<catalogue::NumberedSpec> numbered_ = std::nullopt;
   Words holding_ = {};
   Words input_ = {};
   std::map<std::uint16_t, Limits> writable_ = {};

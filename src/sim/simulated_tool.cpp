@@ -10,7 +10,7 @@ namespace {
 
 using catalogue::Profile;
 
-const catalogue::MonitorFacts* monitor_of(const Profile& profile) {
+const catalogue::MonitorSpec* monitor_of(const Profile& profile) {
   if (!profile.run) return nullptr;
   if (const auto* word = profile.run->word()) return &word->monitor;
   const auto* values = profile.run->command_register();
@@ -42,7 +42,7 @@ PlainOptions plain_options(const BmOptions& tool) {
 }  // namespace
 
 Abilities abilities_of(const Profile& profile) {
-  const catalogue::MonitorFacts* monitor = monitor_of(profile);
+  const catalogue::MonitorSpec* monitor = monitor_of(profile);
   const bool operated = is_operated(profile);
   const bool pushes = operated && catalogue::sends_unasked(profile);
   // The identity of a tool that waits to be asked for its results is that of its start state.
@@ -56,7 +56,7 @@ Abilities abilities_of(const Profile& profile) {
 }
 
 std::unique_ptr<Server> make_simulated_server(const Profile& profile,
-                                              const catalogue::SimulationFacts& start,
+                                              const catalogue::SimulationSpec& start,
                                               const BmOptions& tool, const BlvOptions& bus) {
   if (has_command_word(profile)) return make_blv_bus(profile, start, bus);
   if (is_operated(profile)) {

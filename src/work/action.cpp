@@ -75,7 +75,7 @@ catalogue::Secrecy secrecy_of(const Action& action, const Profile& profile) {
 Result<device::ActionResult> perform_action(const ActionRequest& request, OpenTool& tool,
                                             const Environment& environment) {
   const Action& action = request.action;
-  const bool everybody = tool.target.reach == Reach::everybody;
+  const bool everybody = tool.target.addressing == Addressing::broadcast;
   if (action.motion == catalogue::Motion::stop) {
     return stop_motor(tool, catalogue::StopMode::decelerate, environment).map(in_words_of_actions);
   }

@@ -8,9 +8,9 @@ namespace spindle::work {
 
 using catalogue::Parameter;
 using catalogue::Value;
-using device::PutBack;
+using device::JournalEntry;
 using device::PutBackReport;
-using device::TriedWrite;
+using device::RollbackResult;
 using device::Written;
 
 bool is_interruption(const Error& error) {
@@ -46,14 +46,14 @@ Written Changer::make(const Parameter& parameter, const Value& before, const Val
 std::vector<PutBackReport> Changer::put_back(device::Rollback& rollback) {
   std::string id;
   device::RollbackObserver observer;
-  observer.begin = [&](const TriedWrite& write) {
+  observer.begin = [&](const JournalEntry& write) {
     id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
   };
   observer.end = [&](const PutBackReport& report) {
     const auto& write = report.write;
-    if (report.result == PutBack::kept) return;
+    if (report.result == RollbackResult::kept) return;
     if (id.empty()) id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
-    const bool done = report.result == PutBack::done;
+    const bool done = report.result == RollbackResult::done;
     log_->end(std::exchange(id, {}),
               done ? logged(write.parameter, report.found.value_or(write.tried), write.before,
                             "rolled-back")

@@ -89,7 +89,7 @@ Result<void> find_profile(OpenTool& tool, const Environment& environment) {
 std::string other_port_hint(const Environment& environment) {
   for (const files::ProfileEntry& entry : environment.profiles.list()) {
     const auto profile = environment.profiles.load(entry.id);
-    if (!profile || profile->link.port == catalogue::LinkFacts().port) continue;
+    if (!profile || profile->link.port == catalogue::LinkSpec().port) continue;
     return fmt::format("no port is named, and {} tools listen on port {}: add :{} or --profile {}",
                        profile->series, profile->link.port, profile->link.port, profile->id);
   }
@@ -115,14 +115,14 @@ Target known_target(const OpenTool& tool) {
   return known;
 }
 
-Result<void> check_reach(const Target& target, const catalogue::Profile& profile) {
+Result<void> check_addressing(const Target& target, const catalogue::Profile& profile) {
   const bool serial_line = target.endpoint.medium == link::Medium::serial ||
                            target.endpoint.medium == link::Medium::rtu_over_tcp;
   const bool serial_product = profile.link.framing == modbus::Framing::rtu;
   const std::uint8_t unit = target.endpoint.unit.value_or(modbus::UnitId{profile.link.unit}).value;
   const bool meant = serial_product || (serial_line && target.endpoint.unit);
   const bool everybody = meant && unit == 0;
-  if (everybody == (target.reach == Reach::everybody)) return {};
+  if (everybody == (target.addressing == Addressing::broadcast)) return {};
   Error error{.code = Errc::usage};
   if (everybody) {
     error.message = "unit 0 is every unit on the line, and none answers";
@@ -145,7 +145,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
                                       const Environment& environment,
                                       SimulatedOperator simulated_operator,
                                       link::SessionOptions::Past past) {
-  if (auto meant = check_reach(target, profile); !meant) {
+  if (auto meant = check_addressing(target, profile); !meant) {
     return tl::unexpected(std::move(meant.error()));
   }
   device::LinkOptions options = link_options(target, profile, environment);

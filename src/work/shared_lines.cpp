@@ -19,7 +19,7 @@ SharedLines::SharedLines(const std::vector<Target>& targets, const Environment& 
 }
 
 device::OpenTransport SharedLines::opener() {
-  return [this](const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
+  return [this](const link::Endpoint& endpoint, const catalogue::LinkSpec& facts,
                 Duration connect_timeout) {
     const auto open = [&] { return (*open_)(endpoint, facts, connect_timeout); };
     const auto line = lines_.find(shared_line(endpoint));
@@ -28,7 +28,7 @@ device::OpenTransport SharedLines::opener() {
 }
 
 Result<void> check_same_settings(const std::vector<Target>& targets,
-                                 const std::vector<catalogue::LinkFacts>& facts) {
+                                 const std::vector<catalogue::LinkSpec>& facts) {
   const auto settings = [&](std::size_t index) {
     const link::Endpoint& endpoint = targets[index].endpoint;
     return std::pair(link::serial_settings(endpoint, facts[index].serial.line), endpoint.switching);
@@ -53,8 +53,8 @@ Result<std::vector<Target>> resolve_compatible_targets(const std::vector<std::st
   if (!targets) return targets;
   const auto lines = by_line(*targets);
   if (lines.size() == targets->size()) return targets;  // each has a line of its own
-  std::map<std::string, catalogue::LinkFacts> known;    // each profile is read once
-  std::vector<catalogue::LinkFacts> facts;
+  std::map<std::string, catalogue::LinkSpec> known;     // each profile is read once
+  std::vector<catalogue::LinkSpec> facts;
   for (const Target& target : *targets) {
     const auto [entry, is_new] = known.try_emplace(target.profile);
     if (is_new) {

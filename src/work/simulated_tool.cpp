@@ -16,7 +16,7 @@ namespace {
 const std::vector<modbus::UnitId> simulated_bus = {{1}, {2}, {3}};
 
 std::vector<modbus::UnitId> units_for(const link::Endpoint& endpoint,
-                                      const catalogue::LinkFacts& facts) {
+                                      const catalogue::LinkSpec& facts) {
   const modbus::UnitId unit = endpoint.unit.value_or(modbus::UnitId{facts.unit});
   return unit.value == 0 ? simulated_bus : std::vector<modbus::UnitId>{unit};
 }
@@ -36,7 +36,7 @@ sim::BlvOptions bus_options(const SimulatedToolOptions& options) {
 Result<void> check_identity_bytes(const catalogue::Profile& profile,
                                   std::optional<std::size_t> bytes) {
   if (!bytes || !profile.identity) return {};
-  const catalogue::IdentityFacts& facts = *profile.identity;
+  const catalogue::IdentitySpec& facts = *profile.identity;
   std::set<std::size_t> known = {facts.minimum_bytes, facts.long_serial_bytes, facts.total_bytes};
   known.erase(0);
   if (known.contains(*bytes)) return {};
@@ -49,7 +49,7 @@ Result<void> check_identity_bytes(const catalogue::Profile& profile,
 
 /// The state machine for this kind of tool.
 Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profile,
-                                                 const catalogue::SimulationFacts& start,
+                                                 const catalogue::SimulationSpec& start,
                                                  const SimulatedToolOptions& options) {
   if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
     return tl::unexpected(std::move(known.error()));
@@ -73,7 +73,7 @@ Result<SimulatedTool> make_simulated_tool(const std::string& profile,
   return SimulatedTool{std::move(*loaded), std::move(*server)};
 }
 
-modbus::SerialSettings simulated_line(const catalogue::LinkFacts& facts,
+modbus::SerialSettings simulated_line(const catalogue::LinkSpec& facts,
                                       std::optional<unsigned> baud) {
   return link::serial_settings({.baud = baud}, facts.serial.line);
 }
@@ -81,7 +81,7 @@ modbus::SerialSettings simulated_line(const catalogue::LinkFacts& facts,
 device::OpenTransport with_simulated_tools(const Environment& environment,
                                            SimulatedToolOptions options) {
   return [&environment, options = std::move(options)](
-             const link::Endpoint& endpoint, const catalogue::LinkFacts& facts,
+             const link::Endpoint& endpoint, const catalogue::LinkSpec& facts,
              Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
     if (endpoint.medium != link::Medium::simulated) {
       return environment.open(endpoint, facts, connect_timeout);

@@ -20,12 +20,12 @@ Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Environment& environment) {
   const auto model = device::RunModel::of(*tool.profile);
   if (!model) return tl::unexpected(model.error());
-  if (tool.target.reach == Reach::everybody) {
+  if (tool.target.addressing == Addressing::broadcast) {
     return broadcast_stop(tool.device, **model, mode).map([] { return device::StopResult::sent; });
   }
   const auto stopper = (*model)->stopper(mode);
   tool.device.set_retries(0);  // it is better to send the stop soon, and again
-  tool.device.session().waive_proofs();
+  tool.device.session().skip_verification();
   stopper->observe(tool.device);
   auto stopped = stopper->stop(tool.device, environment.clock);
   for (int again = 1; again < most_stops && leaves_open(stopped); ++again) {

@@ -14,13 +14,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto file = files::read_backup(text, "backup.yaml");
   require(file || file.error().status() == ExitStatus::bad_file);
   if (!file) return 0;
-  const auto snapshot = files::understand_backup(*file, profile);
+  const auto snapshot = files::resolve_backup(*file, profile);
   require(snapshot || snapshot.error().status() == ExitStatus::bad_file);
   if (!snapshot) return 0;
   const std::string rendered = files::render_backup(*snapshot);
   const auto again =
       files::read_backup(rendered, "again.yaml").and_then([](const files::BackupFile& read) {
-        return files::understand_backup(read, profile);
+        return files::resolve_backup(read, profile);
       });
   require(again.has_value());
   require(files::render_backup(*again) == rendered);

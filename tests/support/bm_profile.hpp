@@ -17,40 +17,40 @@ inline catalogue::Profile bm_profile() {
   profile.id = "bm";
   profile.link.port = 5000;
   profile.link.max_read = 100;
-  profile.identity = IdentityFacts{.minimum_bytes = 12,
-                                   .id = {0, 2},
-                                   .controller_model = {2, 2},
-                                   .tool_model = {4, 2},
-                                   .firmware = {6, 2},
-                                   .serial = {8, 4},
-                                   .long_serial_bytes = 13,
-                                   .long_serial = {8, 5},
-                                   .products = {},
-                                   .total_bytes = 17,
-                                   .total = {13, 4},
-                                   .models = {}};
-  profile.events = EventFacts{.arm = catalogue::Arming{.address = 4002,
-                                                       .every = std::chrono::seconds(5),
-                                                       .expires = std::chrono::seconds(10)},
-                              .function = 4,
-                              .first = 3200,
-                              .count = 14,
-                              .number = "event.number",
-                              .kind = "event.status",
-                              .kinds = {{0, EventKind::other},
-                                        {1, EventKind::fastening_ok},
-                                        {2, EventKind::fastening_ng},
-                                        {3, EventKind::direction_change},
-                                        {4, EventKind::preset_change},
-                                        {5, EventKind::alarm_reset},
-                                        {6, EventKind::error}},
-                              .error = "event.error"};
-  profile.limits = LimitFacts{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
-  profile.numbered = NumberedFacts{.prefix = "p",
-                                   .from = 1,
-                                   .to = 725,
-                                   .access = Access::read_write,
-                                   .source = "60427 section 3.1"};
+  profile.identity = IdentitySpec{.minimum_bytes = 12,
+                                  .id = {0, 2},
+                                  .controller_model = {2, 2},
+                                  .tool_model = {4, 2},
+                                  .firmware = {6, 2},
+                                  .serial = {8, 4},
+                                  .long_serial_bytes = 13,
+                                  .long_serial = {8, 5},
+                                  .products = {},
+                                  .total_bytes = 17,
+                                  .total = {13, 4},
+                                  .models = {}};
+  profile.events = EventSpec{.arm = catalogue::Arming{.address = 4002,
+                                                      .every = std::chrono::seconds(5),
+                                                      .expires = std::chrono::seconds(10)},
+                             .function = 4,
+                             .first = 3200,
+                             .count = 14,
+                             .number = "event.number",
+                             .kind = "event.status",
+                             .kinds = {{0, EventKind::other},
+                                       {1, EventKind::fastening_ok},
+                                       {2, EventKind::fastening_ng},
+                                       {3, EventKind::direction_change},
+                                       {4, EventKind::preset_change},
+                                       {5, EventKind::alarm_reset},
+                                       {6, EventKind::error}},
+                             .error = "event.error"};
+  profile.limits = LimitSpec{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
+  profile.numbered = NumberedSpec{.prefix = "p",
+                                  .from = 1,
+                                  .to = 725,
+                                  .access = Access::read_write,
+                                  .source = "60427 section 3.1"};
 
   std::vector<Parameter> parameters;
   const auto add = [&parameters](RegisterTable table, std::uint16_t address, std::string name,
@@ -114,8 +114,8 @@ inline catalogue::Profile bm_profile() {
 
 /// Its start state: preset 1 asks for 2.71 at 235 rpm and takes 1.2 s, preset 2 needs a snug
 /// torque.
-inline catalogue::SimulationFacts bm_start() {
-  catalogue::SimulationFacts start;
+inline catalogue::SimulationSpec bm_start() {
+  catalogue::SimulationSpec start;
   // id 1, controller 1, tool model 3204, firmware 2103, serial 1021100042, 1234 fastenings.
   start.identity = {0, 1, 0, 1, 0, 3, 0x08, 0x37, 42, 0, 10, 21, 10, 0, 0, 0x04, 0xD2};
   start.identity_bytes = 13;

@@ -23,7 +23,7 @@ namespace spindle::test {
 /// A profile, and the state in which its simulated device begins.
 struct Product {
   catalogue::Profile profile;
-  catalogue::SimulationFacts start = {};
+  catalogue::SimulationSpec start = {};
 };
 
 /// The screwdriver that is built in code: three presets.

@@ -319,7 +319,7 @@ class Stage {
   }
 
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
-                                                const catalogue::LinkFacts& facts) {
+                                                const catalogue::LinkSpec& facts) {
     const bool serial = endpoint.medium != link::Medium::tcp;
     const auto found =
         tools_.find(serial ? commands::shared_line(endpoint)

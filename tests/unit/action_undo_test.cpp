@@ -11,7 +11,7 @@ namespace {
 using namespace spindle;
 using namespace std::chrono_literals;
 using device::Device;
-using device::PutBack;
+using device::RollbackResult;
 using device::UndoReport;
 using test::BmRig;
 using test::Fate;
@@ -56,7 +56,7 @@ TEST_CASE("an action is undone, and the tool shows it") {
     bench.rig.wire.fate = next_meet(Fate::is_lost, 5);
   }
   const UndoReport report = bench.undo();
-  CHECK(report.result == PutBack::done);
+  CHECK(report.result == RollbackResult::done);
   CHECK(report.found == 1);
   CHECK(bench.direction() == 0);
   CHECK(bench.rig.writes_of(turn, 0) >= 1);
@@ -68,19 +68,19 @@ TEST_CASE("what cannot be undone is said") {
     bench.rig.wire.fate = [](const modbus::Pdu& request) {
       return request.function == 6 ? Fate::is_only_echoed : Fate::passes;
     };
-    CHECK(bench.undo().result == PutBack::refused);
+    CHECK(bench.undo().result == RollbackResult::refused);
   }
   SUBCASE("refused") {
     bench.rig.wire.fate = [](const modbus::Pdu& request) {
       return request.function == 6 ? Fate::is_refused : Fate::passes;
     };
-    CHECK(bench.undo().result == PutBack::refused);
+    CHECK(bench.undo().result == RollbackResult::refused);
   }
   SUBCASE("gone") {
     bench.rig.wire.unreachable_until = TimePoint::max();
     bench.rig.wire.fate = [](const modbus::Pdu&) { return Fate::closes_unheard; };
     const TimePoint began = bench.rig.clock.now();
-    CHECK(bench.undo().result == PutBack::unknown);
+    CHECK(bench.undo().result == RollbackResult::unknown);
     CHECK(bench.rig.clock.now() - began < 12s);
   }
   CHECK_FALSE(bench.undo().trouble.empty());
@@ -90,12 +90,12 @@ TEST_CASE("what another hand changed meanwhile is left alone") {
   Bench bench;
   bench.rig.write(turn, 0);
   const UndoReport kept = bench.undo();
-  CHECK(kept.result == PutBack::kept);
+  CHECK(kept.result == RollbackResult::kept);
   CHECK(bench.rig.writes_of(turn, 0) == 0);
   const UndoReport other = device::undo(
       {bench.action, 2, 1}, bench.device,
       [&](Duration) { return bench.rig.connect_uninterruptibly(); }, bench.rig.uninterruptible);
-  CHECK(other.result == PutBack::refused);
+  CHECK(other.result == RollbackResult::refused);
   CHECK(other.trouble == "it was changed to 0 meanwhile");
   CHECK(bench.rig.writes_of(turn, 1) == 1);
 }

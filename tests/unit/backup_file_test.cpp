@@ -17,7 +17,7 @@ using catalogue::Profile;
 using catalogue::Snapshot;
 using files::read_backup;
 using files::render_backup;
-using files::understand_backup;
+using files::resolve_backup;
 
 namespace {
 
@@ -74,7 +74,7 @@ Snapshot small_snapshot() {
 
 Result<Snapshot> load(const std::string& text, const Profile& profile = bm()) {
   return read_backup(text, "b.yaml").and_then([&](const files::BackupFile& file) {
-    return understand_backup(file, profile);
+    return resolve_backup(file, profile);
   });
 }
 

@@ -181,7 +181,7 @@ TEST_CASE("blv: the words that run the motor") {
   const Profile profile = blv();
   REQUIRE(profile.run);
   REQUIRE(profile.run->word() != nullptr);
-  const catalogue::CommandWordFacts& run = *profile.run->word();
+  const catalogue::CommandWordSpec& run = *profile.run->word();
   const auto& two_wire = run.modes.at(0);
   const auto& three_wire = run.modes.at(1);
   const std::uint16_t second = run.selecting(2);

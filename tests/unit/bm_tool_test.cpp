@@ -52,7 +52,7 @@ struct Status {
 // A tool, a client and the time.
 struct Bench : test::BmRig {
   explicit Bench(const BmOptions& how = {},
-                 const catalogue::SimulationFacts& facts = test::bm_start())
+                 const catalogue::SimulationSpec& facts = test::bm_start())
       : BmRig({test::bm_profile(), facts}, how) {
     tool->connected(client);
     tool->connected(other_client);
@@ -199,7 +199,7 @@ TEST_CASE("the identity in its forms") {
 }
 
 TEST_CASE("an identity whose usual form is short grows into the long one") {
-  catalogue::SimulationFacts facts = test::bm_start();
+  catalogue::SimulationSpec facts = test::bm_start();
   facts.identity = hex("0001 0001 0003 0837 3CDCC00A 00 000004D2");
   facts.identity_bytes = 12;
   const auto identity = [&facts](const BmOptions& options) {
@@ -376,7 +376,7 @@ TEST_CASE("preset and direction") {
 }
 
 TEST_CASE("event numbers wrap") {
-  catalogue::SimulationFacts facts = test::bm_start();
+  catalogue::SimulationSpec facts = test::bm_start();
   test::append(facts.values, {"event.number", 65534});
   Bench bench({}, facts);
   std::vector<std::uint16_t> numbers;

@@ -24,7 +24,7 @@ using namespace std::chrono_literals;
 using catalogue::Parameter;
 using catalogue::Value;
 using device::Device;
-using device::PutBack;
+using device::RollbackResult;
 using device::WriteResult;
 using modbus::ExceptionCode;
 using modbus::Pdu;
@@ -317,7 +317,7 @@ TEST_CASE("a write that acts behind its put-back is put back once more") {
   bench.tool->replies = {{.acts = 800ms}, {.acts = 0ms}};
   REQUIRE(bench.set(55).result == WriteResult::mismatch);
   const auto reports = bench.put_back();
-  CHECK(reports.front().result == PutBack::done);
+  CHECK(reports.front().result == RollbackResult::done);
   CHECK(bench.read(0) == 10);
   CHECK(bench.writes() == 3);
 }
@@ -328,7 +328,7 @@ TEST_CASE("what is put back is proven after the settling time, and recorded") {
   REQUIRE(bench.set(55).result == WriteResult::written);
   const auto reports = bench.put_back();
   REQUIRE(reports.size() == 1);
-  CHECK(reports[0].result == PutBack::done);
+  CHECK(reports[0].result == RollbackResult::done);
   CHECK(bench.read(0) == 10);
   CHECK(bench.records() ==
         Lines{"begun 10 55", "written 10 55", "begun 55 10", "rolled-back 55 10"});
@@ -338,7 +338,7 @@ TEST_CASE("what cannot be put back is recorded with what the tool holds") {
   Bench bench;
   bench.tool->replies = {{}, {.exception = ExceptionCode::illegal_data_value, .acts = {}}};
   bench.set(55);
-  CHECK(bench.put_back().front().result == PutBack::refused);
+  CHECK(bench.put_back().front().result == RollbackResult::refused);
   CHECK(bench.records() ==
         Lines{"begun 10 55", "written 10 55", "begun 55 10", "not-rolled-back 10 55"});
 }

@@ -22,8 +22,8 @@ constexpr Parameter parameters[] = {                 // NOLINT(*-avoid-c-arrays)
     {.name = "speed", .title = "Speed", .unit = "rpm", .source = "manual", .note = ""},
     {.name = "mode", .title = "Mode", .unit = "", .labels = labels, .source = "", .note = ""}};
 constexpr Entry<unsigned, Text> models[] = {{3, "3204"}, {12, "3300"}};  // NOLINT(*-avoid-c-arrays)
-constexpr IdentityFacts identity{.products = {}, .models = models};
-constexpr EventFacts events{.number = "speed", .kind = "mode"};
+constexpr IdentitySpec identity{.products = {}, .models = models};
+constexpr EventSpec events{.number = "speed", .kind = "mode"};
 
 constexpr Profile profile{.id = "constant",
                           .title = "Constant",

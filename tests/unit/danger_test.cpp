@@ -36,7 +36,7 @@ Action action(std::string name, std::uint16_t address, Hazard hazard) {
 Profile machine() {
   Profile profile;
   profile.id = "machine";
-  profile.numbered = NumberedFacts{
+  profile.numbered = NumberedSpec{
       .prefix = "p", .from = 1, .to = 40, .access = Access::read_write, .source = "manual"};
   profile.parameters = {parameter("word", 10), parameter("brake", 20), parameter("speed", 12),
                         parameter("lock", 50), parameter("pair", 49, Kind::u32)};
@@ -45,7 +45,7 @@ Profile machine() {
                      action("lock", 50, Hazard::locks), action("look", 12, Hazard::none)};
   test::edit(profile.actions, 0, [](auto& entry) { entry.stop_value = 0; });
   test::edit(profile.actions, 1, [](auto& entry) { entry.rest = 0; });
-  profile.run.emplace().model = StartActionFacts{.start = "start"};
+  profile.run.emplace().model = StartActionSpec{.start = "start"};
   return profile;
 }
 
@@ -115,7 +115,7 @@ TEST_CASE("a guarded start is proposed only where the profile has a run model") 
   Profile profile = machine();
   const std::string guarded = danger_of(profile.parameters[0], profile)->remedy();
   CHECK(guarded.find("remote-start") != std::string::npos);
-  profile.run->model = StartActionFacts{.start = "look"};
+  profile.run->model = StartActionSpec{.start = "look"};
   CHECK(danger_of(profile.parameters[0], profile)->remedy().empty());
   profile.run.reset();
   CHECK(danger_of(profile.parameters[0], profile)->remedy().empty());
@@ -125,7 +125,7 @@ TEST_CASE("every register that commands a motor is no setting") {
   Profile profile;
   profile.parameters = {parameter("go", 1), parameter("halt", 2), parameter("hold", 3),
                         parameter("speed", 4)};
-  CommandRegisterFacts facts{.command = "go", .stop_register = "halt", .set_point = "speed"};
+  CommandRegisterSpec facts{.command = "go", .stop_register = "halt", .set_point = "speed"};
   facts.enable.parameter = "hold";
   profile.run.emplace().model = facts;
   CHECK(names_of(stored_parameters(profile)) == std::vector<std::string>{"speed"});
@@ -143,7 +143,7 @@ TEST_CASE("the gravest hazard of a register counts") {
 TEST_CASE("the word that runs a motor is no setting, though no action says so") {
   Profile profile;
   profile.parameters = {parameter("word", 124, Kind::u32), parameter("speed", 130)};
-  profile.run.emplace().model = catalogue::CommandWordFacts{.command = "word"};
+  profile.run.emplace().model = catalogue::CommandWordSpec{.command = "word"};
   const auto danger = danger_of(parse_raw_register("@holding:125")->value(), profile);
   REQUIRE(danger.has_value());
   CHECK(danger->runs_motor);

@@ -12,11 +12,11 @@
 using namespace spindle;
 using namespace std::chrono_literals;
 using catalogue::EventKind;
+using device::EventGap;
 using device::EventMode;
-using device::EventNews;
 using device::EventOrigin;
 using device::EventSource;
-using device::GapNews;
+using device::ToolEvent;
 
 namespace {
 
@@ -27,14 +27,14 @@ std::uint16_t first_of(const modbus::Pdu& request) { return get_u16(request.data
 
 /// A tool by a profile of its own, and what its source of events tells.
 struct Bench : test::PlainRig {
-  explicit Bench(const std::string& name, void (*change)(catalogue::EventFacts&) = nullptr)
+  explicit Bench(const std::string& name, void (*change)(catalogue::EventSpec&) = nullptr)
       : Rig(changed(name, change), sim::PlainOptions{}) {
     source = EventSource::make(profile, EventMode::declared, clock, [this](const auto& news) {
-      if (const auto* event = std::get_if<EventNews>(&news)) events.push_back(*event);
-      if (const auto* gap = std::get_if<GapNews>(&news)) gaps.push_back(*gap);
+      if (const auto* event = std::get_if<ToolEvent>(&news)) events.push_back(*event);
+      if (const auto* gap = std::get_if<EventGap>(&news)) gaps.push_back(*gap);
     });
   }
-  static test::Product changed(const std::string& name, void (*change)(catalogue::EventFacts&)) {
+  static test::Product changed(const std::string& name, void (*change)(catalogue::EventSpec&)) {
     test::Product made = test::product(name);
     if (change != nullptr) change(*made.profile.events);
     return made;
@@ -65,8 +65,8 @@ struct Bench : test::PlainRig {
   }
 
   std::unique_ptr<device::Device> device = nullptr;
-  std::vector<EventNews> events = {};
-  std::vector<GapNews> gaps = {};
+  std::vector<ToolEvent> events = {};
+  std::vector<EventGap> gaps = {};
   std::unique_ptr<EventSource> source = nullptr;
 };
 
@@ -215,7 +215,7 @@ TEST_CASE("counter: a block that is longer than a request is read in pieces") {
 
 TEST_CASE("push without arming: frames come by themselves, and nothing is switched on or off") {
   Bench bench("countermatic",
-              [](catalogue::EventFacts& events) { events.model = catalogue::EventModel::push; });
+              [](catalogue::EventSpec& events) { events.model = catalogue::EventModel::push; });
   CHECK(!bench.source->polls());
   REQUIRE(bench.attach());
   CHECK(bench.source->next_due() == TimePoint::max());

@@ -358,7 +358,7 @@ class Program {
 
  private:
   static Result<std::unique_ptr<link::Transport>> unreachable(const link::Endpoint&,
-                                                              const catalogue::LinkFacts&,
+                                                              const catalogue::LinkSpec&,
                                                               Duration) {
     return tl::unexpected(Error{.code = Errc::connection_refused});
   }

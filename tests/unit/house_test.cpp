@@ -18,7 +18,7 @@
 namespace {
 
 using Names = std::set<std::string, std::less<>>;
-using Findings = std::vector<std::string>;
+using Diagnostics = std::vector<std::string>;
 
 /// A file by its path from the root of the repository.
 struct Source {
@@ -241,7 +241,7 @@ Names visible_from(const std::string& layer) {
 
 // ---- the rules ----
 
-void check_layers(const Source& source, Findings& findings) {
+void check_layers(const Source& source, Diagnostics& findings) {
   const std::string layer = layer_of(source.path);
   if (!arrows.contains(layer)) {
     findings.push_back(fmt::format("{}: is in no layer", source.path));
@@ -256,7 +256,7 @@ void check_layers(const Source& source, Findings& findings) {
   }
 }
 
-void check_private_headers(const Source& source, Findings& findings) {
+void check_private_headers(const Source& source, Diagnostics& findings) {
   const std::string own = layer_of(source.path) + "/";
   for (const Include& include : includes_of(source.text)) {
     if (include.opening != '"' || include.name.starts_with("spindle/")) continue;
@@ -272,7 +272,7 @@ void check_private_headers(const Source& source, Findings& findings) {
   }
 }
 
-void check_homes(const Source& source, Findings& findings) {
+void check_homes(const Source& source, Diagnostics& findings) {
   const std::string layer = layer_of(source.path);
   for (const Include& include : includes_of(source.text)) {
     for (const HomeOfHeader& home : homes) {
@@ -310,7 +310,7 @@ std::string statements_of(const Source& source) {
   return statements;
 }
 
-void check_words(const Source& source, Findings& findings) {
+void check_words(const Source& source, Diagnostics& findings) {
   const std::string statements = statements_of(source);
   for (const BannedWord& banned : banned_words) {
     if (!banned.files.contains(source.path) && uses(statements, banned)) {
@@ -319,7 +319,7 @@ void check_words(const Source& source, Findings& findings) {
   }
 }
 
-void check_english(const Source& source, Findings& findings) {
+void check_english(const Source& source, Diagnostics& findings) {
   std::string text = source.text;
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -330,7 +330,7 @@ void check_english(const Source& source, Findings& findings) {
   }
 }
 
-void check_finished(const Source& source, Findings& findings) {
+void check_finished(const Source& source, Diagnostics& findings) {
   for (const std::string& mark : unfinished) {
     if (source.text.find(mark) != std::string::npos) {
       findings.push_back(fmt::format("{}: says {}", source.path, mark));
@@ -339,7 +339,7 @@ void check_finished(const Source& source, Findings& findings) {
 }
 
 /// fmt's 'L' asks the locale for its decimal sign.
-void check_formats(const Source& source, Findings& findings) {
+void check_formats(const Source& source, Diagnostics& findings) {
   for (std::size_t at = source.text.find('{'); at != std::string::npos;
        at = source.text.find('{', at + 1)) {
     const std::size_t end = source.text.find_first_of("{}\n\"", at + 1);
@@ -350,7 +350,7 @@ void check_formats(const Source& source, Findings& findings) {
   }
 }
 
-void check_pragma_once(const Source& source, Findings& findings) {
+void check_pragma_once(const Source& source, Diagnostics& findings) {
   if (!source.path.ends_with(".hpp")) return;
   const std::vector<std::string> lines = lines_of(code_of(source.text));
   if (std::find(lines.begin(), lines.end(), "#pragma once") == lines.end()) {
@@ -358,7 +358,7 @@ void check_pragma_once(const Source& source, Findings& findings) {
   }
 }
 
-void check_main(const Source& source, Findings& findings) {
+void check_main(const Source& source, Diagnostics& findings) {
   if (layer_of(source.path) != "main") return;
   const std::vector<std::string> lines = lines_of(statements_of(source));
   const auto code_lines = std::count_if(
@@ -396,7 +396,7 @@ bool asks_how_it_is_run(const std::string& text) {
   return false;
 }
 
-void check_run_models(const Source& source, Findings& findings) {
+void check_run_models(const Source& source, Diagnostics& findings) {
   const bool may = std::any_of(run_readers.begin(), run_readers.end(),
                                [&](const auto& reader) { return source.path.starts_with(reader); });
   if (may || !asks_how_it_is_run(source.text)) return;
@@ -472,7 +472,7 @@ class FunctionWalk {
   std::vector<Function> functions_ = {};
 };
 
-void check_functions(const Source& source, Findings& findings) {
+void check_functions(const Source& source, Diagnostics& findings) {
   for (const auto& [name, lines] : FunctionWalk(source).run()) {
     if (lines <= longest_function) continue;
     findings.push_back(fmt::format("{}: {} has {} lines, more than {}", source.path, name, lines,
@@ -506,15 +506,15 @@ bool defines_verb(const Source& source) {
                      [&](const std::string& name) { return known.contains(name); });
 }
 
-void check_verbs(const Source& source, Findings& findings) {
+void check_verbs(const Source& source, Diagnostics& findings) {
   const std::ptrdiff_t lines = std::count(source.text.begin(), source.text.end(), '\n');
   if (lines <= longest_verb || !defines_verb(source)) return;
   findings.push_back(fmt::format("{}: is the file of a verb and has {} lines, more than {}",
                                  source.path, lines, longest_verb));
 }
 
-Findings judge(const Source& source) {
-  Findings findings;
+Diagnostics judge(const Source& source) {
+  Diagnostics findings;
   for (const auto rule : {check_layers, check_private_headers, check_homes, check_words,
                           check_formats, check_english, check_finished, check_pragma_once,
                           check_main, check_run_models, check_functions, check_verbs}) {
@@ -536,7 +536,7 @@ std::vector<Source> sources_under(const std::string& folder) {
   return sources;
 }
 
-std::string joined(const Findings& findings) {
+std::string joined(const Diagnostics& findings) {
   return fmt::format("{}", fmt::join(findings, "\n"));
 }
 
@@ -547,7 +547,7 @@ TEST_CASE("every source file keeps the law of the house") {
   for (const std::string folder : {"include", "src"}) {
     for (const Source& source : sources_under(folder)) {
       layers_seen.insert(layer_of(source.path));
-      const Findings findings = judge(source);
+      const Diagnostics findings = judge(source);
       CHECK_MESSAGE(findings.empty(), joined(findings));
     }
   }

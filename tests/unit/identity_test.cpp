@@ -11,7 +11,7 @@ using namespace spindle::catalogue;
 namespace {
 
 /// Layout of DOGA 60427 §3.4; the long serial and the total are those of the maker's library.
-IdentityFacts doga() {
+IdentitySpec doga() {
   return {.minimum_bytes = 12,
           .id = {0, 2},
           .controller_model = {2, 2},

@@ -13,14 +13,14 @@ using namespace spindle;
 using namespace std::chrono_literals;
 using device::CommandWord;
 using device::EventMode;
-using device::Heed;
 using device::MotorEvent;
-using device::MotorNews;
-using device::News;
+using device::MotorTransition;
+using device::PolledValue;
 using device::Reconnection;
 using device::Samples;
-using device::ValueNews;
+using device::WatchControl;
 using device::Watcher;
+using device::WatchEvent;
 using device::WatchPlan;
 
 namespace {
@@ -50,14 +50,14 @@ struct Line : test::BlvRig {
     Watcher watcher([this] { return link(); },
                     [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
                     Reconnection::never, clock,
-                    [this](const News& one) {
-                      if (const auto* motor = std::get_if<MotorNews>(&one)) {
+                    [this](const WatchEvent& one) {
+                      if (const auto* motor = std::get_if<MotorTransition>(&one)) {
                         events.push_back(motor->event);
                         heard.push_back(clock.now());
                         states.push_back(motor->state);
                       }
-                      if (std::holds_alternative<ValueNews>(one)) ++samples;
-                      return Heed::go_on;
+                      if (std::holds_alternative<PolledValue>(one)) ++samples;
+                      return WatchControl::go_on;
                     });
     REQUIRE(watcher.run([end] { return end; }));
   }

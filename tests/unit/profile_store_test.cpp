@@ -21,7 +21,7 @@ using catalogue::Evidence;
 using catalogue::Hazard;
 using catalogue::Parameter;
 using catalogue::Profile;
-using files::Finding;
+using files::Diagnostic;
 using files::ProfileStore;
 
 namespace {
@@ -56,7 +56,7 @@ std::vector<std::string> expectations(const std::string& path) {
   return expected;
 }
 
-std::string without_file(const Finding& finding) {
+std::string without_file(const Diagnostic& finding) {
   return finding.to_string().substr(finding.file.size() + 1);
 }
 
@@ -94,7 +94,7 @@ TEST_CASE("every shipped profile is free of findings, bases included") {
     CAPTURE(path);
     const auto findings = shipped().check(path);
     REQUIRE(findings.has_value());
-    for (const Finding& finding : *findings) FAIL_CHECK(finding.to_string());
+    for (const Diagnostic& finding : *findings) FAIL_CHECK(finding.to_string());
     ++checked;
   }
   CHECK(checked >= 3);
@@ -107,7 +107,7 @@ TEST_CASE("a drive with one command register is described without a fault") {
         fmt::format("{}/tests/profiles/good/{}.yaml", SPINDLE_SOURCE_DIR, name);
     const auto findings = shipped().check(path);
     REQUIRE(findings.has_value());
-    for (const Finding& finding : *findings) FAIL_CHECK(finding.to_string());
+    for (const Diagnostic& finding : *findings) FAIL_CHECK(finding.to_string());
     const auto profile = shipped().load(path);
     REQUIRE(profile);
     REQUIRE(profile->run);
@@ -145,7 +145,7 @@ TEST_CASE("every rejected profile is refused for its own reason, at its place") 
     const auto findings = shipped().check(path);
     REQUIRE(findings.has_value());
     std::vector<std::string> found;
-    for (const Finding& finding : *findings) found.push_back(without_file(finding));
+    for (const Diagnostic& finding : *findings) found.push_back(without_file(finding));
     REQUIRE(found.size() == expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
       CAPTURE(found[i]);
@@ -180,7 +180,7 @@ TEST_CASE("several faults are all reported, in the order of the file") {
   const auto findings = shipped().check(path);
   REQUIRE(findings.has_value());
   std::vector<std::string> found;
-  for (const Finding& finding : *findings) found.push_back(without_file(finding));
+  for (const Diagnostic& finding : *findings) found.push_back(without_file(finding));
   CHECK(found == std::vector<std::string>{
                      "4:1: unknown key 'titel'; did you mean 'title'?",
                      "5:28: '70000' is not a whole number from 0 to 65535",
@@ -229,7 +229,7 @@ TEST_CASE("rules are checked too where other entries could not be read, and find
   const auto findings = shipped().check(path);
   REQUIRE(findings.has_value());
   std::vector<std::string> found;
-  for (const Finding& finding : *findings) found.push_back(without_file(finding));
+  for (const Diagnostic& finding : *findings) found.push_back(without_file(finding));
   CHECK(found ==
         std::vector<std::string>{
             "2:5: id 'other' differs from the file name 'many'",
@@ -252,7 +252,7 @@ TEST_CASE("a base that is not found hides no fault of the file itself") {
                    "watch: [event.number]\n"));
   REQUIRE(findings.has_value());
   std::vector<std::string> found;
-  for (const Finding& finding : *findings) found.push_back(without_file(finding));
+  for (const Diagnostic& finding : *findings) found.push_back(without_file(finding));
   CHECK(found == std::vector<std::string>{"2:5: id 'other' differs from the file name 'mine'",
                                           "4:10: base profile 'doga-bn' is not found"});
 }

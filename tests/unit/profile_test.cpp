@@ -32,14 +32,14 @@ Profile example() {
   constexpr auto input = RegisterTable::input;
   Profile profile;
   profile.id = "example";
-  profile.numbered = NumberedFacts{.prefix = "p",
-                                   .table = holding,
-                                   .from = 1,
-                                   .to = 725,
-                                   .access = Access::read_write,
-                                   .evidence = Evidence::manual,
-                                   .source = "manual"};
-  profile.limits = LimitFacts{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
+  profile.numbered = NumberedSpec{.prefix = "p",
+                                  .table = holding,
+                                  .from = 1,
+                                  .to = 725,
+                                  .access = Access::read_write,
+                                  .evidence = Evidence::manual,
+                                  .source = "manual"};
+  profile.limits = LimitSpec{.minimum_offset = 1000, .maximum_offset = 2000, .from = 1, .to = 724};
   profile.parameters = {
       named("preset.1.speed", holding, 8, Kind::u16, Access::read_write),
       named("preset.1.target-torque", holding, 2, Kind::u16, Access::read_write),

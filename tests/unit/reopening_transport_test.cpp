@@ -62,7 +62,7 @@ test::Reaction last_answer(modbus::Pdu pdu, Duration end = 0ms) {
   };
 }
 
-test::Reaction hang_up(Errc how = Errc::closed) {
+test::Reaction disconnect(Errc how = Errc::closed) {
   return [how](ByteView) { return std::vector<Arrival>{{1ms, how}}; };
 }
 
@@ -103,8 +103,8 @@ TEST_CASE("what was answered is not asked again when the connection ends behind 
 
 TEST_CASE("a read whose answer does not come whole is sent once more") {
   Server server;
-  SUBCASE("nothing came") { server.connection().on_request(hang_up()); }
-  SUBCASE("the connection was reset") { server.connection().on_request(hang_up(Errc::reset)); }
+  SUBCASE("nothing came") { server.connection().on_request(disconnect()); }
+  SUBCASE("the connection was reset") { server.connection().on_request(disconnect(Errc::reset)); }
   SUBCASE("half of it came") {
     server.connection().on_request([](ByteView request) {
       Bytes half = test::response_to(tcp, request, value(6));
@@ -120,7 +120,7 @@ TEST_CASE("a read whose answer does not come whole is sent once more") {
 
 TEST_CASE("a write that was sent is never sent again") {
   Server server;
-  server.connection().on_request(hang_up());
+  server.connection().on_request(disconnect());
   server.connection().on_request(test::answer(tcp, 1ms, value(7)));
   const auto written = server.session().transact(modbus::write_request({3}, 9));
   REQUIRE_FALSE(written);
@@ -145,9 +145,9 @@ TEST_CASE("a write gets a new connection where the end of this one may be on the
 
 TEST_CASE("a server that brings nothing twice is given up, with the first error") {
   Server server;
-  server.connection().on_request(hang_up());
+  server.connection().on_request(disconnect());
   SUBCASE("it hangs up again") {
-    server.connection().on_request(hang_up());
+    server.connection().on_request(disconnect());
     server.connection();
   }
   SUBCASE("it takes no connection any more") {}

@@ -14,10 +14,10 @@ namespace {
 using namespace spindle;
 using namespace std::chrono_literals;
 using device::Device;
-using device::PutBack;
+using device::JournalEntry;
 using device::PutBackReport;
 using device::Rollback;
-using device::TriedWrite;
+using device::RollbackResult;
 using test::BmRig;
 using test::Fate;
 
@@ -34,8 +34,8 @@ struct Bench {
   }
 
   std::vector<PutBackReport> run() { return rollback.run(writes); }
-  std::vector<PutBack> results() {
-    std::vector<PutBack> all;
+  std::vector<RollbackResult> results() {
+    std::vector<RollbackResult> all;
     for (const PutBackReport& report : run()) all.push_back(report.result);
     return all;
   }
@@ -45,7 +45,7 @@ struct Bench {
 
   BmRig& rig;
   Device device;
-  std::vector<TriedWrite> writes = {};
+  std::vector<JournalEntry> writes = {};
   unsigned reopened = 0;
   Rollback rollback = Rollback(
       device,
@@ -57,7 +57,8 @@ struct Bench {
 };
 
 const std::vector<std::uint16_t> zeros = {0, 0, 0};
-const std::vector<PutBack> all_put_back = {PutBack::kept, PutBack::done, PutBack::done};
+const std::vector<RollbackResult> all_put_back = {RollbackResult::kept, RollbackResult::done,
+                                                  RollbackResult::done};
 
 /// Writes of one register meet this fate, so often.
 auto fate_of_writes(std::uint16_t address, Fate fate, unsigned times = 1'000'000) {
@@ -74,7 +75,7 @@ TEST_CASE("what was written is put back, the last first, and what was not is lef
   const auto reports = bench.run();
   REQUIRE(reports.size() == 3);
   CHECK(reports[0].write.parameter.name == "p303");
-  CHECK(reports[0].result == PutBack::kept);
+  CHECK(reports[0].result == RollbackResult::kept);
   CHECK(reports[1].found->to_string() == "50");
   CHECK(reports[1].now->to_string() == "0");
   CHECK(bench.values() == zeros);
@@ -108,10 +109,10 @@ TEST_CASE("a tool that refuses its old value is told with what it holds") {
   Bench bench(rig);
   rig.wire.fate = fate_of_writes(302, Fate::is_refused);
   const auto reports = bench.run();
-  CHECK(reports[1].result == PutBack::refused);
+  CHECK(reports[1].result == RollbackResult::refused);
   CHECK(reports[1].now->to_string() == "50");
   CHECK(reports[1].trouble.find("exception 02") != std::string::npos);
-  CHECK(reports[2].result == PutBack::done);
+  CHECK(reports[2].result == RollbackResult::done);
   CHECK(bench.values() == std::vector<std::uint16_t>{0, 50, 0});
 }
 
@@ -120,7 +121,7 @@ TEST_CASE("a tool that only echoes its old value is told as well") {
   Bench bench(rig);
   rig.wire.fate = fate_of_writes(302, Fate::is_only_echoed);
   const auto reports = bench.run();
-  CHECK(reports[1].result == PutBack::refused);
+  CHECK(reports[1].result == RollbackResult::refused);
   CHECK(reports[1].now->to_string() == "50");
 }
 
@@ -133,7 +134,7 @@ TEST_CASE("a tool that is gone is given up after about ten seconds, and nothing 
   const auto reports = bench.run();
   REQUIRE(reports.size() == 3);
   for (const PutBackReport& report : reports) {
-    CHECK(report.result == PutBack::unknown);
+    CHECK(report.result == RollbackResult::unknown);
     CHECK_FALSE(report.now.has_value());
     CHECK_FALSE(report.trouble.empty());
   }

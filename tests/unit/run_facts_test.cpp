@@ -9,7 +9,7 @@
 using namespace spindle;
 
 TEST_CASE("operation data are selected by adjoining bits of the word") {
-  catalogue::CommandWordFacts run;
+  catalogue::CommandWordSpec run;
   run.select = 0x07;
   CHECK(run.selecting(0) == 0);
   CHECK(run.selecting(2) == 2);
@@ -25,8 +25,8 @@ TEST_CASE("a pattern of names gets its number") {
 
 namespace {
 
-catalogue::InputFacts some_inputs() {
-  catalogue::InputFacts inputs{.parameter = "in.{n}", .first = 0, .last = 15, .functions = {}};
+catalogue::InputSpec some_inputs() {
+  catalogue::InputSpec inputs{.parameter = "in.{n}", .first = 0, .last = 15, .functions = {}};
   test::append(inputs.functions, {.number = 0, .bit = std::nullopt});
   test::append(inputs.functions, {.number = 1, .bit = 3});
   test::append(inputs.functions, {.number = 2, .bit = 4});

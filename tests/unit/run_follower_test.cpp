@@ -44,7 +44,7 @@ struct Bench {
   BmRig& rig;
   Device device;
   catalogue::Action action = rig.start_action();
-  std::vector<device::EventNews> heard = {};
+  std::vector<device::ToolEvent> heard = {};
   RunFollower follower =
       RunFollower(device, action, rig.clock, [this](const auto& event) { heard.push_back(event); });
   TimePoint began = {};

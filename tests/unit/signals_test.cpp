@@ -190,7 +190,7 @@ TEST_CASE("signals: Ctrl-Z suspends, until it is refused") {
   const int status = status_of_child([] {
     posix::SignalWatch watch;
     if (handler_of(SIGTSTP) != SIG_DFL) ::_exit(1);
-    watch.stay_awake();
+    watch.refuse_suspend();
     ::raise(SIGTSTP);
     if (watch.interrupt().error().code != Errc::interrupted) ::_exit(2);
   });

@@ -28,9 +28,9 @@ Parameter parameter(std::string name, std::uint16_t address, Access access = Acc
 Profile small_profile() {
   Profile profile;
   profile.id = "small";
-  profile.limits = LimitFacts{.minimum_offset = 100, .maximum_offset = 200, .from = 1, .to = 3};
+  profile.limits = LimitSpec{.minimum_offset = 100, .maximum_offset = 200, .from = 1, .to = 3};
   profile.numbered =
-      NumberedFacts{.prefix = "p", .from = 1, .to = 4, .access = Access::read_write, .source = "x"};
+      NumberedSpec{.prefix = "p", .from = 1, .to = 4, .access = Access::read_write, .source = "x"};
   Parameter torque = parameter("torque", 2);
   torque.encoding.scale = Decimal(1, -2);
   torque.unit = "torque";
@@ -127,7 +127,7 @@ TEST_CASE("without numbers what can be set is stored in the order of the catalog
   Profile profile;
   profile.parameters = {parameter("b", 20), parameter("a", 10, Access::read_only),
                         parameter("command", 30), parameter("c", 5)};
-  profile.run = catalogue::RunFacts{.model = catalogue::CommandWordFacts{.command = "command"}};
+  profile.run = catalogue::RunSpec{.model = catalogue::CommandWordSpec{.command = "command"}};
   Parameter input = parameter("input", 5, Access::read_only);
   input.table = modbus::RegisterTable::input;
   test::append(profile.parameters, input);

@@ -12,20 +12,20 @@
 
 using namespace spindle;
 using namespace std::chrono_literals;
+using device::EventGap;
 using device::EventMode;
-using device::EventNews;
 using device::EventOrigin;
-using device::GapNews;
-using device::Heed;
-using device::LagNews;
-using device::LinkNews;
+using device::LinkChange;
 using device::LinkState;
-using device::News;
+using device::PolledValue;
+using device::PollLag;
 using device::Reconnection;
 using device::Samples;
 using device::Standing;
-using device::ValueNews;
+using device::ToolEvent;
+using device::WatchControl;
 using device::Watcher;
+using device::WatchEvent;
 using device::WatchPlan;
 
 namespace {
@@ -56,7 +56,7 @@ struct Workshop : test::BmRig {
     const TimePoint end = clock.now() + time;
     Watcher watcher([this] { return link(); },
                     [this](const catalogue::Profile&) -> Result<WatchPlan> { return plan; },
-                    reconnection, clock, [this](const News& one) { return hear(one); });
+                    reconnection, clock, [this](const WatchEvent& one) { return hear(one); });
     auto watched = watcher.run([end] { return end; });
     unreached = watcher.unreached();
     return watched;
@@ -65,14 +65,14 @@ struct Workshop : test::BmRig {
   template <typename Kind>
   [[nodiscard]] std::vector<Kind> told() const {
     std::vector<Kind> chosen;
-    for (const News& one : news) {
+    for (const WatchEvent& one : news) {
       if (const auto* kind = std::get_if<Kind>(&one)) chosen.push_back(*kind);
     }
     return chosen;
   }
   [[nodiscard]] std::vector<std::uint16_t> numbers() const {
     std::vector<std::uint16_t> all;
-    for (const EventNews& event : told<EventNews>()) all.push_back(event.block.front());
+    for (const ToolEvent& event : told<ToolEvent>()) all.push_back(event.block.front());
     return all;
   }
   [[nodiscard]] std::vector<TimePoint> times(std::uint8_t function) const {
@@ -91,7 +91,7 @@ struct Workshop : test::BmRig {
 
   WatchPlan plan = {};
   Reconnection reconnection = Reconnection::forever;
-  std::vector<News> news = {};
+  std::vector<WatchEvent> news = {};
   std::vector<TimePoint> event_heard = {};
   std::optional<Error> unreached = std::nullopt;
   std::size_t wanted = 1'000'000;  ///< news, then stop
@@ -107,10 +107,10 @@ struct Workshop : test::BmRig {
     std::string identity = device->identity_text();
     return Watcher::Link{std::move(*device), std::move(identity)};
   }
-  Heed hear(const News& one) {
+  WatchControl hear(const WatchEvent& one) {
     news.push_back(one);
-    if (std::holds_alternative<EventNews>(one)) event_heard.push_back(clock.now());
-    return news.size() < wanted ? Heed::go_on : Heed::stop;
+    if (std::holds_alternative<ToolEvent>(one)) event_heard.push_back(clock.now());
+    return news.size() < wanted ? WatchControl::go_on : WatchControl::stop;
   }
 };
 
@@ -137,11 +137,11 @@ TEST_CASE("pushed events are told once each, in order, with their blocks") {
   const auto numbers = shop.numbers();
   REQUIRE(numbers.size() > 20);
   for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
-  for (const EventNews& event : shop.told<EventNews>()) {
+  for (const ToolEvent& event : shop.told<ToolEvent>()) {
     CHECK(event.source == EventOrigin::push);
     CHECK(event.block.size() == 14);
   }
-  CHECK(shop.told<GapNews>().empty());
+  CHECK(shop.told<EventGap>().empty());
 }
 
 TEST_CASE("the old event is not a result") {
@@ -149,7 +149,7 @@ TEST_CASE("the old event is not a result") {
   REQUIRE(shop.watch(3s));
   CHECK(shop.numbers().empty());
   REQUIRE(shop.news.size() == 1);
-  CHECK(shop.told<LinkNews>().front().message == "connected: serial 1021100042, firmware 2103");
+  CHECK(shop.told<LinkChange>().front().message == "connected: serial 1021100042, firmware 2103");
 }
 
 TEST_CASE("what was pushed before the counter was read is old") {
@@ -163,7 +163,7 @@ TEST_CASE("what was pushed before the counter was read is old") {
   };
   REQUIRE(shop.watch(3s));
   CHECK(shop.numbers().empty());
-  CHECK(shop.told<GapNews>().empty());
+  CHECK(shop.told<EventGap>().empty());
 }
 
 TEST_CASE("what is pushed while the last event is fetched keeps its place") {
@@ -175,7 +175,7 @@ TEST_CASE("what is pushed while the last event is fetched keeps its place") {
       what();
     };
     REQUIRE(shop.watch(3s));
-    CHECK(shop.told<GapNews>().empty());
+    CHECK(shop.told<EventGap>().empty());
   };
   SUBCASE("the fetched one was pushed too") {
     while_fetching([&] {
@@ -183,7 +183,7 @@ TEST_CASE("what is pushed while the last event is fetched keeps its place") {
       shop.happen();
     });
     CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
-    CHECK(shop.told<EventNews>().back().source == EventOrigin::push);
+    CHECK(shop.told<ToolEvent>().back().source == EventOrigin::push);
   }
   SUBCASE("the fetched one was not pushed") {
     while_fetching([&] {
@@ -192,7 +192,7 @@ TEST_CASE("what is pushed while the last event is fetched keeps its place") {
       shop.happen();
     });
     CHECK(shop.numbers() == std::vector<std::uint16_t>{1962, 1963});
-    CHECK(shop.told<EventNews>().back().source == EventOrigin::catch_up);
+    CHECK(shop.told<ToolEvent>().back().source == EventOrigin::catch_up);
   }
 }
 
@@ -230,7 +230,7 @@ TEST_CASE("the tool is disarmed on every way out") {
     REQUIRE_FALSE(watched);
     CHECK(watched.error().code == Errc::exception_response);
     CHECK(watched.error().name == "@holding:9999");
-    CHECK(shop.told<LinkNews>().size() == 1);
+    CHECK(shop.told<LinkChange>().size() == 1);
   }
   CHECK(shop.wire.requests.back().is(write_single, 4002, 0));
 }
@@ -249,7 +249,7 @@ TEST_CASE("attempts come at once, then after 0.25 s, doubling up to 10 s, a fift
   Workshop shop;
   shop.wire.unreachable_until = TimePoint::max();
   REQUIRE(shop.watch(120s));
-  const auto links = shop.told<LinkNews>();
+  const auto links = shop.told<LinkChange>();
   REQUIRE(links.size() == shop.wire.attempts.size());
   REQUIRE(links.size() > 10);
   CHECK(shop.wire.attempts.front() == test::FakeClock::start);
@@ -278,18 +278,18 @@ TEST_CASE("after a lost link the missed events are a gap and the last one is fet
     shop.wire.unreachable_until = shop.clock.now() + 20s;
   });
   REQUIRE(shop.watch(60s));
-  const auto links = shop.told<LinkNews>();
+  const auto links = shop.told<LinkChange>();
   REQUIRE(links.size() > 4);
   CHECK(links[0].state == LinkState::connected);
   CHECK(links[1].state == LinkState::lost);
   CHECK(links[2].state == LinkState::reconnecting);
   CHECK(links.back().state == LinkState::connected);
 
-  const auto gaps = shop.told<GapNews>();
+  const auto gaps = shop.told<EventGap>();
   REQUIRE(gaps.size() == 1);
   REQUIRE(gaps.front().missed);
   CHECK(*gaps.front().missed > 5);
-  const auto events = shop.told<EventNews>();
+  const auto events = shop.told<ToolEvent>();
   std::uint32_t jumps = 0;
   for (std::size_t at = 1; at < events.size(); ++at) {
     const std::uint32_t step = events[at].block.front() - events[at - 1].block.front();
@@ -306,7 +306,7 @@ TEST_CASE("a link that never serves is tried ever more seldom") {
   shop.faults = {sim::parse_fault("close@every:3").value()};
   REQUIRE(shop.watch(60s));
   CHECK(shop.wire.attempts.size() < 14);
-  CHECK(shop.told<LinkNews>().size() > 6);
+  CHECK(shop.told<LinkChange>().size() > 6);
 }
 
 TEST_CASE("a link whose values were polled has served, and attempts are counted anew") {
@@ -321,7 +321,7 @@ TEST_CASE("a link whose values were polled has served, and attempts are counted 
     });
   }
   REQUIRE(shop.watch(30s));
-  const auto links = shop.told<LinkNews>();
+  const auto links = shop.told<LinkChange>();
   std::size_t lost = 0;
   for (std::size_t at = 1; at < links.size(); ++at) {
     if (links[at - 1].state != LinkState::lost) continue;
@@ -337,8 +337,8 @@ TEST_CASE("one lost answer to a keep-alive or an arming is no reason to reconnec
   shop.profile.link.retries = 1;
   shop.faults = {sim::parse_fault("lost@every:7").value()};
   REQUIRE(shop.watch(60s));
-  CHECK(shop.told<LinkNews>().size() == 1);
-  CHECK(shop.told<GapNews>().empty());
+  CHECK(shop.told<LinkChange>().size() == 1);
+  CHECK(shop.told<EventGap>().empty());
   CHECK(shop.numbers().size() > 20);
 }
 
@@ -347,10 +347,11 @@ TEST_CASE("a tool that is busy for a moment is asked again, and nothing is lost 
   shop.faults = {sim::parse_fault("exception=6@every:7").value()};
   REQUIRE(shop.watch(120s));
   std::size_t lost = 0;
-  for (const LinkNews& link : shop.told<LinkNews>()) lost += link.state == LinkState::lost ? 1 : 0;
+  for (const LinkChange& link : shop.told<LinkChange>())
+    lost += link.state == LinkState::lost ? 1 : 0;
   CHECK(lost > 3);
   std::uint32_t missed = 0;
-  for (const GapNews& gap : shop.told<GapNews>()) missed += gap.missed.value_or(0);
+  for (const EventGap& gap : shop.told<EventGap>()) missed += gap.missed.value_or(0);
   const auto numbers = shop.numbers();
   REQUIRE(numbers.size() > 20);
   CHECK(numbers.back() - numbers.front() + 1U == numbers.size() + missed);
@@ -363,7 +364,7 @@ TEST_CASE("a restarted tool is said, and what stands in its registers is no even
     shop.wire.cut();
   });
   REQUIRE(shop.watch(20s));
-  const auto gaps = shop.told<GapNews>();
+  const auto gaps = shop.told<EventGap>();
   REQUIRE(gaps.size() == 1);
   CHECK_FALSE(gaps.front().missed);
   CHECK(gaps.front().reason.find("restarted") != std::string::npos);
@@ -390,10 +391,10 @@ TEST_CASE("a counter that comes to the last number, or just past it, hides no ev
     happen(116, since);
   });
   REQUIRE(shop.watch(10s));
-  const auto gaps = shop.told<GapNews>();
+  const auto gaps = shop.told<EventGap>();
   REQUIRE(gaps.size() == 1);
   CHECK_FALSE(gaps.front().missed);
-  const auto events = shop.told<EventNews>();
+  const auto events = shop.told<ToolEvent>();
   REQUIRE(events.size() == 1);
   CHECK(events.front().block.front() == since);
   CHECK(events.front().source == EventOrigin::catch_up);
@@ -408,7 +409,7 @@ TEST_CASE("what a restarted tool remembers is told as such, and what it pushes i
   });
   shop.clock.at(shop.clock.now() + 8s, [&] { shop.happen(); });
   REQUIRE(shop.watch(10s));
-  const auto events = shop.told<EventNews>();
+  const auto events = shop.told<ToolEvent>();
   REQUIRE(events.size() == 2);
   CHECK(events[0].block.front() == 1);
   CHECK(events[0].standing == Standing::remembered);
@@ -424,11 +425,11 @@ TEST_CASE("an event that was missed for a moment is a result, and no doubt about
     shop.happen();
   });
   REQUIRE(shop.watch(10s));
-  const auto events = shop.told<EventNews>();
+  const auto events = shop.told<ToolEvent>();
   REQUIRE(events.size() == 1);
   CHECK(events.front().source == EventOrigin::catch_up);
   CHECK(events.front().standing == Standing::result);
-  CHECK(shop.told<GapNews>().empty());
+  CHECK(shop.told<EventGap>().empty());
 }
 
 TEST_CASE("another tool or firmware behind the address is said, and its old event is no result") {
@@ -438,12 +439,12 @@ TEST_CASE("another tool or firmware behind the address is said, and its old even
   SUBCASE("firmware") { other.firmware = 2200; }
   shop.clock.at(shop.clock.now() + 3s, [&] { shop.replace_tool(other); });
   REQUIRE(shop.watch(10s));
-  const auto links = shop.told<LinkNews>();
+  const auto links = shop.told<LinkChange>();
   REQUIRE(links.size() == 3);
   CHECK(links[2].message.starts_with("not the tool of before: serial "));
   CHECK(links[2].message.find("before: serial 1021100042, firmware 2103") != std::string::npos);
-  REQUIRE(shop.told<GapNews>().size() == 1);
-  CHECK_FALSE(shop.told<GapNews>().front().missed);
+  REQUIRE(shop.told<EventGap>().size() == 1);
+  CHECK_FALSE(shop.told<EventGap>().front().missed);
   CHECK(shop.numbers().empty());
 }
 
@@ -464,7 +465,7 @@ TEST_CASE("without reconnection the first trouble ends it") {
     const auto watched = shop.watch(60s);
     REQUIRE_FALSE(watched);
     CHECK(watched.error().code == Errc::closed);
-    CHECK(shop.told<LinkNews>().back().state == LinkState::lost);
+    CHECK(shop.told<LinkChange>().back().state == LinkState::lost);
   }
   SUBCASE("the tool is not there") {
     shop.wire.unreachable_until = TimePoint::max();
@@ -486,7 +487,7 @@ TEST_CASE("an event is told at once, however long a keep-alive goes without an a
     shop.happen();
   };
   REQUIRE(shop.watch(20s));
-  const auto told = shop.told<EventNews>();
+  const auto told = shop.told<ToolEvent>();
   REQUIRE(told.size() > 10);
   REQUIRE(shop.event_heard.size() <= happened.size());
   for (std::size_t at = 0; at < shop.event_heard.size(); ++at) {
@@ -504,9 +505,9 @@ TEST_CASE("a counter that runs away from its polls is told as it was seen") {
     last = static_cast<std::uint16_t>(last + 1);
   };
   REQUIRE(shop.watch(3s));
-  CHECK(shop.told<LinkNews>().size() == 1);
+  CHECK(shop.told<LinkChange>().size() == 1);
   std::uint32_t missed = 0;
-  for (const GapNews& gap : shop.told<GapNews>()) {
+  for (const EventGap& gap : shop.told<EventGap>()) {
     CHECK(gap.reason == "events came faster than they could be read");
     missed += gap.missed.value_or(0);
   }
@@ -521,7 +522,7 @@ TEST_CASE("polling the counter finds every event and arms nothing") {
   const auto numbers = shop.numbers();
   REQUIRE(numbers.size() > 20);
   for (std::size_t at = 0; at < numbers.size(); ++at) CHECK(numbers[at] == 1962 + at);
-  CHECK(shop.told<EventNews>().front().source == EventOrigin::poll);
+  CHECK(shop.told<ToolEvent>().front().source == EventOrigin::poll);
   CHECK(shop.times(write_single).empty());
   CHECK(std::none_of(shop.wire.requests.begin(), shop.wire.requests.end(), reads_full_block));
 }
@@ -531,7 +532,7 @@ TEST_CASE("events that come between two polls are a gap") {
   shop.plan.events = EventMode::unarmed;
   shop.plan.interval = 10s;
   REQUIRE(shop.watch(35s));
-  const auto gaps = shop.told<GapNews>();
+  const auto gaps = shop.told<EventGap>();
   REQUIRE(gaps.size() >= 2);
   CHECK(gaps.front().reason == "events came faster than they were polled");
 }
@@ -543,12 +544,12 @@ TEST_CASE("values are told when they change, first, or always") {
   const auto watched = [&](Samples samples) {
     shop.plan.samples = samples;
     REQUIRE(shop.watch(10s));
-    return shop.told<ValueNews>();
+    return shop.told<PolledValue>();
   };
   SUBCASE("changes") {
     const auto values = watched(Samples::changes);
     REQUIRE(values.size() > 4);
-    for (const ValueNews& value : values) {
+    for (const PolledValue& value : values) {
       REQUIRE(value.previous);
       CHECK_FALSE(*value.previous == value.value);
     }
@@ -614,20 +615,20 @@ TEST_CASE("a beat that was missed is told, at once and then once a minute") {
   shop.plan.interval = 10ms;
   SUBCASE("a tool that is quick enough") {
     REQUIRE(shop.watch(10s));
-    CHECK(shop.told<LagNews>().empty());
-    CHECK(shop.told<ValueNews>().size() == 1000);
+    CHECK(shop.told<PollLag>().empty());
+    CHECK(shop.told<PolledValue>().size() == 1000);
   }
   SUBCASE("one that needs 25 ms") {
     shop.faults = {sim::parse_fault("latency=25ms").value()};
     REQUIRE(shop.watch(90s));
-    const auto lags = shop.told<LagNews>();
+    const auto lags = shop.told<PollLag>();
     REQUIRE(lags.size() == 3);  // at once, after a minute, and at the end
     CHECK(lags[1].interval == 10ms);
     CHECK(lags[1].achieved > 24ms);
     CHECK(lags[1].achieved < 31ms);
     std::uint64_t missed = 0;
-    for (const LagNews& lag : lags) missed += lag.missed;
-    const std::uint64_t told = shop.told<ValueNews>().size();
+    for (const PollLag& lag : lags) missed += lag.missed;
+    const std::uint64_t told = shop.told<PolledValue>().size();
     CHECK(told > 2900);  // one behind the other, without pauses
     CHECK(missed + told > 8980);
     CHECK(missed + told < 9020);

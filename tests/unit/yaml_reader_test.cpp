@@ -19,10 +19,10 @@ struct Parsed {
 };
 
 Parsed parse(std::string_view text, Documents wanted = Documents::all) {
-  Findings findings;
+  Diagnostics findings;
   const std::size_t file = findings.add_file("f");
   Parsed parsed{parse_yaml(text, file, wanted, findings), {}};
-  for (const Finding& finding : findings.list()) parsed.findings.push_back(finding.to_string());
+  for (const Diagnostic& finding : findings.list()) parsed.findings.push_back(finding.to_string());
   return parsed;
 }
 
@@ -195,7 +195,7 @@ TEST_CASE("no text takes more than a bounded tree") {
 }
 
 TEST_CASE("findings: sorted by place, the same fault once") {
-  Findings findings;
+  Diagnostics findings;
   const std::size_t file = findings.add_file("f");
   const std::size_t other = findings.add_file("g");
   findings.add({other, 1, 1}, "last");
@@ -205,7 +205,7 @@ TEST_CASE("findings: sorted by place, the same fault once") {
   findings.add_once({file, 2, 1}, "dropped");
   findings.add({file, 1, 9}, "first");
   Texts texts;
-  for (const Finding& finding : findings.list()) texts.push_back(finding.to_string());
+  for (const Diagnostic& finding : findings.list()) texts.push_back(finding.to_string());
   CHECK(texts == Texts{"f:1:9: first", "f:2:1: second", "f:2:1: third", "g:1:1: last"});
   CHECK(findings.error().code == Errc::bad_file);
   CHECK(findings.error().message == "f:1:9: first (and 3 more faults)");

@@ -32,7 +32,7 @@ class EventLayout {
   [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
 
  private:
-  const EventFacts* facts_;
+  const EventSpec* facts_;
   std::vector<Field> fields_ = {};
   std::size_t number_at_ = 0;
   std::size_t kind_at_ = 0;

@@ -50,7 +50,7 @@ inline auto fields(const Slice& v) {
   return std::tie(offset, size);
 }
 
-inline auto fields(const IdentityFacts& v) {
+inline auto fields(const IdentitySpec& v) {
   const auto& [minimum_bytes, id, controller_model, tool_model, firmware, serial, long_serial_bytes,
                long_serial, product_byte, products, total_bytes, total, models, firmware_below] = v;
   return std::tie(minimum_bytes, id, controller_model, tool_model, firmware, serial,
@@ -73,7 +73,7 @@ inline auto fields(const modbus::SerialSettings& v) {
   return std::tie(baud, parity, stop_bits);
 }
 
-inline auto fields(const SerialFacts& v) {
+inline auto fields(const SerialSpec& v) {
   const auto& [line, gaps, broadcast_pause] = v;
   return std::tie(line, gaps, broadcast_pause);
 }
@@ -83,7 +83,7 @@ inline auto fields(const UnitRange& v) {
   return std::tie(first, last);
 }
 
-inline auto fields(const LinkFacts& v) {
+inline auto fields(const LinkSpec& v) {
   const auto& [framing, port, unit, units, max_read, max_write, keep_alive, answer, connect,
                retries, settle, loopback, any_unit, even_pairs, serial, contiguous, absent] = v;
   return std::tie(framing, port, unit, units, max_read, max_write, keep_alive, answer, connect,
@@ -100,19 +100,19 @@ inline auto fields(const EventColumn& v) {
   return std::tie(heading, parameter, width);
 }
 
-inline auto fields(const EventFacts& v) {
+inline auto fields(const EventSpec& v) {
   const auto& [model, arm, function, first, count, number, flag, kind, kinds, error, columns,
                interval] = v;
   return std::tie(model, arm, function, first, count, number, flag, kind, kinds, error, columns,
                   interval);
 }
 
-inline auto fields(const LimitFacts& v) {
+inline auto fields(const LimitSpec& v) {
   const auto& [minimum_offset, maximum_offset, from, to] = v;
   return std::tie(minimum_offset, maximum_offset, from, to);
 }
 
-inline auto fields(const NumberedFacts& v) {
+inline auto fields(const NumberedSpec& v) {
   const auto& [prefix, table, from, to, access, evidence, source] = v;
   return std::tie(prefix, table, from, to, access, evidence, source);
 }
@@ -141,7 +141,7 @@ inline auto fields(const CodeTables& v) {
   return std::tie(error, warning);
 }
 
-inline auto fields(const RefusalFacts& v) {
+inline auto fields(const RefusalSpec& v) {
   const auto& [parameter, codes, busy, retry_every, give_up_after] = v;
   return std::tie(parameter, codes, busy, retry_every, give_up_after);
 }
@@ -151,22 +151,22 @@ inline auto fields(const AlarmList& v) {
   return std::tie(name, parameters, codes);
 }
 
-inline auto fields(const SimulationFacts::Value& v) {
+inline auto fields(const SimulationSpec::Value& v) {
   const auto& [pattern, raw] = v;
   return std::tie(pattern, raw);
 }
 
-inline auto fields(const SimulationFacts::Limits& v) {
+inline auto fields(const SimulationSpec::Limits& v) {
   const auto& [pattern, minimum, maximum] = v;
   return std::tie(pattern, minimum, maximum);
 }
 
-inline auto fields(const SimulationFacts::Event& v) {
+inline auto fields(const SimulationSpec::Event& v) {
   const auto& [kind, values] = v;
   return std::tie(kind, values);
 }
 
-inline auto fields(const SimulationFacts& v) {
+inline auto fields(const SimulationSpec& v) {
   const auto& [identity, identity_bytes, limit_exception, stopped_error, permanent_alarms, values,
                limits, events, absent] = v;
   return std::tie(identity, identity_bytes, limit_exception, stopped_error, permanent_alarms,
@@ -183,12 +183,12 @@ inline auto fields(const InputFunction& v) {
   return std::tie(number, bit, evidence, source);
 }
 
-inline auto fields(const InputFacts& v) {
+inline auto fields(const InputSpec& v) {
   const auto& [parameter, first, last, functions] = v;
   return std::tie(parameter, first, last, functions);
 }
 
-inline auto fields(const MonitorFacts& v) {
+inline auto fields(const MonitorSpec& v) {
   const auto& [status, running, running_values, stopped_values, at_speed, busy, command_speed,
                feedback_speed, load, alarm, warning] = v;
   return std::tie(status, running, running_values, stopped_values, at_speed, busy, command_speed,
@@ -200,12 +200,12 @@ inline auto fields(const StartOption& v) {
   return std::tie(option, action);
 }
 
-inline auto fields(const StartActionFacts& v) {
+inline auto fields(const StartActionSpec& v) {
   const auto& [start, selections, alarm] = v;
   return std::tie(start, selections, alarm);
 }
 
-inline auto fields(const CommandWordFacts& v) {
+inline auto fields(const CommandWordSpec& v) {
   const auto& [command, mode, modes, starting, decelerate_always, instant_always, select, inputs,
                monitor, speed, acceleration, deceleration, first, last, preferred, analog, digital,
                analog_to, watchdog, group] = v;
@@ -214,19 +214,19 @@ inline auto fields(const CommandWordFacts& v) {
                   digital, analog_to, watchdog, group);
 }
 
-inline auto fields(const EnableFacts& v) {
+inline auto fields(const EnableSpec& v) {
   const auto& [parameter, bit, value] = v;
   return std::tie(parameter, bit, value);
 }
 
-inline auto fields(const CommandRegisterFacts& v) {
+inline auto fields(const CommandRegisterSpec& v) {
   const auto& [command, forward, reverse, stop, instant, stop_register, stop_value, enable,
                set_point, monitor, stopping] = v;
   return std::tie(command, forward, reverse, stop, instant, stop_register, stop_value, enable,
                   set_point, monitor, stopping);
 }
 
-inline auto fields(const RunFacts& v) {
+inline auto fields(const RunSpec& v) {
   const auto& [model, still_runs, evidence, source, is_derived] = v;
   return std::tie(model, still_runs, evidence, source, is_derived);
 }

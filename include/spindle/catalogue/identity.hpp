@@ -19,7 +19,7 @@ struct Slice {
 };
 
 /// How a product's answer to FC 11h is read. A profile without it cannot be recognised.
-struct IdentityFacts {
+struct IdentitySpec {
   std::uint8_t minimum_bytes = 0;  ///< a shorter answer is another product's
   Slice id = {};
   Slice controller_model = {};
@@ -62,8 +62,8 @@ enum class Generation : std::uint8_t {
 
 /// Reads what is there; never fails (a short or foreign answer leaves fields empty and says so in
 /// notes).
-Identity decode_identity(const IdentityFacts& facts, ByteView answer);
+Identity decode_identity(const IdentitySpec& facts, ByteView answer);
 
-Generation generation_of(const IdentityFacts& facts, const Identity& identity);
+Generation generation_of(const IdentitySpec& facts, const Identity& identity);
 
 }  // namespace spindle::catalogue

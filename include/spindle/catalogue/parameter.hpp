@@ -137,7 +137,7 @@ struct Parameter {
   Text note;    ///< what a user should know, such as when a change takes effect; may be empty
   std::optional<Effect> effect = std::nullopt;  ///< empty: the profile does not speak of it
   Text risk = {};  ///< what a change may cost, told before it is written; may be empty
-  /// How long a written value may take until it reads back; empty: as `LinkFacts::settle` says.
+  /// How long a written value may take until it reads back; empty: as `LinkSpec::settle` says.
   std::optional<Duration> settle = std::nullopt;
   Hazard hazard = Hazard::none;  ///< declared; danger_of() says what counts
 };

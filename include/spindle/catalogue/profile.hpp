@@ -32,7 +32,7 @@ struct GapRule {
   Duration gap = {};
 };
 
-struct SerialFacts {
+struct SerialSpec {
   modbus::SerialSettings line = {};
   List<GapRule> gaps = {};
   Duration broadcast_pause = {};  ///< on top of the gap
@@ -51,7 +51,7 @@ struct UnitRange {
 };
 
 /// How to talk to this product. Values come from the profile, each with its evidence there.
-struct LinkFacts {
+struct LinkSpec {
   modbus::Framing framing = modbus::Framing::tcp;
   std::uint16_t port = 502;
   std::uint8_t unit = 0;
@@ -68,14 +68,14 @@ struct LinkFacts {
   bool loopback = false;    ///< FC 08 00 is answered
   bool any_unit = false;    ///< TCP: answers may carry another unit identifier than was asked
   bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
-  SerialFacts serial = {};
+  SerialSpec serial = {};
   List<Area> contiguous = {};  ///< registers may be read along here
   List<Area> absent = {};      ///< registers said not to exist
 };
 
 /// Whether a value of this kind can be written. Error `usage`: values of 32 bits are never split
 /// (`even_pairs`), and a request takes only one register (`max_write`).
-Result<void> check_pair(Kind kind, const LinkFacts& link);
+Result<void> check_pair(Kind kind, const LinkSpec& link);
 
 /// What an event says, as the contract names it.
 enum class EventKind : std::uint8_t {
@@ -127,7 +127,7 @@ struct EventColumn {
 };
 
 /// Results and what else happens: how it is learned of, and the registers that tell of it.
-struct EventFacts {
+struct EventSpec {
   EventModel model = EventModel::push;
   std::optional<Arming> arm = std::nullopt;  ///< of `push`; empty: frames come without
   std::uint8_t function = 0;                 ///< 3 or 4
@@ -144,10 +144,10 @@ struct EventFacts {
 };
 
 /// The table that the event block stands in.
-modbus::RegisterTable table_of(const EventFacts& events);
+modbus::RegisterTable table_of(const EventSpec& events);
 
 /// The tool's own limits of parameter n: registers n + offset.
-struct LimitFacts {
+struct LimitSpec {
   std::uint16_t minimum_offset = 0;
   std::uint16_t maximum_offset = 0;
   std::uint16_t from = 0;
@@ -155,7 +155,7 @@ struct LimitFacts {
 };
 
 /// Parameters that exist by number only.
-struct NumberedFacts {
+struct NumberedSpec {
   Text prefix;
   modbus::RegisterTable table = modbus::RegisterTable::holding;
   std::uint16_t from = 0;
@@ -187,7 +187,7 @@ struct Action {
   std::uint16_t maximum = 0;
   bool has_range = false;  ///< numbers from minimum to maximum may be given beside the labels
   List<Label> labels = {};
-  Motion motion = Motion::none;  ///< the words are those of RunFacts
+  Motion motion = Motion::none;  ///< the words are those of RunSpec
   /// The register acts when its value changes to `value`: this is written before it and behind it.
   std::optional<std::uint16_t> rest = std::nullopt;
   std::optional<Preparation> prepare = std::nullopt;
@@ -234,7 +234,7 @@ struct CodeTables {
 };
 
 /// What a product says, in a register of its own, of the exception response that it sent last.
-struct RefusalFacts {
+struct RefusalSpec {
   Text parameter = {};
   CodeTexts codes = {};
   List<std::int64_t> busy = {};  ///< codes of a tool that only has to be waited for
@@ -253,7 +253,7 @@ struct AlarmList {
 
 /// A start state for the simulated tool. Patterns are globs over the names of named and numbered
 /// parameters; later entries win.
-struct SimulationFacts {
+struct SimulationSpec {
   List<std::uint8_t> identity =
       {};  ///< device-specific bytes of the answer to FC 11h, in its longest form
   std::size_t identity_bytes = 0;  ///< how many of them the tool sends unless told otherwise
@@ -291,16 +291,16 @@ class Profile {
   Text series;
   Text path;              ///< file it came from
   List<Text> bases = {};  ///< ids of the profiles that it extends, the nearest first
-  LinkFacts link;
-  std::optional<IdentityFacts> identity;
-  std::optional<EventFacts> events;
-  std::optional<LimitFacts> limits;
-  std::optional<NumberedFacts> numbered;
+  LinkSpec link;
+  std::optional<IdentitySpec> identity;
+  std::optional<EventSpec> events;
+  std::optional<LimitSpec> limits;
+  std::optional<NumberedSpec> numbered;
   List<Parameter> parameters;
   List<Action> actions;
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
-  std::optional<RunFacts> run = std::nullopt;  ///< how it is started and stopped; may be missing
-  std::optional<RefusalFacts> refusals = std::nullopt;
+  std::optional<RunSpec> run = std::nullopt;  ///< how it is started and stopped; may be missing
+  std::optional<RefusalSpec> refusals = std::nullopt;
   List<AlarmList> alarm_lists = {};
   Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named

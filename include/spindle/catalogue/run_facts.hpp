@@ -35,7 +35,7 @@ struct InputFunction {
 };
 
 /// Where a driver keeps what each bit of its command word does.
-struct InputFacts {
+struct InputSpec {
   Text parameter = {};      ///< with {n}, the number of the bit; empty: the bits are fixed
   std::uint16_t first = 0;  ///< bits from
   std::uint16_t last = 0;   ///< to
@@ -52,7 +52,7 @@ class CommandBits {
   CommandBits();
   /// `numbers` are those of the bits from the first on; what is not known of further bits is
   /// unknown.
-  CommandBits(const InputFacts& facts, std::span<const std::int64_t> numbers);
+  CommandBits(const InputSpec& facts, std::span<const std::int64_t> numbers);
 
   /// The word of the profile in the bits of this driver. Empty where no bit has a function that it
   /// needs.
@@ -75,7 +75,7 @@ class CommandBits {
 };
 
 /// What a motor says of itself. Names are those of parameters; an empty one: it does not say it.
-struct MonitorFacts {
+struct MonitorSpec {
   Text status = {};
   std::optional<std::uint8_t> running = std::nullopt;   ///< bit of the status; empty: its values
   List<std::int64_t> running_values = {};               ///< values of a status that says "runs"
@@ -96,7 +96,7 @@ struct StartOption {
 };
 
 /// How a product is run that starts by an action with a `stop`, and ends by itself.
-struct StartActionFacts {
+struct StartActionSpec {
   Text start = {};                    ///< the action; its `confirm` says whether it runs
   List<StartOption> selections = {};  ///< what may be selected before, in this order
   Text alarm = {};                    ///< present alarm; 0: none
@@ -104,7 +104,7 @@ struct StartActionFacts {
 
 /// How a product is run whose motor follows a command word: a level, which holds until it is told
 /// otherwise. Names are those of parameters; of a 32-bit one the word is the low half.
-struct CommandWordFacts {
+struct CommandWordSpec {
   Text command = {};  ///< the command word
   Text mode = {};     ///< parameter whose value decides what the bits of the word mean
   Table<std::int64_t, RunWords> modes = {};
@@ -115,9 +115,9 @@ struct CommandWordFacts {
   std::uint16_t decelerate_always = 0;
   std::uint16_t instant_always = 0;
   std::uint16_t select = 0;  ///< adjoining bits that hold the number of the operation data
-  InputFacts inputs = {};    ///< which bit does what on one driver
+  InputSpec inputs = {};     ///< which bit does what on one driver
 
-  MonitorFacts monitor = {};  ///< with all bits of the status, both speeds and the alarm
+  MonitorSpec monitor = {};  ///< with all bits of the status, both speeds and the alarm
 
   Text speed = {};              ///< of operation data {n}; its range is that of the parameter
   Text acceleration = {};       ///< time, seconds
@@ -142,14 +142,14 @@ struct CommandWordFacts {
 };
 
 /// What lets a motor follow its command register: a value, or one bit.
-struct EnableFacts {
+struct EnableSpec {
   Text parameter = {};                             ///< empty: nothing has to be enabled
   std::optional<std::uint8_t> bit = std::nullopt;  ///< set beside the other bits
   std::uint32_t value = 0;                         ///< written where there is no bit
 };
 
 /// How a product is run by values of one register of 16 or 32 bits. Names are those of parameters.
-struct CommandRegisterFacts {
+struct CommandRegisterSpec {
   Text command = {};
   std::uint32_t forward = 0;
   std::optional<std::uint32_t> reverse = std::nullopt;  ///< empty: it turns one way only
@@ -157,9 +157,9 @@ struct CommandRegisterFacts {
   std::optional<std::uint32_t> instant = std::nullopt;  ///< stops harder than `stop`
   Text stop_register = {};  ///< another register that stops it; may be empty
   std::uint32_t stop_value = 0;
-  EnableFacts enable = {};
-  Text set_point = {};        ///< how fast, in its own unit; may be empty
-  MonitorFacts monitor = {};  ///< without a status and a speed nothing proves a standstill
+  EnableSpec enable = {};
+  Text set_point = {};       ///< how fast, in its own unit; may be empty
+  MonitorSpec monitor = {};  ///< without a status and a speed nothing proves a standstill
   Duration stopping = std::chrono::seconds(10);  ///< how long a stop may take at most
 };
 
@@ -174,8 +174,8 @@ inline constexpr auto run_words =
 constexpr std::string_view to_text(RunKind kind) { return run_words.text(kind); }
 
 /// The section `run` of a profile.
-struct RunFacts {
-  std::variant<StartActionFacts, CommandWordFacts, CommandRegisterFacts> model = CommandWordFacts{};
+struct RunSpec {
+  std::variant<StartActionSpec, CommandWordSpec, CommandRegisterSpec> model = CommandWordSpec{};
   /// What to look at when a stop is not confirmed, as one sentence; may be empty.
   Text still_runs = {};
   Evidence evidence = Evidence::inferred;
@@ -185,14 +185,12 @@ struct RunFacts {
   bool is_derived = false;
 
   [[nodiscard]] RunKind kind() const { return static_cast<RunKind>(model.index()); }
-  [[nodiscard]] const CommandWordFacts* word() const {
-    return std::get_if<CommandWordFacts>(&model);
+  [[nodiscard]] const CommandWordSpec* word() const { return std::get_if<CommandWordSpec>(&model); }
+  [[nodiscard]] const StartActionSpec* action() const {
+    return std::get_if<StartActionSpec>(&model);
   }
-  [[nodiscard]] const StartActionFacts* action() const {
-    return std::get_if<StartActionFacts>(&model);
-  }
-  [[nodiscard]] const CommandRegisterFacts* command_register() const {
-    return std::get_if<CommandRegisterFacts>(&model);
+  [[nodiscard]] const CommandRegisterSpec* command_register() const {
+    return std::get_if<CommandRegisterSpec>(&model);
   }
 
   /// Whether a write to this parameter is a command to the motor.

@@ -46,7 +46,7 @@ struct SetOptions {
   std::vector<std::string> assignments;  ///< NAME=VALUE
   Execution execution = Execution::real;
   Storing storing = Storing::no;
-  Reach reach = Reach::one;
+  Addressing addressing = Addressing::unicast;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
@@ -55,7 +55,7 @@ struct DoOptions {
   std::string target;                ///< or a group
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
-  Reach reach = Reach::one;
+  Addressing addressing = Addressing::unicast;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> perform(const DoOptions& options, Context& context);
@@ -111,7 +111,7 @@ std::vector<std::string> start_options(const catalogue::Profile& profile);
 struct RemoteStopOptions {
   std::vector<std::string> targets;
   std::optional<catalogue::StopMode> stop = std::nullopt;
-  Reach reach = Reach::one;
+  Addressing addressing = Addressing::unicast;
 };
 Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 

@@ -17,7 +17,7 @@ struct DoneAction {
 
 /// Whether a tool shows again what it showed before an action.
 struct UndoReport {
-  PutBack result = PutBack::unknown;
+  RollbackResult result = RollbackResult::unknown;
   std::optional<std::int64_t> found = std::nullopt;  ///< before anything was put back
   std::string trouble = {};                          ///< why it is not done
 };

@@ -15,7 +15,7 @@ class CommandRegister final : public RunModel {
   static Result<CommandRegister> of(const catalogue::Profile& profile);
   CommandRegister(CommandRegister&& other) noexcept;
 
-  [[nodiscard]] const catalogue::CommandRegisterFacts& facts() const { return facts_; }
+  [[nodiscard]] const catalogue::CommandRegisterSpec& facts() const { return facts_; }
   [[nodiscard]] const catalogue::Parameter& command_parameter() const { return command_; }
   [[nodiscard]] const MotorMonitor* monitor() const override {
     return monitor_ ? &*monitor_ : nullptr;
@@ -34,9 +34,9 @@ class CommandRegister final : public RunModel {
   Result<void> send_stop(Device& device, catalogue::StopMode mode, std::uint32_t enabling) const;
 
  private:
-  CommandRegister(const catalogue::CommandRegisterFacts& facts, catalogue::Parameter command);
+  CommandRegister(const catalogue::CommandRegisterSpec& facts, catalogue::Parameter command);
 
-  catalogue::CommandRegisterFacts facts_;
+  catalogue::CommandRegisterSpec facts_;
   catalogue::Parameter command_;
   std::optional<catalogue::Parameter> stop_ = std::nullopt;
   std::optional<MotorMonitor> monitor_ = std::nullopt;

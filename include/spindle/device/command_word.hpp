@@ -16,7 +16,7 @@ class CommandWord final : public RunModel {
   static Result<CommandWord> of(const catalogue::Profile& profile);
   CommandWord(CommandWord&& other) noexcept;
 
-  [[nodiscard]] const catalogue::CommandWordFacts& facts() const { return facts_; }
+  [[nodiscard]] const catalogue::CommandWordSpec& facts() const { return facts_; }
   [[nodiscard]] const MotorMonitor* monitor() const override { return &monitor_; }
   [[nodiscard]] std::string telling_setting() const override { return facts_.mode; }
   [[nodiscard]] std::unique_ptr<Stopper> stopper(catalogue::StopMode mode) const override;
@@ -40,9 +40,9 @@ class CommandWord final : public RunModel {
   [[nodiscard]] modbus::RegisterAddress command_register() const { return command_register_; }
 
  private:
-  CommandWord(const catalogue::CommandWordFacts& facts, MotorMonitor monitor);
+  CommandWord(const catalogue::CommandWordSpec& facts, MotorMonitor monitor);
 
-  catalogue::CommandWordFacts facts_;
+  catalogue::CommandWordSpec facts_;
   MotorMonitor monitor_;
   std::vector<catalogue::Parameter> inputs_ = {};
   modbus::RegisterAddress command_register_ = {};

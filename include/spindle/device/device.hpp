@@ -18,13 +18,13 @@ namespace spindle::device {
 
 /// Opens the line to an endpoint; `posix` and `sim` bring the implementations.
 using OpenTransport = std::function<Result<std::unique_ptr<link::Transport>>(
-    const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>;
+    const link::Endpoint& endpoint, const catalogue::LinkSpec& facts, Duration connect_timeout)>;
 
 /// How frames are bounded there: by the medium, and by the product where it is simulated.
-modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkFacts& facts);
+modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkSpec& facts);
 
 /// The frames that an armed tool sends.
-link::SpontaneousShape shape_of(const catalogue::EventFacts& events);
+link::SpontaneousShape shape_of(const catalogue::EventSpec& events);
 
 /// What the user may override of a profile's link facts.
 struct LinkOptions {
@@ -158,7 +158,7 @@ class Device {
 
   /// Ends the connection; everything that needs it fails with `closed` from now on. A tool that
   /// serves one client at a time must be let go before it is opened anew.
-  void hang_up();
+  void disconnect();
 
   /// How often a read without an answer is repeated from now on.
   void set_retries(unsigned retries);

@@ -27,7 +27,7 @@ enum class Standing : std::uint8_t {
 };
 
 /// A new event. `block` are the registers of the profile's event block.
-struct EventNews {
+struct ToolEvent {
   EventOrigin source;
   Registers block;
   WallTime time;
@@ -36,7 +36,7 @@ struct EventNews {
 };
 
 /// Events that happened, or may have, and were not seen.
-struct GapNews {
+struct EventGap {
   std::optional<std::uint32_t> missed;  ///< empty: unknown
   std::string reason;
   bool is_only_here = false;  ///< as of a result
@@ -53,7 +53,7 @@ enum class EventMode : std::uint8_t {
 /// nothing is told twice, as far as the tool lets it be known. One thread.
 class EventSource {
  public:
-  using Tell = std::function<void(const std::variant<EventNews, GapNews>&)>;
+  using Tell = std::function<void(const std::variant<ToolEvent, EventGap>&)>;
 
   /// Null where there is nothing to learn: the profile has no events, or they are not wanted.
   /// `profile` and `clock` must outlive it.

@@ -11,7 +11,7 @@
 namespace spindle::device {
 
 /// What the number of an event says about it.
-enum class Novelty : std::uint8_t {
+enum class Sequence : std::uint8_t {
   baseline,  ///< the first number seen: an old event, not a result
   repeat,    ///< seen before
   next,      ///< one more than the last
@@ -24,12 +24,12 @@ enum class Novelty : std::uint8_t {
 };
 
 struct Tracked {
-  Novelty novelty = Novelty::baseline;
+  Sequence novelty = Sequence::baseline;
   std::uint32_t missed = 0;  ///< for `jump` and `wrap`
 
   /// Whether the event is a result that is new.
   [[nodiscard]] bool is_new() const {
-    return novelty != Novelty::baseline && novelty != Novelty::repeat;
+    return novelty != Sequence::baseline && novelty != Sequence::repeat;
   }
 };
 

@@ -33,7 +33,7 @@ class MotorMonitor {
  public:
   /// Error `unknown_name` where the profile lacks one of the names. Requires facts with a status
   /// or a speed.
-  static Result<MotorMonitor> of(const catalogue::MonitorFacts& facts,
+  static Result<MotorMonitor> of(const catalogue::MonitorSpec& facts,
                                  const catalogue::Profile& profile);
 
   /// What look() reads, to be read along with other things.
@@ -44,7 +44,7 @@ class MotorMonitor {
   [[nodiscard]] bool tells_running(std::string_view parameter) const;
   /// Whether this status says that the driver works by itself.
   [[nodiscard]] bool is_busy(const Decimal& status) const;
-  [[nodiscard]] const catalogue::MonitorFacts& facts() const { return facts_; }
+  [[nodiscard]] const catalogue::MonitorSpec& facts() const { return facts_; }
 
   /// Lays what one parameter says over a state. Error: the reading has none.
   Result<void> note(const Reading& reading, MotorState& state) const;
@@ -60,7 +60,7 @@ class MotorMonitor {
   [[nodiscard]] bool runs(std::int64_t status) const;
   [[nodiscard]] bool is_still(const Reading& reading) const;
 
-  catalogue::MonitorFacts facts_ = {};
+  catalogue::MonitorSpec facts_ = {};
   std::string speed_unit_ = {};
   std::vector<catalogue::Parameter> parameters_ = {};
   std::vector<catalogue::Parameter> proof_ = {};  ///< of a standstill

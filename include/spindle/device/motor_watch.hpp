@@ -21,10 +21,10 @@ class MotorWatch {
   /// Reads the next piece, or nothing where all of it is among the polled values. Gives back what
   /// happened since it was read last, also on an earlier connection; at first there is nothing to
   /// compare.
-  Result<std::vector<MotorNews>> take_turn(Device& device);
+  Result<std::vector<MotorTransition>> take_turn(Device& device);
 
   /// The same for what was read along with other values.
-  Result<std::vector<MotorNews>> take(Device& device, std::span<const Reading> readings);
+  Result<std::vector<MotorTransition>> take(Device& device, std::span<const Reading> readings);
 
   /// Whether take_turn() has anything to read.
   [[nodiscard]] bool needs_turns() const { return !pieces_.empty(); }

@@ -11,7 +11,7 @@
 namespace spindle::device {
 
 /// A write that may have reached the tool.
-struct TriedWrite {
+struct JournalEntry {
   catalogue::Parameter parameter;
   catalogue::Value before;
   catalogue::Value tried;
@@ -20,7 +20,7 @@ struct TriedWrite {
 };
 
 /// Whether a register holds what it held before.
-enum class PutBack : std::uint8_t {
+enum class RollbackResult : std::uint8_t {
   done,     ///< it holds its old value again
   kept,     ///< it held its old value still
   refused,  ///< the tool does not take it back
@@ -28,8 +28,8 @@ enum class PutBack : std::uint8_t {
 };
 
 struct PutBackReport {
-  TriedWrite write;
-  PutBack result = PutBack::unknown;
+  JournalEntry write;
+  RollbackResult result = RollbackResult::unknown;
   std::optional<catalogue::Value> found = std::nullopt;  ///< before anything was put back
   std::optional<catalogue::Value> now = std::nullopt;    ///< as last read; empty: not known
   std::string trouble = {};                              ///< why it is not done
@@ -37,7 +37,7 @@ struct PutBackReport {
 
 /// Is told of every write that a put-back needs, so that it can be recorded.
 struct RollbackObserver {
-  std::function<void(const TriedWrite& write)> begin = {};    ///< before the first one is sent
+  std::function<void(const JournalEntry& write)> begin = {};  ///< before the first one is sent
   std::function<void(const PutBackReport& report)> end = {};  ///< of every write, also without one
 };
 
@@ -55,7 +55,7 @@ class Rollback {
       : device_(&device), reopen_(std::move(reopen)), calm_(&calm) {}
 
   /// One report a write, in the order in which they were put back.
-  std::vector<PutBackReport> run(std::span<const TriedWrite> writes,
+  std::vector<PutBackReport> run(std::span<const JournalEntry> writes,
                                  const RollbackObserver& observer = {});
 
   /// What differs from before, once everything was put back: a tool may have changed more than it
@@ -65,7 +65,7 @@ class Rollback {
  private:
   /// One write while it is put back.
   struct Attempt {
-    const TriedWrite* write;
+    const JournalEntry* write;
     const RollbackObserver* observer;
     std::optional<catalogue::Value> found = std::nullopt;  ///< before anything was put back
     bool begun = false;                                    ///< something was sent

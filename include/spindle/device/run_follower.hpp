@@ -20,7 +20,7 @@ enum class RunEnding : std::uint8_t {
 
 struct FollowedRun {
   RunEnding ending;
-  std::optional<EventNews> event = std::nullopt;
+  std::optional<ToolEvent> event = std::nullopt;
 };
 
 struct FollowOptions {
@@ -30,7 +30,7 @@ struct FollowOptions {
 };
 
 /// Hears every new event of a run when it becomes known, the result among them.
-using HearEvent = std::function<void(const EventNews&)>;
+using HearEvent = std::function<void(const ToolEvent&)>;
 
 /// Follows one run of a tool with events, from just before the start until its result: listens,
 /// keeps the output armed and reads the running state. Starts and stops nothing. Its time limits
@@ -49,16 +49,16 @@ class RunFollower {
   Result<FollowedRun> follow(const FollowOptions& options);
 
   /// The event of a run that is over, such as that of a stop; waits for it a little.
-  Result<std::optional<EventNews>> late_event();
+  Result<std::optional<ToolEvent>> late_event();
 
   /// Switches the output off again.
   void leave();
 
  private:
   Result<std::optional<FollowedRun>> step(TimePoint deadline);
-  Result<std::optional<EventNews>> next_result(TimePoint until);
-  Result<std::optional<EventNews>> fetch_result();
-  std::optional<EventNews> sift(EventNews event);
+  Result<std::optional<ToolEvent>> next_result(TimePoint until);
+  Result<std::optional<ToolEvent>> fetch_result();
+  std::optional<ToolEvent> filter_result(ToolEvent event);
   [[nodiscard]] bool is_cut_short(const Error& error, TimePoint deadline) const;
   Result<std::optional<RunEnding>> look_at_tool();
   Result<void> arm();
@@ -74,7 +74,7 @@ class RunFollower {
   TimePoint confirm_by_ = {};
   TimePoint arm_due_ = {};
   bool has_run_ = false;
-  std::optional<EventNews> other_ = std::nullopt;  ///< the last event that is no result
+  std::optional<ToolEvent> other_ = std::nullopt;  ///< the last event that is no result
 };
 
 }  // namespace spindle::device

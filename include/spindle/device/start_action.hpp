@@ -16,16 +16,16 @@ class StartAction final : public RunModel {
   Result<void> broadcast_stop(Device& device, catalogue::StopMode mode) const override;
 
   [[nodiscard]] const catalogue::Action& start() const { return start_; }
-  [[nodiscard]] const catalogue::StartActionFacts& facts() const { return facts_; }
+  [[nodiscard]] const catalogue::StartActionSpec& facts() const { return facts_; }
 
   StartAction(StartAction&& other) noexcept
       : facts_(std::move(other.facts_)), start_(std::move(other.start_)) {}
 
  private:
-  StartAction(catalogue::StartActionFacts facts, catalogue::Action start)
+  StartAction(catalogue::StartActionSpec facts, catalogue::Action start)
       : facts_(std::move(facts)), start_(std::move(start)) {}
 
-  catalogue::StartActionFacts facts_;
+  catalogue::StartActionSpec facts_;
   catalogue::Action start_;
 };
 

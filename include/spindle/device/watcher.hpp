@@ -16,7 +16,7 @@
 namespace spindle::device {
 
 /// A polled value: its first reading, one that differs, or every sample.
-struct ValueNews {
+struct PolledValue {
   const catalogue::Parameter* parameter;
   Registers registers;
   catalogue::Value value;
@@ -24,7 +24,7 @@ struct ValueNews {
 };
 
 /// Polls that could not be made in time, since the last time that this was told.
-struct LagNews {
+struct PollLag {
   std::uint32_t missed;  ///< intervals in which nothing was read
   Duration interval;     ///< as asked for
   Duration achieved;     ///< from one poll to the next, on average
@@ -37,13 +37,14 @@ enum class LinkState : std::uint8_t {
   reconnecting,  ///< an attempt failed after the link was lost
 };
 
-struct LinkNews {
+struct LinkChange {
   LinkState state;
   unsigned attempt;  ///< how many came to nothing, this one included, since there was a link
   std::string message;
 };
 
-using News = std::variant<EventNews, ValueNews, GapNews, LagNews, LinkNews, MotorNews>;
+using WatchEvent =
+    std::variant<ToolEvent, PolledValue, EventGap, PollLag, LinkChange, MotorTransition>;
 
 enum class Samples : std::uint8_t { changes, changes_and_first, all };
 enum class Reconnection : std::uint8_t { forever, never };
@@ -58,7 +59,7 @@ struct WatchPlan {
 };
 
 /// What the listener wants next.
-enum class Heed : std::uint8_t { go_on, stop };
+enum class WatchControl : std::uint8_t { go_on, stop };
 
 /// Watches one tool: pushed and polled events as one stream, values by polling, keep-alive,
 /// re-arming, reconnection with back-off. Every loss of knowledge is in the stream. One thread.
@@ -77,7 +78,7 @@ class Watcher {
   /// What to watch on a tool of this profile; asked once for every profile that a tool turns out to
   /// have.
   using Plan = std::function<Result<WatchPlan>(const catalogue::Profile&)>;
-  using Tell = std::function<Heed(const News&)>;
+  using Tell = std::function<WatchControl(const WatchEvent&)>;
   /// When to end, asked anew at least once a second; a point in the past ends at once.
   using Until = std::function<TimePoint()>;
 
@@ -111,14 +112,14 @@ class Watcher {
   Result<void> read_values();
   Result<void> learn_meanings();
   Result<void> look_between();
-  Result<void> tell_motor(Result<std::vector<MotorNews>> news);
+  Result<void> tell_motor(Result<std::vector<MotorTransition>> news);
   [[nodiscard]] std::uint64_t requests() { return link_->device.session().counters().requests; }
   [[nodiscard]] bool polls_values() const { return !plan_.values.empty() || motor_; }
   [[nodiscard]] bool polls() const { return (source_ && source_->polls()) || polls_values(); }
   void tell_reading(std::size_t index, Reading& reading);
   void hear_waiting();
   void hear(const link::Spontaneous& frame);
-  void tell(const News& news);
+  void tell(const WatchEvent& news);
   void tell_trouble(const Error& error);
   void leave();
   [[nodiscard]] bool goes_on(const Until& until) const;

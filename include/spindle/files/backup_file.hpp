@@ -44,7 +44,7 @@ Result<BackupFile> read_backup(std::string_view text, const std::string& path);
 /// What the names and values mean. Error `bad_file` with the first fault: unknown names, registers
 /// that are another parameter's, values that do not fit the encoding, and a value and raw registers
 /// that say different things. Where only one of the two is there, it counts.
-Result<catalogue::Snapshot> understand_backup(const BackupFile& file,
-                                              const catalogue::Profile& profile);
+Result<catalogue::Snapshot> resolve_backup(const BackupFile& file,
+                                           const catalogue::Profile& profile);
 
 }  // namespace spindle::files

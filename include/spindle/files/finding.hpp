@@ -11,7 +11,7 @@ struct Place {
 };
 
 /// One fault in a file.
-struct Finding {
+struct Diagnostic {
   std::string file;
   int line = 0;    ///< from 1
   int column = 0;  ///< from 1

@@ -58,7 +58,7 @@ class ProfileStore {
 
   /// The start state for the simulated tool (the file's YAML document `part: simulation`, or that
   /// of the nearest file it extends); empty facts where there is none.
-  [[nodiscard]] Result<catalogue::SimulationFacts> load_simulation(
+  [[nodiscard]] Result<catalogue::SimulationSpec> load_simulation(
       std::string_view name_or_file) const;
 
   /// Meanings and remedies of the product's error and alarm codes (the file's `part: texts`, over
@@ -71,7 +71,7 @@ class ProfileStore {
 
   /// Every fault of a file and of those it extends, all documents; empty when it is valid. Error
   /// only when the file cannot be read or found.
-  [[nodiscard]] Result<std::vector<Finding>> check(std::string_view name_or_file) const;
+  [[nodiscard]] Result<std::vector<Diagnostic>> check(std::string_view name_or_file) const;
 
   /// Every valid profile that list() names, sorted by id. Files with faults are left out: one of a
   /// user's must not hide the others.

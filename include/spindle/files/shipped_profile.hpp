@@ -15,8 +15,8 @@ struct ShippedProfile {
   std::string_view extends;  ///< id of its base; empty: none
   bool is_abstract = false;
   const catalogue::Profile* profile;
-  const catalogue::SimulationFacts* simulation;  ///< its own, or that of the nearest base
-  const catalogue::CodeTables* codes;            ///< with those of its bases
+  const catalogue::SimulationSpec* simulation;  ///< its own, or that of the nearest base
+  const catalogue::CodeTables* codes;           ///< with those of its bases
 };
 
 /// By ascending id.

@@ -48,7 +48,7 @@ Tools salvage_tools(const std::string& path, const ReadText& read = read_text_fi
 /// What could be read of a tools file, and everything that load_tools() would refuse in it.
 struct CheckedTools {
   Tools tools;
-  std::vector<Finding> findings;
+  std::vector<Diagnostic> findings;
 };
 
 /// Error only when the file cannot be read.

@@ -134,7 +134,7 @@ class Session {
 
   /// RTU: from now on answers are believed without a proof behind them, also after trouble: a stop
   /// and its confirmation must not wait for more answers than they need.
-  void waive_proofs() { proves_ = Proves::never; }
+  void skip_verification() { proves_ = Proves::never; }
 
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
   /// Whom the requests from now on are for.
@@ -183,7 +183,7 @@ class Session {
   }
   [[nodiscard]] Duration time_to_listen() const;
   bool take_late(const modbus::Adu& stray);
-  void doubt_answers(TimePoint since);
+  void require_verification(TimePoint since);
   Result<modbus::Pdu> exchange(const modbus::Pdu& request);
   Result<modbus::Pdu> send_and_await(Outstanding& outstanding);
   Result<void> send(const modbus::Adu& adu, ByteView bytes);

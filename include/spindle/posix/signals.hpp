@@ -27,7 +27,7 @@ class SignalWatch {
 
   /// From now on SIGTSTP (Ctrl-Z) raises the interrupt as SIGINT does, instead of suspending, and
   /// the use of a terminal that is another program's now (SIGTTIN, SIGTTOU) suspends neither.
-  void stay_awake();
+  void refuse_suspend();
 
   /// What is told on standard error when a second signal ends the process; empty: nothing. Words
   /// that are too long are cut.

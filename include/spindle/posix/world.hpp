@@ -20,7 +20,7 @@ namespace spindle::posix {
 
 /// Opens real lines. What the endpoint leaves out (port, rate, parity, stop bits) is the profile's.
 std::function<Result<std::unique_ptr<link::Transport>>(
-    const link::Endpoint& endpoint, const catalogue::LinkFacts& facts, Duration connect_timeout)>
+    const link::Endpoint& endpoint, const catalogue::LinkSpec& facts, Duration connect_timeout)>
 line_opener(Clock& clock, const Interrupt& interrupt);
 
 /// The same for lines that no signal ends.
@@ -33,7 +33,7 @@ Uninterruptible uninterruptible(SignalWatch& signals, CalmTime& calm) {
   return {calm.clock,
           calm.interrupt,
           line_opener(calm),
-          [&signals] { signals.stay_awake(); },
+          [&signals] { signals.refuse_suspend(); },
           [&signals](std::string_view words) { signals.set_last_words(words); },
           start_guardian};
 }

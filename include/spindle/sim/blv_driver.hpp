@@ -52,12 +52,12 @@ class BlvBus : public Server {
 /// Devices of any profile: registers with limits, exceptions and start values; with the run model
 /// command-register also their motor. Over TCP there is one, which answers to any unit.
 std::unique_ptr<BlvBus> make_profile_bus(const catalogue::Profile& profile,
-                                         const catalogue::SimulationFacts& start,
+                                         const catalogue::SimulationSpec& start,
                                          const BlvOptions& options, const Bytes& identity);
 
 /// Requires a profile with the run model command-word.
 std::unique_ptr<BlvBus> make_blv_bus(const catalogue::Profile& profile,
-                                     const catalogue::SimulationFacts& start,
+                                     const catalogue::SimulationSpec& start,
                                      const BlvOptions& options);
 
 }  // namespace spindle::sim

@@ -54,7 +54,7 @@ class BmTool : public Server {
 
 /// Requires a profile with events.
 std::unique_ptr<BmTool> make_bm_tool(const catalogue::Profile& profile,
-                                     const catalogue::SimulationFacts& start,
+                                     const catalogue::SimulationSpec& start,
                                      const BmOptions& options);
 
 }  // namespace spindle::sim

@@ -77,7 +77,7 @@ class Peer {
   std::optional<modbus::Pdu> respond(const modbus::Adu& request, const Fault* exception,
                                      TimePoint now);
   Bytes event_bytes(const Fault* fault, modbus::TransactionId pending);
-  void hang_up(TimePoint now);
+  void disconnect(TimePoint now);
   void enqueue(Message message);
   void join_held(Message& message);
 

@@ -33,7 +33,7 @@ class PlainTool : public Server {
 };
 
 std::unique_ptr<PlainTool> make_plain_tool(const catalogue::Profile& profile,
-                                           const catalogue::SimulationFacts& start,
+                                           const catalogue::SimulationSpec& start,
                                            const PlainOptions& options);
 
 }  // namespace spindle::sim

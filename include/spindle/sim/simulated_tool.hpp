@@ -22,7 +22,7 @@ Abilities abilities_of(const catalogue::Profile& profile);
 /// follows a command word, or else registers, with the motor of a command register where there is
 /// one.
 std::unique_ptr<Server> make_simulated_server(const catalogue::Profile& profile,
-                                              const catalogue::SimulationFacts& start,
+                                              const catalogue::SimulationSpec& start,
                                               const BmOptions& tool, const BlvOptions& bus);
 
 }  // namespace spindle::sim

@@ -36,7 +36,7 @@ class Changer {
 
   /// Everything that was written since the last put_back() and that the tool may hold, now or in a
   /// moment, in the order in which it was sent.
-  [[nodiscard]] const std::vector<device::TriedWrite>& sent() const { return sent_; }
+  [[nodiscard]] const std::vector<device::JournalEntry>& sent() const { return sent_; }
 
   /// Puts all of sent() back, the last first, and records each as `rolled-back` or
   /// `not-rolled-back`; what was found as before is not written. One report a write, in that order.
@@ -45,7 +45,7 @@ class Changer {
  private:
   device::Device* device_;
   ChangeLog* log_;
-  std::vector<device::TriedWrite> sent_ = {};
+  std::vector<device::JournalEntry> sent_ = {};
 };
 
 }  // namespace spindle::work

@@ -48,7 +48,7 @@ Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Nee
 
 /// Unit 0 on a serial line is every unit, and none answers: refuses it where one tool is meant,
 /// and one tool where everybody is.
-Result<void> check_reach(const Target& target, const catalogue::Profile& profile);
+Result<void> check_addressing(const Target& target, const catalogue::Profile& profile);
 
 /// The target of a tool that was opened, with the profile that was found, to be opened again.
 Target known_target(const OpenTool& tool);

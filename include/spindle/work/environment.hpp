@@ -30,7 +30,7 @@ struct Uninterruptible {
   device::OpenTransport open;
   /// From now on a request to suspend the program (Ctrl-Z) ends it as Ctrl-C does: a suspended
   /// program stops no motor. May be empty.
-  std::function<void()> stay_awake = {};
+  std::function<void()> refuse_suspend = {};
   /// What is told when a second signal ends the program at once; empty: nothing. May be empty.
   std::function<void(std::string_view words)> set_last_words = {};
   /// Starts a second process that does `when_orphaned`, and tells what it returns, when this

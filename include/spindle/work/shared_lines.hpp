@@ -29,7 +29,7 @@ class SharedLines {
 /// Refuses two tools of one line that do not mean the same rate, parity and stop bits. `facts` are
 /// those of the targets' profiles, in their order.
 Result<void> check_same_settings(const std::vector<Target>& targets,
-                                 const std::vector<catalogue::LinkFacts>& facts);
+                                 const std::vector<catalogue::LinkSpec>& facts);
 
 /// resolve_targets() for commands that go on with all of them: refuses tools of one line that do
 /// not mean the same settings, as a frame at a wrong rate can stop a motor that runs there.

@@ -32,7 +32,7 @@ struct SimulatedTool {
 };
 
 /// How the line of a simulated serial tool is set; an empty rate is the profile's.
-modbus::SerialSettings simulated_line(const catalogue::LinkFacts& facts,
+modbus::SerialSettings simulated_line(const catalogue::LinkSpec& facts,
                                       std::optional<unsigned> baud);
 
 Result<SimulatedTool> make_simulated_tool(const std::string& profile,

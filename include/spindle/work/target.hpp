@@ -10,7 +10,7 @@
 namespace spindle::work {
 
 /// Whom a command means: one tool, or everybody on its serial line.
-enum class Reach : std::uint8_t { one, everybody };
+enum class Addressing : std::uint8_t { unicast, broadcast };
 
 /// A tool as the user named it, with everything that is known before connecting.
 struct Target {
@@ -19,7 +19,7 @@ struct Target {
   std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
   std::string torque_unit = {};  ///< of the tools file; empty: unknown
   std::vector<std::string> verified = {};
-  Reach reach = Reach::one;
+  Addressing addressing = Addressing::unicast;
   link::Reopening reopening = link::Reopening::never;
 };
 
