@@ -71,7 +71,7 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
 }
 
 Summary summary_of(const Outcome& outcome, Addressing addressing, const std::string& target) {
-  const bool everybody = reach == Addressing::broadcast;
+  const bool everybody = addressing == Addressing::broadcast;
   return {.counts = {{everybody ? "sent" : "done", count(outcome.succeeded())},
                      {"failed", count(outcome.failed())}},
           .sentence = fmt::format("{} {}, {} failed", outcome.succeeded(),

@@ -11,7 +11,7 @@ Result<Targets> resolve_one_or_group(const std::string& text, Addressing address
                                      const Context& context) {
   auto tools = resolve_compatible_targets({text}, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
-  if (reach == Addressing::broadcast && tools->size() > 1) {
+  if (addressing == Addressing::broadcast && tools->size() > 1) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("--broadcast is for everybody on one serial line, and '{}' is "
@@ -19,9 +19,9 @@ Result<Targets> resolve_one_or_group(const std::string& text, Addressing address
                                      text, tools->size()),
               .hint = "name the line, as in rtu:///dev/ttyUSB0?unit=0, or leave out --broadcast"});
   }
-  for (Target& target : *tools) target.addressing = reach;
+  for (Target& target : *tools) target.addressing = addressing;
   return Targets{.tools = std::move(*tools),
-                 .is_group = names_group(text) && reach == Addressing::unicast};
+                 .is_group = names_group(text) && addressing == Addressing::unicast};
 }
 
 Targets reopening(Targets targets) {

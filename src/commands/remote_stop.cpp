@@ -109,7 +109,7 @@ std::optional<Error> fault_of_file(const RemoteStopOptions& options, const Conte
 
 /// `unproven`: so many were acknowledged, and nothing that can be read proves them.
 Summary summary_of(const Outcome& outcome, Addressing addressing, std::size_t unproven) {
-  const bool everybody = reach == Addressing::broadcast;
+  const bool everybody = addressing == Addressing::broadcast;
   const std::size_t stopped = everybody ? 0 : outcome.succeeded() - unproven;
   const std::size_t sent = everybody ? outcome.succeeded() : unproven;
   Summary summary;
