@@ -402,7 +402,7 @@ namespace {
 
 /// A device of holding and input registers in which N has the value N, on any profile.
 struct Opened : test::ScriptedDevice {
-  explicit Opened(const Profile& profile, const LinkOptions& options = {}) {
+  explicit Opened(Profile seen_as, const LinkOptions& options = {}) : profile(std::move(seen_as)) {
     script.otherwise = [](ByteView request) {
       const Pdu pdu = test::request_of(modbus::Framing::tcp, request).pdu;
       const auto parsed = modbus::parse_request(pdu).value();
@@ -419,6 +419,7 @@ struct Opened : test::ScriptedDevice {
     REQUIRE(device.has_value());
   }
 
+  const Profile profile;
   Result<Device> device = tl::unexpected(Error());
 };
 
