@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "actions.hpp"
-#include "command_word_setup.hpp"
 #include "motor_run.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/catalogue/value.hpp"
+#include "spindle/work/command_word_setup.hpp"
 
 namespace spindle::commands {
 namespace {

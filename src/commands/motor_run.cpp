@@ -46,7 +46,9 @@ class MotorRun final : public ToolRun {
   Result<void> prepare() override {
     tables_ =
         context().profiles.load_code_tables(tool().profile->path).value_or(catalogue::CodeTables());
-    return setup_->prepare();
+    return setup_->prepare().map([this] {
+      if (const auto advice = setup_->advice(); !advice.empty()) context().renderer.note(advice);
+    });
   }
   [[nodiscard]] std::vector<report::Column> columns() const override {
     return motor_columns(Tools::one);
@@ -62,14 +64,12 @@ class MotorRun final : public ToolRun {
             .stopping = setup_->stopping()};
   }
 
-  void begin(GuardedRun& guarded, Listing& listing) override {
-    guarded_ = &guarded;
-    listing_ = &listing;
+  void begin() override {
     following_.fastest = plan_->speed;
     following_.interval = setup_->interval(look_interval);
     following_.progress = [this](Duration elapsed, const device::MotorState& state) {
-      auto read = guarded_->check_reader();
-      if (read) guarded_->show_running(elapsed, speed_in_words(state));
+      auto read = output().check_reader();
+      if (read) output().show_running(elapsed, speed_in_words(state));
       return read;
     };
     following_.hear = [this](const device::MotorTransition& news) { tell(news); };
@@ -113,11 +113,11 @@ class MotorRun final : public ToolRun {
 
   RunEnd judge(const Result<void>& followed) override {
     if (!followed) {
-      guarded_->fail_following(followed.error());
+      output().fail_following(followed.error());
     } else if (auto error = error_of(*ending_)) {
-      guarded_->fail(*error);
+      output().fail(*error);
     } else {
-      guarded_->outcome().succeed();
+      output().outcome().succeed();
     }
     const std::string result(followed ? ending_words.text(*ending_) : "");
     return {.result = result,
@@ -133,7 +133,7 @@ class MotorRun final : public ToolRun {
 
   void tell(const device::MotorTransition& news) {
     news_.push_back(news);
-    listing_->add(motor_record(news, tool().target, tables_));
+    output().add(motor_record(news, tool().target, tables_));
   }
 
   [[nodiscard]] bool has_told(device::MotorEvent event) const {
@@ -189,8 +189,6 @@ class MotorRun final : public ToolRun {
   std::unique_ptr<MotorSetup> setup_;
   std::unique_ptr<device::Stopper> stopper_ = nullptr;
   catalogue::CodeTables tables_ = {};
-  GuardedRun* guarded_ = nullptr;  ///< these: from just before the start
-  Listing* listing_ = nullptr;
   device::MotorFollowOptions following_ = {};
   std::optional<MotorEnding> ending_ = std::nullopt;  ///< empty: it could not be followed
   std::vector<device::MotorTransition> news_ = {};

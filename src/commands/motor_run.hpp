@@ -3,8 +3,8 @@
 #include <functional>
 #include <memory>
 
-#include "motor_setup.hpp"
 #include "run.hpp"
+#include "spindle/work/motor_setup.hpp"
 
 namespace spindle::commands {
 

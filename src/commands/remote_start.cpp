@@ -26,7 +26,7 @@ Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context
     return tl::unexpected(std::move(agreed.error()));
   }
   const auto mode = options.stop.value_or(catalogue::StopMode::decelerate);
-  return run_guarded(*plan->on(tool, context), mode, tool, context);
+  return run_and_tell(*plan->on(tool, context), mode, tool, context);
 }
 
 }  // namespace spindle::commands

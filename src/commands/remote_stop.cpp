@@ -5,15 +5,15 @@
 #include <optional>
 #include <thread>
 
-#include "last_words.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/last_words.hpp"
 #include "spindle/work/shared_lines.hpp"
 #include "spindle/work/side_by_side.hpp"
-#include "stop_pursuit.hpp"
+#include "spindle/work/stop_pursuit.hpp"
 #include "stops.hpp"
 
 namespace spindle::commands {

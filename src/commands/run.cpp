@@ -94,34 +94,13 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options, con
   return plan_command_register(options, profile, target);
 }
 
-Result<Outcome> run_guarded(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
-                            Context& context) {
-  GuardedRun guarded(tool, context);
-  if (auto guardian = guarded.set_guardian(run.settings_in_words(), mode); !guardian) {
-    return tl::unexpected(std::move(guardian.error()));
-  }
-  if (auto ready = run.prepare(); !ready) {
-    return tl::unexpected(with_left(std::move(ready.error()), run.put_back()));
-  }
-  Listing listing(context, run.columns());
-  work::LoggedChange started = run.start_change();
-  const std::string id = run.log().begin(started);
-  auto [followed, stop] = guarded.run(
-      run.motion(), [&] { run.begin(guarded, listing); }, [&] { return run.follow(); });
-  run.look_back(followed, stop);
-  const bool stands = stop.result == device::StopResult::confirmed;
-  guarded.leave(stands ? run.put_back() : run.left());
-  const RunEnd end = run.judge(followed);
-  started.result = log_word(end.logged, stop);
-  run.log().end(id, started);
-  return guarded.end(listing, stop, end);
-}
-
-Error bad_option(std::string_view option, std::string message, std::string hint) {
-  return {.code = Errc::usage,
-          .message = std::move(message),
-          .hint = std::move(hint),
-          .name = std::string(option)};
+Result<Outcome> run_and_tell(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
+                             Context& context) {
+  const auto columns = run.columns();
+  RunOutput output(columns, tool, context);
+  run.show_on(output);
+  return run_guarded(run, mode, tool, run.log(), context, output)
+      .and_then([&](const work::RunReport& report) { return output.end(report); });
 }
 
 }  // namespace spindle::commands

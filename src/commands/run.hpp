@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "guarded_run.hpp"
+#include "run_output.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/work/change_log.hpp"
@@ -12,51 +12,33 @@
 
 namespace spindle::commands {
 
-/// One guarded run of one tool, as its run model sets it up, follows it and tells of it. The order
-/// of the calls is that of run_guarded().
-class ToolRun {
+/// One run of one tool, which its model also asks for and tells of.
+class ToolRun : public work::Run {
  public:
   /// Both must outlive it.
   ToolRun(OpenTool& tool, Context& context);
-  ToolRun(const ToolRun&) = delete;
-  ToolRun& operator=(const ToolRun&) = delete;
-  virtual ~ToolRun() = default;
 
   /// Asks the user with what the tool itself says. Changes nothing.
   virtual Result<void> ask() = 0;
 
-  /// What it sets beside the motion, in words; empty: nothing.
-  [[nodiscard]] virtual std::string settings_in_words() const = 0;
-  /// Checks that the tool may be started, and sets it. Nothing moves.
-  virtual Result<void> prepare() = 0;
   [[nodiscard]] virtual std::vector<report::Column> columns() const = 0;
-  /// The start, as the change log names it.
-  [[nodiscard]] virtual work::LoggedChange start_change() const = 0;
-  [[nodiscard]] virtual device::GuardedMotion motion() = 0;
-  /// Just before the start is sent: the time allowed begins. Both outlive follow() and judge().
-  virtual void begin(GuardedRun& guarded, Listing& listing) = 0;
-  /// Returns when the run is over or has to be ended.
-  virtual Result<void> follow() = 0;
-  /// Behind the stop: what can be read now may say more of how it ended.
-  virtual void look_back(Result<void>& followed, const device::StopReport& stop) = 0;
-  /// Of a tool that stands still, also after prepare() failed. Returns what could not be set back.
-  virtual std::vector<Left> put_back() = 0;
-  /// What was set and not set back, of a tool that may still run.
-  [[nodiscard]] virtual std::vector<Left> left() const = 0;
-  /// How it ended; what is wrong with that is an error of the guarded run.
-  virtual RunEnd judge(const Result<void>& followed) = 0;
 
+  /// Where it is shown from now on. It must outlive the run.
+  void show_on(RunOutput& output) { output_ = &output; }
   /// Where it is recorded.
   [[nodiscard]] work::ChangeLog& log() { return log_; }
 
  protected:
   [[nodiscard]] OpenTool& tool() const { return *tool_; }
   [[nodiscard]] Context& context() const { return *context_; }
+  /// Requires show_on().
+  [[nodiscard]] RunOutput& output() const { return *output_; }
 
  private:
   OpenTool* tool_;
   Context* context_;
   work::ChangeLog log_;
+  RunOutput* output_ = nullptr;
 };
 
 /// Everything about a run that is decided before its tool is touched.
@@ -79,10 +61,7 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options,
                                           const catalogue::Profile& profile, const Target& target);
 
 /// Sets, starts, follows and always stops; sets back, logs and tells. `mode` is how it is stopped.
-Result<Outcome> run_guarded(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
-                            Context& context);
-
-/// An option that is missing or wrong.
-Error bad_option(std::string_view option, std::string message, std::string hint = {});
+Result<Outcome> run_and_tell(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
+                             Context& context);
 
 }  // namespace spindle::commands

@@ -14,7 +14,7 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/device/run_follower.hpp"
 #include "spindle/device/start_action.hpp"
-#include "start_action_setup.hpp"
+#include "spindle/work/start_action_setup.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -79,10 +79,9 @@ class StartActionRun final : public ToolRun {
   }
   [[nodiscard]] device::GuardedMotion motion() override { return device::motion_of(plan_->start); }
 
-  void begin(GuardedRun& guarded, Listing& listing) override {
-    guarded_ = &guarded;
-    listing_ = &listing;
+  void begin() override {
     limits_ = limit_run();
+    is_begun_ = true;
   }
   Result<void> follow() override {
     auto ended = follower_->follow(limits_);
@@ -111,7 +110,7 @@ class StartActionRun final : public ToolRun {
  private:
   /// What happens to the tool between its start and its end.
   void tell(const device::ToolEvent& event) {
-    if (listing_ != nullptr) listing_->add(records_->event(event));
+    if (is_begun_) output().add(records_->event(event));
   }
 
   /// The time allowed begins before the start is sent, and its echo is not waited for any longer.
@@ -126,8 +125,8 @@ class StartActionRun final : public ToolRun {
   }
 
   Result<void> go_on(Duration elapsed) {
-    auto read = guarded_->check_reader();
-    if (read) guarded_->show_running(elapsed);
+    auto read = output().check_reader();
+    if (read) output().show_running(elapsed);
     return read;
   }
 
@@ -142,11 +141,11 @@ class StartActionRun final : public ToolRun {
   void judge(const Result<void>& followed, std::optional<EventKind> kind) {
     const bool tightened = kind == EventKind::fastening_ok;
     if (!followed && !(tightened && followed.error().code == Errc::closed_pipe)) {
-      guarded_->fail_following(followed.error());
+      output().fail_following(followed.error());
       return;
     }
     if (ended_ && ended_->ending == RunEnding::ignored && !kind) {
-      guarded_->fail(
+      output().fail(
           with_target(Error{.code = Errc::mismatch,
                             .message = "the tool acknowledged the start, but does not run",
                             .hint = "is it locked, or without a battery charge?",
@@ -155,15 +154,15 @@ class StartActionRun final : public ToolRun {
       return;
     }
     if (ended_ && ended_->ending == RunEnding::ended && !kind) {
-      guarded_->fail(with_target(Error{.code = Errc::no_answer,
-                                       .message = "the tool ran, but never sent a result",
-                                       .hint = "'spindle get' with 'event.*' shows its last event"},
-                                 tool().target));
+      output().fail(with_target(Error{.code = Errc::no_answer,
+                                      .message = "the tool ran, but never sent a result",
+                                      .hint = "'spindle get' with 'event.*' shows its last event"},
+                                tool().target));
       return;
     }
     // Success is a screw that is tight, and nothing else.
-    guarded_->outcome().succeed();
-    if (!tightened) guarded_->outcome().negate();
+    output().outcome().succeed();
+    if (!tightened) output().outcome().negate();
   }
 
   const RemoteStartOptions* options_;
@@ -171,8 +170,7 @@ class StartActionRun final : public ToolRun {
   StartActionSetup setup_;
   std::optional<NewsRecords> records_ = std::nullopt;
   std::optional<device::RunFollower> follower_ = std::nullopt;
-  GuardedRun* guarded_ = nullptr;  ///< these: from just before the start
-  Listing* listing_ = nullptr;
+  bool is_begun_ = false;
   device::FollowOptions limits_ = {};
   std::optional<device::FollowedRun> ended_ = std::nullopt;  ///< empty: it could not be followed
   std::optional<device::ToolEvent> event_ = std::nullopt;

@@ -29,18 +29,4 @@ std::span<const report::Column> stop_columns() {
   return columns;
 }
 
-std::string where_to_stop(const catalogue::Profile* profile) {
-  const std::string here = "stop it at the tool";
-  const std::string more = profile == nullptr ? "" : device::still_runs_words(*profile);
-  return more.empty() ? here : here + "; " + more;
-}
-
-Error still_runs(const Target& target, const catalogue::Profile* profile) {
-  return with_target(
-      Error{.code = Errc::mismatch,
-            .message = "the stop was acknowledged, but the tool still says that it runs",
-            .hint = where_to_stop(profile)},
-      target);
-}
-
 }  // namespace spindle::commands

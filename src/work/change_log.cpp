@@ -60,4 +60,16 @@ Result<void> ChangeLog::append(const std::string& line) {
   return disk_->append_line(folder + "/changes.jsonl", line);
 }
 
+ChangeLog change_log(std::string_view command, const OpenTool& tool, const Environment& environment,
+                     ChangeLog::Warn warn) {
+  const auto& identity = tool.device.identity();
+  return {{.command = std::string(command),
+           .target = tool.target.shown,
+           .serial = identity ? identity->serial : std::string(),
+           .folder = environment.state_folder},
+          environment.disk,
+          environment.clock,
+          std::move(warn)};
+}
+
 }  // namespace spindle::work

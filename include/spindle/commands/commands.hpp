@@ -8,6 +8,7 @@
 #include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
 #include "spindle/work/action.hpp"
+#include "spindle/work/run.hpp"
 #include "spindle/work/simulated_tool.hpp"
 #include "spindle/work/snapshot.hpp"
 
@@ -88,20 +89,8 @@ struct WatchOptions {
 };
 Result<Outcome> watch(const WatchOptions& options, Context& context);
 
-struct RemoteStartOptions {
-  std::string target;
-  std::string preset;             ///< value of the action select-preset; empty: leave as it is
-  std::string direction;          ///< value of the action direction; empty: leave as it is
-  std::optional<Duration> limit;  ///< stop after this time
-  Acceptance acceptance = Acceptance::verified_only;
-  // Of a motor that a command word runs.
-  std::string speed = {};  ///< r/min
-  catalogue::Direction direction_of_motor = catalogue::Direction::forward;
-  std::optional<std::uint16_t> operation = std::nullopt;  ///< operation data; empty: the profile's
-  std::string acceleration = {};                          ///< seconds; empty: leave as it is
-  std::string deceleration = {};                          ///< seconds; empty: leave as it is
-  std::optional<Duration> watchdog = std::nullopt;        ///< the driver's own; empty: leave it
-  std::optional<catalogue::StopMode> stop = std::nullopt;
+struct RemoteStartOptions : work::RunOptions {
+  std::string target = {};
 };
 Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context);
 /// The options that the run model of a profile declares beside those of every model, as typed:

@@ -12,6 +12,7 @@
 #include "spindle/catalogue/parameter.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/files/change_log.hpp"
+#include "spindle/work/connect.hpp"
 
 namespace spindle::work {
 
@@ -64,5 +65,9 @@ class ChangeLog {
   bool folder_made_ = false;
   bool warned_ = false;
 };
+
+/// The record of changes of a command on this tool. `environment` must outlive it.
+ChangeLog change_log(std::string_view command, const OpenTool& tool, const Environment& environment,
+                     ChangeLog::Warn warn);
 
 }  // namespace spindle::work

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
 
@@ -20,5 +22,11 @@ Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
 /// Tells every motor on the line to stop, more than once, as none of them acknowledges it.
 Result<void> broadcast_stop(device::Device& device, const device::RunModel& model,
                             catalogue::StopMode mode);
+
+/// What helps where a stop could not be confirmed, with what else may keep this product running.
+std::string where_to_stop(const catalogue::Profile* profile);
+
+/// The stop was acknowledged, and the tool says that it runs all the same. `profile` may be null.
+Error still_runs(const Target& target, const catalogue::Profile* profile);
 
 }  // namespace spindle::work

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "command_word_setup.hpp"
-#include "spindle/commands/context.hpp"
+#include "spindle/work/command_word_setup.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/environment.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
 
 /// A neighbour that is switched off must not keep the user waiting.
@@ -44,7 +44,7 @@ Result<std::string> WordSetup::group_in_words() {
   }
   session.set_unit(unit);
   session.set_answer_timeout(usual);
-  device.set_retries(context().common.retries.value_or(tool().profile->link.retries));
+  device.set_retries(environment().common.retries.value_or(tool().profile->link.retries));
   if (!children.empty()) {
     return fmt::format(
         "{} is the parent of a group ({}), of which only its own motor is set and "
@@ -62,8 +62,8 @@ std::vector<Target> WordSetup::neighbours() const {
   std::vector<Target> found;
   const std::string line = shared_line(tool().target.endpoint);
   if (line.empty()) return found;
-  for (const files::Tool& known : context().tools.tools) {
-    for (Target& other : resolve_each_target({known.name}, context()).targets) {
+  for (const files::Tool& known : environment().tools.tools) {
+    for (Target& other : resolve_each_target({known.name}, environment()).targets) {
       const auto& unit = other.endpoint.unit;
       const bool is_other =
           unit && unit->value != 0 && unit->value != tool().device.session().options().unit.value;
@@ -75,4 +75,4 @@ std::vector<Target> WordSetup::neighbours() const {
   return found;
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "motor_setup.hpp"
 #include "spindle/device/command_word.hpp"
+#include "spindle/work/motor_setup.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// What is decided of a run before the driver is touched.
 struct WordPlan : MotorPlan {
@@ -22,8 +22,8 @@ struct WordPlan : MotorPlan {
 /// The operation data and the watchdog, by function 06, which the drivers of a group do not hear.
 class WordSetup final : public MotorSetup {
  public:
-  WordSetup(const WordPlan& plan, OpenTool& tool, Context& context, work::ChangeLog& log)
-      : MotorSetup(plan.motor->monitor(), tool, context, log), plan_(&plan) {}
+  WordSetup(const WordPlan& plan, OpenTool& tool, const Environment& environment, ChangeLog& log)
+      : MotorSetup(plan.motor->monitor(), tool, environment, log), plan_(&plan) {}
 
   Result<void> look() override;
   Result<std::string> group_in_words() override;
@@ -37,6 +37,7 @@ class WordSetup final : public MotorSetup {
   [[nodiscard]] Duration stopping() const override { return found_.stopping; }
   /// A watchdog that is on is fed more often than it bites.
   [[nodiscard]] Duration interval(Duration usual) const override;
+  [[nodiscard]] std::string advice() const override;
   [[nodiscard]] std::string hint_not_started() const override;
   [[nodiscard]] std::string hint_too_fast() const override;
 
@@ -77,4 +78,4 @@ class WordSetup final : public MotorSetup {
   bool cleared_word_ = false;  ///< it had a run bit, which stays cleared
 };
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

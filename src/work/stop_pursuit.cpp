@@ -1,13 +1,13 @@
-#include "stop_pursuit.hpp"
+#include "spindle/work/stop_pursuit.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "stops.hpp"
+#include "spindle/work/stop.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
 
 using catalogue::Profile;
@@ -31,26 +31,26 @@ bool is_hopeless(const Error& error) {
 
 }  // namespace
 
-StopPursuit::StopPursuit(const Target& target, StopMode mode, const Context& context)
+StopPursuit::StopPursuit(const Target& target, StopMode mode, const Environment& environment)
     : target_(target),
       mode_(mode),
-      wanted_connect_(context.common.connect_timeout),
+      wanted_connect_(environment.common.connect_timeout),
       usual_(wanted_connect_.value_or(catalogue::LinkSpec().connect)),
-      context_(context),
+      environment_(environment),
       guard_(
-          motion(), [this](Duration patience) { return open(patience); }, context_.clock,
+          motion(), [this](Duration patience) { return open(patience); }, environment_.clock,
           Duration::zero()) {}
 
-StopPursuit::StopPursuit(const OpenTool& tool, StopMode mode, const Context& context)
+StopPursuit::StopPursuit(const OpenTool& tool, StopMode mode, const Environment& environment)
     : target_(tool.target),
       mode_(mode),
-      wanted_connect_(context.common.connect_timeout),
+      wanted_connect_(environment.common.connect_timeout),
       usual_(wanted_connect_.value_or(tool.profile->link.connect)),
-      context_(context),
+      environment_(environment),
       profile_(tool.profile.get()),
       generation_is_checked_(true),
       guard_(
-          motion(), [this](Duration patience) { return open(patience); }, context_.clock,
+          motion(), [this](Duration patience) { return open(patience); }, environment_.clock,
           start_under_way) {
   target_.endpoint.claim = link::Claim::beside;
   // It was started, so it can be stopped. On a line that was left in the middle of an exchange what
@@ -77,7 +77,7 @@ Result<StopResult> StopPursuit::result() {
 }
 
 Result<device::Device> StopPursuit::open(Duration patience) {
-  context_.common.connect_timeout = std::min(usual_, patience);
+  environment_.common.connect_timeout = std::min(usual_, patience);
   auto device = profile_ == nullptr && target_.profile.empty() ? connect_unknown() : connect();
   if (!device) last_ = device.error();
   return device;
@@ -87,12 +87,12 @@ Result<device::Device> StopPursuit::open(Duration patience) {
 /// are others is not written to.
 Result<device::Device> StopPursuit::connect() {
   if (profile_ == nullptr) {
-    auto profile = load_profile(target_, context_);
+    auto profile = load_profile(target_, environment_);
     if (!profile) return tl::unexpected(std::move(profile.error()));
     auto adopted = adopt(std::make_unique<const Profile>(std::move(*profile)));
     if (!adopted) return tl::unexpected(std::move(adopted.error()));
   }
-  auto device = connect_device(target_, *profile_, context_);
+  auto device = connect_device(target_, *profile_, environment_);
   if (!device) return device;
   return check_generation(*device).map([&] { return std::move(*device); });
 }
@@ -113,12 +113,12 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
 }
 
 Result<device::Device> StopPursuit::connect_unknown() {
-  const CommonOptions usual = context_.common;
+  const CommonOptions usual = environment_.common;
   const Duration patience = usual.timeout.value_or(catalogue::LinkSpec().answer);
-  context_.common.retries = 0;  // a question that got lost is asked on a new connection
-  if (++questions_ <= soon_repeated) context_.common.timeout = std::min(patience, soon);
-  auto tool = open_tool(target_, Profile(), Need::named_registers, context_);
-  context_.common = usual;
+  environment_.common.retries = 0;  // a question that got lost is asked on a new connection
+  if (++questions_ <= soon_repeated) environment_.common.timeout = std::min(patience, soon);
+  auto tool = open_tool(target_, Profile(), Need::named_registers, environment_);
+  environment_.common = usual;
   if (!tool) return tl::unexpected(std::move(tool.error()));
   generation_is_checked_ = true;
   auto adopted = adopt(std::move(tool->profile));
@@ -157,4 +157,4 @@ Result<StopResult> StopPursuit::send_stop(device::Device& device, Clock& clock) 
   return stopper_->stop(device, clock);
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,4 +1,4 @@
-#include "start_action_setup.hpp"
+#include "spindle/work/start_action_setup.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "records.hpp"
-#include "spindle/commands/commands.hpp"
+#include "spindle/work/snapshot.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 namespace {
 
 using catalogue::Action;
@@ -122,7 +121,7 @@ Result<void> StartActionSetup::select() {
   for (Selected& selected : selected_) {
     const ActionRequest& request = selected.request;
     selected.tried = true;
-    const auto result = perform_recorded(request, *tool_, *log_, *context_);
+    const auto result = perform_recorded(request, *tool_, *log_, *environment_);
     if (!result) return tl::unexpected(result.error());
     if (result == device::ActionResult::not_confirmed) {
       return tl::unexpected(with_target(not_confirmed(request), tool_->target));
@@ -140,16 +139,17 @@ std::vector<Left> StartActionSetup::put_back() {
       left.push_back(left_of(*selected, before ? "no command selects that" : ""));
       continue;
     }
-    if (context_->uninterruptible.refuse_suspend) context_->uninterruptible.refuse_suspend();
-    work::LoggedChange change{.name = request.action.name,
-                              .register_address = request.action.address.value,
-                              .old_value = Decimal(request.value),
-                              .new_value = Decimal(*before)};
+    if (environment_->uninterruptible.refuse_suspend)
+      environment_->uninterruptible.refuse_suspend();
+    LoggedChange change{.name = request.action.name,
+                        .register_address = request.action.address.value,
+                        .old_value = Decimal(request.value),
+                        .new_value = Decimal(*before)};
     const std::string id = log_->begin(change);
     const auto report = device::undo(
         {request.action, request.value, *before}, tool_->device,
         [this](Duration patience) { return uninterruptible_line_.connect(patience); },
-        context_->uninterruptible.clock);
+        environment_->uninterruptible.clock);
     if (report.found) change.old_value = Decimal(*report.found);
     const bool done = report.result == device::RollbackResult::done ||
                       report.result == device::RollbackResult::kept;
@@ -178,4 +178,4 @@ Left StartActionSetup::left_of(const Selected& selected, std::string trouble) {
           .trouble = std::move(trouble)};
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -1,4 +1,4 @@
-#include "command_word_setup.hpp"
+#include "spindle/work/command_word_setup.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,10 +7,9 @@
 #include <limits>
 #include <utility>
 
-#include "run.hpp"
 #include "spindle/catalogue/value.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 using catalogue::CommandWordSpec;
 using catalogue::Parameter;
@@ -92,8 +91,8 @@ std::unique_ptr<device::Stopper> WordSetup::stopper(catalogue::StopMode mode) co
 Duration WordSetup::interval(Duration usual) const {
   const auto& watchdog = plan_->watchdog ? plan_->watchdog : found_.watchdog;
   if (!watchdog || watchdog->number == Decimal(0)) return usual;
-  const Duration bites = std::chrono::milliseconds(watchdog->number.mantissa());
-  return std::min(usual, bites / looks_per_watchdog);
+  const Duration watchdog_period = std::chrono::milliseconds(watchdog->number.mantissa());
+  return std::min(usual, watchdog_period / looks_per_watchdog);
 }
 
 std::string WordSetup::hint_not_started() const {
@@ -181,7 +180,7 @@ Result<void> WordSetup::clear_word() {
 Result<void> WordSetup::write_settings() {
   for (const auto& [parameter, value] : plan_->settings) {
     if (auto written = write_one(parameter, value); !written) {
-      return tl::unexpected(work::of_write(parameter.name, std::move(written.error())));
+      return tl::unexpected(of_write(parameter.name, std::move(written.error())));
     }
     const bool is_stop =
         parameter.name == catalogue::numbered_name(facts().deceleration, plan_->operation);
@@ -194,17 +193,17 @@ Result<void> WordSetup::write_settings() {
 }
 
 Result<void> WordSetup::set_watchdog() {
+  if (!plan_->watchdog) return {};
+  return write_one(*plan_->watchdog_parameter, *plan_->watchdog);
+}
+
+std::string WordSetup::advice() const {
   const bool is_off = !found_.watchdog || found_.watchdog->number == Decimal(0);
-  if (plan_->watchdog) {
-    return write_one(*plan_->watchdog_parameter, *plan_->watchdog);
-  }
-  if (is_off && plan_->watchdog_parameter) {
-    context().renderer.note(
-        fmt::format("{}: {} is off: if this computer or the line fails, the motor runs on; with "
-                    "--watchdog 1s the driver itself stops it",
-                    tool().target.shown, plan_->watchdog_parameter->name));
-  }
-  return {};
+  if (plan_->watchdog || !is_off || !plan_->watchdog_parameter) return {};
+  return fmt::format(
+      "{}: {} is off: if this computer or the line fails, the motor runs on; with "
+      "--watchdog 1s the driver itself stops it",
+      tool().target.shown, plan_->watchdog_parameter->name);
 }
 
 void WordSetup::add_left(std::vector<Left>& left) const {
@@ -215,4 +214,4 @@ void WordSetup::add_left(std::vector<Left>& left) const {
                   .trouble = "its run bit would start the motor when a speed is set"});
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

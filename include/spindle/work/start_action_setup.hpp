@@ -5,14 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "actions.hpp"
-#include "change_log.hpp"
-#include "guarded_run.hpp"
-#include "spindle/commands/commands.hpp"
 #include "spindle/device/action_undo.hpp"
+#include "spindle/work/run.hpp"
 #include "spindle/work/uninterruptible_line.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// Everything about the run of such a tool that is decided before it is touched.
 struct StartActionPlan {
@@ -25,13 +22,13 @@ struct StartActionPlan {
 class StartActionSetup {
  public:
   /// All must outlive it.
-  StartActionSetup(const StartActionPlan& plan, OpenTool& tool, Context& context,
-                   work::ChangeLog& log)
+  StartActionSetup(const StartActionPlan& plan, OpenTool& tool, const Environment& environment,
+                   ChangeLog& log)
       : plan_(&plan),
         tool_(&tool),
-        context_(&context),
+        environment_(&environment),
         log_(&log),
-        uninterruptible_line_(tool, context) {}
+        uninterruptible_line_(tool, environment) {}
 
   /// Checks that the tool has no alarm and stands still (whether it is locked cannot be read on
   /// every product), and reads what is going to be changed. Only reads.
@@ -66,10 +63,10 @@ class StartActionSetup {
 
   const StartActionPlan* plan_;
   OpenTool* tool_;
-  Context* context_;
-  work::ChangeLog* log_;
+  const Environment* environment_;
+  ChangeLog* log_;
   UninterruptibleLine uninterruptible_line_;
   std::vector<Selected> selected_ = {};
 };
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -3,23 +3,23 @@
 #include <memory>
 #include <optional>
 
-#include "spindle/commands/context.hpp"
 #include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/environment.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// A stop of one tool that this program did not start, or of which it knows nothing any more. It is
 /// pursued as a guard does it: for about ten seconds, over lost answers and lost connections, and
 /// signals do not end it.
 class StopPursuit {
  public:
-  /// What the tool is comes from its profile, or where none is named from its identity. `context`
-  /// is one that signals do not end; its references must outlive it.
-  StopPursuit(const Target& target, catalogue::StopMode mode, const Context& context);
+  /// What the tool is comes from its profile, or where none is named from its identity.
+  /// `environment` is one that signals do not end; its references must outlive it.
+  StopPursuit(const Target& target, catalogue::StopMode mode, const Environment& environment);
   /// Of a tool that is known, and to which a start may still be under way. Its connection is not
   /// used.
-  StopPursuit(const OpenTool& tool, catalogue::StopMode mode, const Context& context);
+  StopPursuit(const OpenTool& tool, catalogue::StopMode mode, const Environment& environment);
   StopPursuit(const StopPursuit&) = delete;
   StopPursuit& operator=(const StopPursuit&) = delete;
   ~StopPursuit() = default;
@@ -51,7 +51,7 @@ class StopPursuit {
   catalogue::StopMode mode_;
   std::optional<Duration> wanted_connect_;  ///< what the user said of the time to connect
   Duration usual_;                          ///< time to connect
-  Context context_;                         ///< lines that are opened on it refer to it
+  Environment environment_;                 ///< lines that are opened on it refer to it
   std::unique_ptr<const catalogue::Profile> own_profile_ = nullptr;
   const catalogue::Profile* profile_ = nullptr;  ///< null: not known yet
   std::unique_ptr<const device::RunModel> model_ = nullptr;
@@ -63,4 +63,4 @@ class StopPursuit {
   device::RunGuard guard_;  ///< its device needs the profile
 };
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

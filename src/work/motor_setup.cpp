@@ -1,14 +1,13 @@
-#include "motor_setup.hpp"
+#include "spindle/work/motor_setup.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <utility>
 
-#include "run.hpp"
 #include "spindle/catalogue/value.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 using catalogue::Parameter;
 using catalogue::Value;
@@ -102,11 +101,11 @@ std::vector<Left> MotorSetup::put_back() {
   std::vector<Left> left;
   add_left(left);
   if (changer_.sent().empty()) return left;
-  if (context_->uninterruptible.refuse_suspend) context_->uninterruptible.refuse_suspend();
+  if (environment_->uninterruptible.refuse_suspend) environment_->uninterruptible.refuse_suspend();
   begin_put_back();
   device::Rollback rollback(
       tool_->device, [this](Duration patience) { return uninterruptible_line_.connect(patience); },
-      context_->uninterruptible.clock);
+      environment_->uninterruptible.clock);
   for (const device::PutBackReport& report : changer_.put_back(rollback)) {
     const bool as_before = report.result == device::RollbackResult::done ||
                            report.result == device::RollbackResult::kept;
@@ -133,4 +132,4 @@ Left MotorSetup::left_of(const device::JournalEntry& write, std::string trouble)
           .trouble = std::move(trouble) + left_note(write.parameter)};
 }
 
-}  // namespace spindle::commands
+}  // namespace spindle::work

@@ -7,23 +7,21 @@
 #include <utility>
 #include <vector>
 
-#include "change_log.hpp"
-#include "guarded_run.hpp"
-#include "spindle/commands/commands.hpp"
-#include "spindle/commands/context.hpp"
 #include "spindle/device/rollback.hpp"
 #include "spindle/device/run_model.hpp"
 #include "spindle/work/change.hpp"
+#include "spindle/work/environment.hpp"
+#include "spindle/work/run.hpp"
 #include "spindle/work/uninterruptible_line.hpp"
 
-namespace spindle::commands {
+namespace spindle::work {
 
 /// A parameter and what it is to be.
 using Setting = std::pair<catalogue::Parameter, catalogue::Value>;
 
 /// What every run of a motor decides before its driver is touched.
 struct MotorPlan {
-  RemoteStartOptions options;
+  RunOptions options;
   std::vector<Setting> settings = {};           ///< the speed first, where it has one
   std::optional<Decimal> speed = std::nullopt;  ///< empty: the driver's own
   std::string speed_unit = {};                  ///< as people read it: "r/min"
@@ -48,13 +46,13 @@ std::string settings_in_words(const std::vector<Setting>& settings);
 class MotorSetup {
  public:
   /// All must outlive it. `monitor` may be null.
-  MotorSetup(const device::MotorMonitor* monitor, OpenTool& tool, Context& context,
-             work::ChangeLog& log)
+  MotorSetup(const device::MotorMonitor* monitor, OpenTool& tool, const Environment& environment,
+             ChangeLog& log)
       : monitor_(monitor),
         tool_(&tool),
-        context_(&context),
+        environment_(&environment),
         changer_(tool.device, log),
-        uninterruptible_line_(tool, context) {}
+        uninterruptible_line_(tool, environment) {}
   MotorSetup(const MotorSetup&) = delete;
   MotorSetup& operator=(const MotorSetup&) = delete;
   virtual ~MotorSetup() = default;
@@ -80,6 +78,8 @@ class MotorSetup {
   /// How often it has to be asked at least.
   [[nodiscard]] virtual Duration interval(Duration usual) const { return usual; }
 
+  /// What the user should know of the run, as a sentence; may be empty.
+  [[nodiscard]] virtual std::string advice() const { return {}; }
   /// What to look at where a motor did not start, or ran too fast.
   [[nodiscard]] virtual std::string hint_not_started() const = 0;
   [[nodiscard]] virtual std::string hint_too_fast() const { return {}; }
@@ -92,8 +92,8 @@ class MotorSetup {
 
  protected:
   [[nodiscard]] OpenTool& tool() const { return *tool_; }
-  [[nodiscard]] Context& context() const { return *context_; }
-  [[nodiscard]] work::Changer& changer() { return changer_; }
+  [[nodiscard]] const Environment& environment() const { return *environment_; }
+  [[nodiscard]] Changer& changer() { return changer_; }
   /// Error `negative` where an alarm is present, or the motor runs or its driver works.
   Result<void> check_at_rest();
   /// Reads what a parameter is, and writes it where it is something else.
@@ -114,9 +114,9 @@ class MotorSetup {
 
   const device::MotorMonitor* monitor_;
   OpenTool* tool_;
-  Context* context_;
-  work::Changer changer_;
+  const Environment* environment_;
+  Changer changer_;
   UninterruptibleLine uninterruptible_line_;
 };
 
-}  // namespace spindle::commands
+}  // namespace spindle::work
