@@ -13,7 +13,7 @@ struct CodePoints {
 // Made of the Unicode Character Database 14.0.0 by tests/generated/character_table_test.py.
 
 /// General categories Mn and Me, the joiners, and Hangul Jamo that join.
-inline constexpr std::array<CodePoints, 307> no_cell = {{
+inline constexpr std::array<CodePoints, 307> zero_width = {{
     {0x0300, 0x036F},   {0x0483, 0x0489},   {0x0591, 0x05BD},   {0x05BF, 0x05BF},
     {0x05C1, 0x05C2},   {0x05C4, 0x05C5},   {0x05C7, 0x05C7},   {0x0610, 0x061A},
     {0x064B, 0x065F},   {0x0670, 0x0670},   {0x06D6, 0x06DC},   {0x06DF, 0x06E4},

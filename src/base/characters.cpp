@@ -22,8 +22,8 @@ bool is_control(char32_t character) {
 }  // namespace
 
 std::size_t cell_width(char32_t character) {
-  if (character < no_cell.front().first) return 1;
-  if (is_in(character, no_cell)) return 0;
+  if (character < zero_width.front().first) return 1;
+  if (is_in(character, zero_width)) return 0;
   return is_in(character, two_cells) ? 2 : 1;
 }
 

@@ -235,7 +235,7 @@ modbus::RegisterTable table_of(const EventSpec& events) {
   return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
 }
 
-bool RefusalSpec::is_busy(std::int64_t code) const {
+bool ExtendedErrorSpec::is_busy(std::int64_t code) const {
   return std::find(busy.begin(), busy.end(), code) != busy.end();
 }
 

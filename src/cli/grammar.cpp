@@ -116,15 +116,9 @@ void add_common_options(CLI::App& app, ParseState& draft) {
     if (user.consent != commands::Consent::given) user.consent = commands::Consent::no_input;
   };
   bind.flag("--no-input", ask_nothing, "never ask; what would have to be asked is refused");
-  const auto be_quiet = [&invocation, &user] {
-    invocation.talk = report::Talk::quiet;
-    user.progress = report::Showing::unwanted;
-  };
+  const auto be_quiet = [&user] { user.verbosity = report::Verbosity::quiet; };
   bind.flag("-q,--quiet", be_quiet, "no summary, notes and progress on stderr");
-  const auto show_frames = [&user] {
-    user.verbosity = commands::Verbosity::frames;
-    user.progress = report::Showing::unwanted;
-  };
+  const auto show_frames = [&user] { user.frames = commands::Frames::shown; };
   bind.flag("-v,--verbose", show_frames, "every frame and decision on stderr");
   bind.option("--trace", "FILE", common.trace_file, "every frame into a pcapng file for Wireshark");
   bind.option("--color", "WHEN", invocation.color, one_of(color_words), "auto, always or never");

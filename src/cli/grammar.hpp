@@ -30,7 +30,6 @@ struct Invocation {
   /// Set: print this and end with status 0 (--help).
   std::optional<std::string> text = std::nullopt;
   report::Format format = report::Format::table;
-  report::Talk talk = report::Talk::normal;
   ColorChoice color = ColorChoice::automatic;
   /// Whether the command wants the tools file without a fault, makes do with what can be read of
   /// it, or is about its faults.

@@ -118,7 +118,7 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   if (!tools) return tl::unexpected(tools.error());
   const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
-  const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.verbosity);
+  const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.frames);
   commands::Context context{
       {.clock = world.clock,
        .interrupt = world.interrupt,
@@ -184,10 +184,11 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   }
   auto invocation = parse(arguments);
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
-  const report::Talk talk = invocation ? invocation->talk : report::Talk::normal;
+  const report::Verbosity verbosity =
+      invocation ? invocation->user.verbosity : report::Verbosity::normal;
   if (invocation) world.io.color = color_of(world, invocation->color);
   if (invocation && is_dumb(world)) invocation->user.progress = report::Showing::unwanted;
-  const auto renderer = report::make_renderer(format, world.io, talk);
+  const auto renderer = report::make_renderer(format, world.io, verbosity);
   if (!invocation) return tell(invocation.error(), world, *renderer);
   if (invocation->asks == Invocation::Asks::version) {
     const auto told = tell_version(world, format, *renderer);

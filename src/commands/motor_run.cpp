@@ -72,7 +72,7 @@ class MotorRun final : public ToolRun {
       if (read) output().show_running(elapsed, speed_in_words(state));
       return read;
     };
-    following_.hear = [this](const device::MotorTransition& news) { tell(news); };
+    following_.on_transition = [this](const device::MotorTransition& news) { tell(news); };
     const auto& limit = plan_->options.limit;
     if (limit) following_.deadline = context().clock.now() + *limit;
   }

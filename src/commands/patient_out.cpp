@@ -19,7 +19,7 @@ PatientOut::PatientOut(report::Streams& streams, const Interrupt& interrupt, std
   if (!streams.out_for) return;
   out_ = std::exchange(streams.out, [this](std::string_view text) { return push(text); });
   err_ = std::exchange(streams.err, [this](std::string_view text) {
-    settle();
+    flush();
     err_(text);
   });
   writer_ = std::thread([this] { write_on(); });
@@ -55,7 +55,7 @@ bool PatientOut::is_full() {
   return full_ && !failure_;
 }
 
-void PatientOut::settle() {
+void PatientOut::flush() {
   std::unique_lock lock(mutex_);
   written_.wait(lock, [this] { return is_idle() || stalls_ > 0; });
 }

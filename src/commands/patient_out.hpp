@@ -37,7 +37,7 @@ class PatientOut {
   [[nodiscard]] bool is_full();
 
   /// Waits until all is written, or no reader seems to take it.
-  void settle();
+  void flush();
 
   /// Waits until all is written, for as long as that takes; after a signal only as long as a reader
   /// takes it. Returns how many pieces are left. Fails as `Streams::out` does.

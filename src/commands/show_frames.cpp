@@ -44,10 +44,10 @@ link::Trace frames_as_lines(const std::string& target, const report::Streams& io
 
 }  // namespace
 
-work::ShowFrames show_frames(const report::Streams& io, const Clock& clock, Verbosity verbosity) {
-  return [&io, &clock, verbosity](const std::string& target) {
+work::ShowFrames show_frames(const report::Streams& io, const Clock& clock, Frames frames) {
+  return [&io, &clock, frames](const std::string& target) {
     link::Trace trace;
-    if (verbosity == Verbosity::frames) trace = frames_as_lines(target, io, clock);
+    if (frames == Frames::shown) trace = frames_as_lines(target, io, clock);
     trace.notice = [&io, target](std::string_view sentence) {
       report::say_warning(io, fmt::format("{}: {}", target, sentence));
     };

@@ -132,7 +132,7 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   };
   serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     traffic.count(heard);
-    if (context.user.verbosity == Verbosity::frames) tell(heard, connection, bytes, context);
+    if (context.user.frames == Frames::shown) tell(heard, connection, bytes, context);
   };
   serve.ignored = [&](std::uint32_t connection, ByteView bytes, std::string_view reason) {
     tell_ignored(connection, bytes, reason, context);

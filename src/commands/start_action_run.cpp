@@ -92,7 +92,7 @@ class StartActionRun final : public ToolRun {
 
   void look_back(Result<void>& /*followed*/, const device::StopReport& stop) override {
     event_ = find_result(stop);
-    follower_->leave();
+    follower_->disarm();
   }
   std::vector<Left> put_back() override { return setup_.put_back(); }
   [[nodiscard]] std::vector<Left> left() const override { return setup_.left(); }

@@ -45,7 +45,7 @@ WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   tell_dropped(voice);
   listing_.add(std::visit([&](const auto& one) { return record_of(one, *voice.records); }, news));
   show_status();
-  const bool counted = options_->count > 0 && heard_ >= options_->count;
+  const bool counted = options_->count > 0 && activity_ >= options_->count;
   if (counted || !listing_.open()) end();
   return ended_ ? WatchControl::stop : WatchControl::go_on;
 }
@@ -91,7 +91,7 @@ Result<Outcome> WatchStream::finish() {
   if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
   const bool idle =
       options_->idle_timeout && context_->clock.now() >= last_event_ + *options_->idle_timeout;
-  if (idle && heard_ == 0) outcome_.negate();
+  if (idle && activity_ == 0) outcome_.negate();
   const auto left = out_.drain();
   if (!left) return tl::unexpected(left.error());
   if (*left > 0) return give_up(*left);
@@ -110,21 +110,21 @@ report::Record WatchStream::record_of(const device::ToolEvent& news, const NewsR
   ++counts_.events;
   if (kind == catalogue::EventKind::fastening_ok) ++counts_.ok;
   if (kind == catalogue::EventKind::fastening_ng) ++counts_.ng;
-  hear();
+  note_activity();
   return record;
 }
 
 report::Record WatchStream::record_of(const device::MotorTransition& news,
                                       const NewsRecords& records) {
   ++counts_.events;
-  hear();
+  note_activity();
   return records.motor(news);
 }
 
 report::Record WatchStream::record_of(const device::PolledValue& news, const NewsRecords& records) {
   const bool sample = options_->samples == device::Samples::all;
   ++(sample ? counts_.samples : counts_.changes);
-  hear();
+  note_activity();
   return records.value(news, sample ? "sample" : "change", context_->clock.wall());
 }
 
@@ -152,8 +152,8 @@ void WatchStream::note_link(const device::LinkChange& news) {
 }
 
 /// Something came, as --count and --idle-timeout mean it.
-void WatchStream::hear() {
-  ++heard_;
+void WatchStream::note_activity() {
+  ++activity_;
   last_event_ = context_->clock.now();
 }
 
@@ -186,9 +186,9 @@ void WatchStream::tell_dropped(Voice& voice) {
 
 /// Under the stream, where both are one terminal.
 void WatchStream::show_status() {
-  const bool alone = context_->user.verbosity == Verbosity::normal;
+  const bool alone = context_->user.frames == Frames::hidden;
   if (!context_->io.out_is_terminal || !alone) return;
-  out_.settle();
+  out_.flush();
   status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),
                            counted(counts_.ok + counts_.ng, "result"), counts_.ng));
 }

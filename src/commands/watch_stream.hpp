@@ -69,7 +69,7 @@ class WatchStream {
   report::Record record_of(const device::PollLag& news, const NewsRecords& records);
   report::Record record_of(const device::LinkChange& news, const NewsRecords& records);
   void note_link(const device::LinkChange& news);
-  void hear();
+  void note_activity();
   void drop(const device::WatchEvent& news, Dropped& dropped);
   void tell_dropped(Voice& voice);
   void show_status();
@@ -88,7 +88,7 @@ class WatchStream {
   Outcome outcome_ = {};
   TimePoint started_;
   TimePoint last_event_;
-  std::size_t heard_ = 0;  ///< as --count means it
+  std::size_t activity_ = 0;  ///< as --count means it
   Counts counts_ = {};
   std::size_t connected_ = 0;
   bool ended_ = false;

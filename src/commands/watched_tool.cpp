@@ -27,10 +27,10 @@ Result<WatchedTool> WatchedTool::make(Target target, const std::vector<std::stri
                                       ProfileShelf& shelf, const Context& context) {
   WatchedTool tool(std::move(target), names, shelf, context);
   if (tool.target_.profile.empty()) return tool;
-  return tool.learn(tool.target_.profile).map([&] { return std::move(tool); });
+  return tool.adopt_profile(tool.target_.profile).map([&] { return std::move(tool); });
 }
 
-Result<void> WatchedTool::learn(const std::string& profile) {
+Result<void> WatchedTool::adopt_profile(const std::string& profile) {
   return shelf_->take(profile).map([&](const KnownProfile* known) { known_ = known; });
 }
 
@@ -39,7 +39,7 @@ Result<void> WatchedTool::find_profile(const Context& context) {
   if (!tool) return do_without_profile(std::move(tool.error()), context);
   target_ = tool->target;
   target_.profile = tool->profile->id;
-  return learn(target_.profile);
+  return adopt_profile(target_.profile);
 }
 
 /// Raw registers can be read of a tool that says nothing of itself. One that did not even answer is
@@ -75,12 +75,13 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
     if (auto found = find_profile(hurried); !found) return tl::unexpected(std::move(found.error()));
   }
   auto device =
-      connect_device(target_, known_->profile, hurried, SimulatedOperator::working, past_);
+      connect_device(target_, known_->profile, hurried, SimulatedOperator::working, late_answers_);
   if (!device) return tl::unexpected(std::move(device.error()));
   if (auto registers = device->require_known_registers(); !registers) {
     return tl::unexpected(std::move(registers.error()));
   }
-  past_ = link::SessionOptions::Past::doubtful;  // it is opened again after trouble only
+  late_answers_ =
+      link::SessionOptions::LateAnswers::possible;  // it is opened again after trouble only
   if (known_->profile.link.loopback) {
     if (auto there = device->require_answer(); !there) {
       return tl::unexpected(std::move(there.error()));

@@ -62,14 +62,14 @@ class WatchedTool {
 
   Result<void> find_profile(const Context& context);
   Result<void> do_without_profile(Error why, const Context& context);
-  Result<void> learn(const std::string& profile);
+  Result<void> adopt_profile(const std::string& profile);
 
   Target target_;
   const std::vector<std::string>* names_;
   ProfileShelf* shelf_;
   const Context* context_;
   const KnownProfile* known_ = nullptr;
-  link::SessionOptions::Past past_ = link::SessionOptions::Past::clean;
+  link::SessionOptions::LateAnswers late_answers_ = link::SessionOptions::LateAnswers::none;
 };
 
 /// Resolves targets, asking none of them. Those of one line have the same settings. All but

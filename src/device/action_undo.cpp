@@ -44,7 +44,7 @@ class Undo {
       silences_ = 0;
     }
     link::Session& session = device_->session();
-    session.shield();
+    session.set_uninterruptible();
     session.set_answer_timeout(std::min(session.options().answer_timeout, longest_answer));
     return {};
   }

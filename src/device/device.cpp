@@ -156,7 +156,8 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
     session.in_use_until = now;
     // Who else uses a device server is not to be seen, so its first answers are proved.
     const bool is_shared = endpoint.medium == link::Medium::rtu_over_tcp;
-    session.past = is_shared ? link::SessionOptions::Past::shared : options.past;
+    session.late_answers =
+        is_shared ? link::SessionOptions::LateAnswers::shared : options.late_answers;
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;
@@ -221,7 +222,7 @@ class ClosedTransport final : public link::Transport {
   Result<std::size_t> receive(std::span<std::uint8_t> /*into*/, TimePoint /*deadline*/) override {
     return tl::unexpected(Error{.code = Errc::closed});
   }
-  void shield() override {}
+  void set_uninterruptible() override {}
 };
 
 std::string target_of(const link::Endpoint& endpoint, const LinkOptions& options) {
@@ -270,7 +271,7 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       client_(*session_, limits_, retries_) {}
 
 Device::~Device() {
-  if (session_) session_->settle();
+  if (session_) session_->drain_late_answer();
 }
 
 Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Profile& profile,
@@ -670,7 +671,7 @@ Written Device::write(const Parameter& parameter, const Value& before, const Val
 }
 
 void Device::shield(Clock& calm) {
-  session_->shield();
+  session_->set_uninterruptible();
   calm_ = &calm;
 }
 

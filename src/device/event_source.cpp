@@ -25,7 +25,7 @@ bool is_interrupt(const Error& error) {
 
 /// What is still to be said is said although an interrupt came, but soon.
 void begin_farewell(link::Session& session) {
-  session.shield();
+  session.set_uninterruptible();
   session.set_answer_timeout(std::min(session.options().answer_timeout, farewell_timeout));
 }
 

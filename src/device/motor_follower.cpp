@@ -78,7 +78,8 @@ class Follower {
 
   void note(const MotorState& state) {
     for (const MotorEvent event : events_between(before_, state)) {
-      if (options_->hear) options_->hear({event, state, device_->session().clock().wall()});
+      if (options_->on_transition)
+        options_->on_transition({event, state, device_->session().clock().wall()});
     }
     before_ = state;
     if (!state.running) return;

@@ -25,11 +25,11 @@ bool is_result(std::optional<EventKind> kind) {
 }  // namespace
 
 RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& clock,
-                         HearEvent hear)
+                         HandleEvent handle)
     : device_(&device),
       start_(&start),
       clock_(&clock),
-      hear_(std::move(hear)),
+      handle_(std::move(handle)),
       layout_(device.profile()),
       answer_timeout_(device.session().options().answer_timeout) {}
 
@@ -139,7 +139,7 @@ std::optional<ToolEvent> RunFollower::filter_result(ToolEvent event) {
   // that says how this run ended.
   const bool restarted = tracked.novelty == Sequence::restart;
   if (!tracked.is_new() || restarted || EventTracker::is_blank(event.block)) return std::nullopt;
-  if (hear_) hear_(event);
+  if (handle_) handle_(event);
   const auto kind = layout_.kind_of(event.block);
   if (is_result(kind)) return event;
   if (kind == EventKind::other) other_ = std::move(event);
@@ -153,7 +153,7 @@ Result<std::optional<ToolEvent>> RunFollower::late_event() {
   return event;
 }
 
-void RunFollower::leave() {
+void RunFollower::disarm() {
   // The tool switches itself off when it hears nothing; a lost farewell costs only time.
   const auto ignored = device_->switch_events(EventOutput::off);
   static_cast<void>(ignored);

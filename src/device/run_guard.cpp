@@ -110,7 +110,7 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt) {
     }
   }
   link::Session& session = device_->session();
-  session.shield();
+  session.set_uninterruptible();
   session.skip_verification();
   session.set_answer_timeout(patience_of(attempt));
   device_->set_retries(0);  // it is better to send the stop again

@@ -76,7 +76,7 @@ Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, 
 
 Result<void> Watcher::run(const Until& until) {
   auto watched = watch(until);
-  leave();
+  disarm();
   if (beat_.missed > 0) tell_lag(clock_->now());
   return watched;
 }
@@ -107,7 +107,7 @@ Result<void> Watcher::connect(const Until& until) {
   if (auto paused = pause(until); !paused || !goes_on(until)) return paused;
   auto link = open_();
   if (!link) return tl::unexpected(std::move(link.error()));
-  return greet(std::move(*link));
+  return attach(std::move(*link));
 }
 
 Result<void> Watcher::pause(const Until& until) {
@@ -152,9 +152,9 @@ void Watcher::tell_trouble(const Error& error) {
   retry_at_ = now + back_off(short_lived_ - forgiven);
 }
 
-Result<void> Watcher::greet(Link link) {
+Result<void> Watcher::attach(Link link) {
   if (profile_ != &link.device.profile()) {
-    if (auto learned = learn(link.device.profile()); !learned) return learned;
+    if (auto learned = adopt_profile(link.device.profile()); !learned) return learned;
   }
   link_ = std::move(link);
   connected_at_ = clock_->now();
@@ -163,7 +163,7 @@ Result<void> Watcher::greet(Link link) {
   return begin();
 }
 
-Result<void> Watcher::learn(const catalogue::Profile& profile) {
+Result<void> Watcher::adopt_profile(const catalogue::Profile& profile) {
   auto plan = make_plan_(profile);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   plan_ = std::move(*plan);
@@ -219,7 +219,7 @@ Result<void> Watcher::serve(const Until& until) {
     if (clock_->now() >= end) break;
     auto frame = link_->device.session().next_spontaneous(std::min(end, next_due()));
     if (!frame) return tl::unexpected(std::move(frame.error()));
-    if (*frame) hear(**frame);
+    if (*frame) handle(**frame);
     if (stopped_) break;
     if (auto done = run_due(); !done) return done;
   }
@@ -282,9 +282,9 @@ Result<void> Watcher::keep_alive() {
 Result<void> Watcher::ask(const std::function<Result<void>()>& request) {
   hear_waiting();
   link::Session& session = link_->device.session();
-  session.set_hearer([this](const link::Spontaneous& frame) { hear(frame); });
+  session.on_spontaneous([this](const link::Spontaneous& frame) { handle(frame); });
   auto answered = ask_twice(request);
-  session.set_hearer({});
+  session.on_spontaneous({});
   return answered;
 }
 
@@ -389,7 +389,7 @@ void Watcher::hear_waiting() {
   if (source_) source_->handle_waiting();
 }
 
-void Watcher::hear(const link::Spontaneous& frame) {
+void Watcher::handle(const link::Spontaneous& frame) {
   if (!source_) return;
   seen_at_ = clock_->now();
   source_->handle(frame);
@@ -401,7 +401,7 @@ void Watcher::tell(const WatchEvent& news) {
 
 // ---- leaving ----
 
-void Watcher::leave() {
+void Watcher::disarm() {
   if (link_ && source_) source_->disarm();
 }
 

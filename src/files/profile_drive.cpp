@@ -55,7 +55,7 @@ class DriveRules {
     return parameter;
   }
 
-  void check_refusals(const catalogue::RefusalSpec& refusals) {
+  void check_refusals(const catalogue::ExtendedErrorSpec& refusals) {
     require(refusals.parameter, draft_.refusals.of("parameter"));
     for (const std::int64_t code : refusals.busy) {
       if (refusals.codes.contains(code)) continue;

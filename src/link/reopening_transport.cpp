@@ -86,9 +86,9 @@ Result<std::size_t> ReopeningTransport::receive(std::span<std::uint8_t> into, Ti
   }
 }
 
-void ReopeningTransport::shield() {
+void ReopeningTransport::set_uninterruptible() {
   shielded_ = true;
-  if (transport_) transport_->shield();
+  if (transport_) transport_->set_uninterruptible();
 }
 
 Result<std::size_t> ReopeningTransport::take(TimePoint deadline) {
@@ -115,7 +115,7 @@ Result<void> ReopeningTransport::reopen(Error why) {
     return tl::unexpected(ended ? std::move(opened.error()) : std::move(why));
   }
   transport_ = std::move(*opened);
-  if (shielded_) transport_->shield();
+  if (shielded_) transport_->set_uninterruptible();
   brought_nothing_ = true;
   held_.resize(whole());  // the rest of a frame in part went with its connection
   return {};

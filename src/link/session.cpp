@@ -164,8 +164,8 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
-  if (options_.past == SessionOptions::Past::shared) require_verification(created_);
-  if (options_.past == SessionOptions::Past::doubtful) {
+  if (options_.late_answers == SessionOptions::LateAnswers::shared) require_verification(created_);
+  if (options_.late_answers == SessionOptions::LateAnswers::possible) {
     require_verification(created_);
     others_late_until_ = past_until_ = doubtful_until_;
   }
@@ -198,17 +198,17 @@ Session::~Session() {
 }
 
 /// The line is ours as long as this lives. Who has it next keeps the silence that we owe.
-class Session::Turn {
+class Session::Lease {
  public:
-  explicit Turn(Session& session) : session_(&session) {
-    const Transport::Turn left = session_->transport_->begin_turn();
+  explicit Lease(Session& session) : session_(&session) {
+    const Transport::BusLease left = session_->transport_->acquire_bus();
     session_->last_activity_ = std::max(session_->last_activity_, left.used_until);
     session_->others_late_until_ = std::max(session_->past_until_, left.late_until);
   }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
-  ~Turn() {
-    session_->transport_->end_turn(
+  Lease(const Lease&) = delete;
+  Lease& operator=(const Lease&) = delete;
+  ~Lease() {
+    session_->transport_->release_bus(
         {.used_until = session_->last_activity_, .late_until = session_->doubtful_until_});
   }
 
@@ -217,7 +217,7 @@ class Session::Turn {
 };
 
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request, const Others& others) {
-  const Turn turn(*this);
+  const Lease lease(*this);
   return ask(request, others);
 }
 
@@ -443,7 +443,7 @@ Result<bool> Session::is_undisturbed_since(const Mark& mark) {
   const bool listens = is_rtu() && expects_others() && is_new && proves_ == Proves::in_doubt &&
                        !doubt_.is_raised(now);
   if (listens) {
-    const Turn turn(*this);
+    const Lease lease(*this);
     if (auto silent = wait_for_silence(now + time_to_listen()); !silent) {
       return tl::unexpected(std::move(silent.error()));
     }
@@ -560,7 +560,7 @@ Result<void> Session::find_echo(const modbus::Pdu& request) {
 }
 
 Result<void> Session::broadcast(const modbus::Pdu& request) {
-  const Turn turn(*this);
+  const Lease lease(*this);
   if (quarantined_until_) {
     if (auto left = leave_quarantine(); !left) return left;
   }
@@ -783,7 +783,7 @@ void Session::accept(const modbus::Adu& received, Outstanding& outstanding) {
 void Session::keep(const modbus::Pdu& pdu) {
   ++counters_.spontaneous;
   Spontaneous frame{.pdu = pdu, .arrival = clock_->now(), .wall = clock_->wall()};
-  if (hear_) return hear_(frame);
+  if (handle_spontaneous_) return handle_spontaneous_(frame);
   if (queue_.size() == max_queued) {
     queue_.pop_front();
     ++counters_.overflowed;
@@ -849,10 +849,10 @@ Result<void> Session::leave_quarantine() {
   return {};
 }
 
-void Session::settle() {
+void Session::drain_late_answer() {
   if (!abandoned_) return;
-  const Turn turn(*this);
-  transport_->shield();
+  const Lease lease(*this);
+  transport_->set_uninterruptible();
   const TimePoint until = clock_->now() + longest_settling;
   while (abandoned_) {
     const auto frame = take_frame();

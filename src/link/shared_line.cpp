@@ -25,11 +25,11 @@ class SharedLine::Share : public Transport {
     if (opened_ == line_->opened_ && --line_->shares_ == 0) line_->transport_.reset();
   }
 
-  Turn begin_turn() override {
+  BusLease acquire_bus() override {
     turn_ = std::unique_lock(line_->turn_);
     return line_->left_;
   }
-  void end_turn(const Turn& left) override {
+  void release_bus(const BusLease& left) override {
     line_->left_.used_until = std::max(line_->left_.used_until, left.used_until);
     line_->left_.late_until = std::max(line_->left_.late_until, left.late_until);
     turn_.unlock();
@@ -65,7 +65,7 @@ class SharedLine::Share : public Transport {
         [&](Transport* open) { return judged(open->receive(into, deadline)); });
   }
 
-  void shield() override {}
+  void set_uninterruptible() override {}
 
  private:
   /// Stays as long as this share is in its turn: only then it can find out that the line is broken.

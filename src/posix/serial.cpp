@@ -238,7 +238,7 @@ class SerialTransport final : public link::Transport {
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
-  void shield() override { wait_.shield(); }
+  void set_uninterruptible() override { wait_.set_uninterruptible(); }
   [[nodiscard]] std::string company() const override { return company_; }
   [[nodiscard]] TimePoint late_until() const override { return late_until_; }
   void leave_late(TimePoint until) override { leave_late_answers(name_, until); }

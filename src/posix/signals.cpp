@@ -43,7 +43,7 @@ bool is_watched(int number) {
 // Supervisors, wrappers and terminals send several signals for one wish. Those that follow this
 // soon (a hand is slower) are part of the first, or they would end the process before it has
 // stopped a motor.
-constexpr std::int64_t signal_burst = 50'000'000;
+constexpr std::int64_t signal_burst_ns = 50'000'000;
 
 // The one mutable global of the program: a signal handler gets nothing but the signal's number, so
 // the way to the Interrupt has to be static.
@@ -78,7 +78,7 @@ extern "C" void on_signal(int number) {
   if (interrupt == nullptr) return;
   const int interrupted_errno = errno;
   if (interrupt->signalled()) {
-    if (monotonic_ns() - first_signal_ns.load() >= signal_burst) end_at_once(number);
+    if (monotonic_ns() - first_signal_ns.load() >= signal_burst_ns) end_at_once(number);
     errno = interrupted_errno;
     return;
   }

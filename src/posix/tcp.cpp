@@ -56,7 +56,7 @@ class TcpTransport final : public link::Transport {
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
-  void shield() override { wait_.shield(); }
+  void set_uninterruptible() override { wait_.set_uninterruptible(); }
   [[nodiscard]] std::string company() const override { return line_.lock.holder; }
   [[nodiscard]] TimePoint late_until() const override { return line_.late_until; }
   void leave_late(TimePoint until) override {

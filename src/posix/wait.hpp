@@ -41,7 +41,7 @@ class LineWait {
   LineWait(const Clock& clock, const Interrupt& interrupt)
       : clock_(&clock), interrupt_(&interrupt) {}
 
-  void shield() { shield_ = Shield::up; }
+  void set_uninterruptible() { shield_ = Shield::up; }
 
   /// Error: the interrupt that is raised.
   [[nodiscard]] Result<void> check() const;

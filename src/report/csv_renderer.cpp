@@ -62,8 +62,8 @@ class CsvRenderer final : public PlainRenderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Talk talk) {
-  return std::make_unique<CsvRenderer>(streams, talk);
+std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Verbosity verbosity) {
+  return std::make_unique<CsvRenderer>(streams, verbosity);
 }
 
 }  // namespace spindle::report

@@ -6,7 +6,7 @@ namespace {
 
 class JsonRenderer final : public Renderer {
  public:
-  JsonRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
+  JsonRenderer(Streams& streams, Verbosity verbosity) : streams_(streams), verbosity_(verbosity) {}
 
   Result<void> begin(std::span<const Column> /*columns*/) override { return {}; }
 
@@ -23,7 +23,7 @@ class JsonRenderer final : public Renderer {
     return this->record(record);
   }
 
-  void note(std::string_view sentence) override { say_sentence(streams_, talk_, sentence); }
+  void note(std::string_view sentence) override { say_sentence(streams_, verbosity_, sentence); }
 
   Result<void> summary(const Record& counts, std::string_view /*sentence*/) override {
     return record(counts);
@@ -37,15 +37,15 @@ class JsonRenderer final : public Renderer {
 
  private:
   Streams& streams_;
-  Talk talk_;
+  Verbosity verbosity_;
   std::string line_;
   LineWriter lines_{streams_, "\n"};
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Talk talk) {
-  return std::make_unique<JsonRenderer>(streams, talk);
+std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Verbosity verbosity) {
+  return std::make_unique<JsonRenderer>(streams, verbosity);
 }
 
 }  // namespace spindle::report

@@ -5,16 +5,16 @@
 
 namespace spindle::report {
 
-std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk) {
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity) {
   switch (format) {
     case Format::json:
-      return make_json_renderer(streams, talk);
+      return make_json_renderer(streams, verbosity);
     case Format::csv:
-      return make_csv_renderer(streams, talk);
+      return make_csv_renderer(streams, verbosity);
     case Format::table:
       break;
   }
-  return make_table_renderer(streams, talk);
+  return make_table_renderer(streams, verbosity);
 }
 
 Record error_record(const Error& error, WallTime time) {
@@ -55,8 +55,8 @@ void say_warning(const Streams& streams, std::string_view sentence) {
   streams.err(printable(sentence, LineBreaks::fold) + "\n");
 }
 
-void say_sentence(const Streams& streams, Talk talk, std::string_view sentence) {
-  if (talk == Talk::quiet || sentence.empty()) return;
+void say_sentence(const Streams& streams, Verbosity verbosity, std::string_view sentence) {
+  if (verbosity == Verbosity::quiet || sentence.empty()) return;
   streams.err(printable(sentence, LineBreaks::fold) + "\n");
 }
 
@@ -64,10 +64,12 @@ Result<void> PlainRenderer::line(const Record& /*record*/, std::string_view plai
   return streams_.out(printable(plain, LineBreaks::fold) + "\n");
 }
 
-void PlainRenderer::note(std::string_view sentence) { say_sentence(streams_, talk_, sentence); }
+void PlainRenderer::note(std::string_view sentence) {
+  say_sentence(streams_, verbosity_, sentence);
+}
 
 Result<void> PlainRenderer::summary(const Record& /*record*/, std::string_view sentence) {
-  say_sentence(streams_, talk_, sentence);
+  say_sentence(streams_, verbosity_, sentence);
   return {};
 }
 

@@ -7,9 +7,9 @@
 
 namespace spindle::report {
 
-std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Talk talk);
-std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Talk talk);
-std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Talk talk);
+std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Verbosity verbosity);
+std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Verbosity verbosity);
+std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Verbosity verbosity);
 
 /// Lines for programs. The first one begins on a line of its own, also in a file whose last line a
 /// crash or a full disk cut off.
@@ -31,7 +31,7 @@ class LineWriter {
 /// What tables and CSV have in common: everything beside the data goes to stderr as sentences.
 class PlainRenderer : public Renderer {
  public:
-  PlainRenderer(Streams& streams, Talk talk) : streams_(streams), talk_(talk) {}
+  PlainRenderer(Streams& streams, Verbosity verbosity) : streams_(streams), verbosity_(verbosity) {}
 
   Result<void> line(const Record& record, std::string_view plain) override;
   void note(std::string_view sentence) override;
@@ -43,13 +43,13 @@ class PlainRenderer : public Renderer {
 
  private:
   Streams& streams_;
-  Talk talk_;
+  Verbosity verbosity_;
 };
 
 /// One line on stderr behind "spindle: ", quiet or not.
 void say_error(const Streams& streams, const Error& error);
 
 /// The sentence on stderr, unless it is empty or not wanted.
-void say_sentence(const Streams& streams, Talk talk, std::string_view sentence);
+void say_sentence(const Streams& streams, Verbosity verbosity, std::string_view sentence);
 
 }  // namespace spindle::report

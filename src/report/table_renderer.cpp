@@ -123,8 +123,8 @@ class TableRenderer final : public PlainRenderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Talk talk) {
-  return std::make_unique<TableRenderer>(streams, talk);
+std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Verbosity verbosity) {
+  return std::make_unique<TableRenderer>(streams, verbosity);
 }
 
 }  // namespace spindle::report

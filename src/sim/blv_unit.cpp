@@ -48,7 +48,7 @@ BlvUnit::BlvUnit(const catalogue::Profile& profile, const catalogue::SimulationS
                  std::uint8_t address, Duration configuring)
     : address_(address),
       run_(word_facts(profile)),
-      refusals_(profile.refusals.value_or(catalogue::RefusalSpec{})),
+      refusals_(profile.refusals.value_or(catalogue::ExtendedErrorSpec{})),
       permanent_alarms_(start.permanent_alarms.begin(), start.permanent_alarms.end()),
       max_read_(profile.link.max_read),
       max_write_(profile.link.max_write),

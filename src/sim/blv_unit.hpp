@@ -93,7 +93,7 @@ class BlvUnit final : public BusUnit {
 
   std::uint8_t address_;
   catalogue::CommandWordSpec run_;
-  catalogue::RefusalSpec refusals_;
+  catalogue::ExtendedErrorSpec refusals_;
   std::vector<catalogue::Parameter> words_;  ///< with the names of bits
   std::vector<std::int64_t> permanent_alarms_;
   std::uint16_t max_read_;

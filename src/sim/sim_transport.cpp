@@ -28,7 +28,7 @@ class SimTransport final : public link::Transport {
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   [[nodiscard]] bool is_private() const override { return true; }
-  void shield() override { shielding_ = Shielding::on; }
+  void set_uninterruptible() override { shielding_ = Shielding::on; }
 
  private:
   [[nodiscard]] bool interrupted() const {
@@ -119,7 +119,7 @@ class OwningSimTransport final : public link::Transport {
     return transport_.receive(into, deadline);
   }
   [[nodiscard]] bool is_private() const override { return true; }
-  void shield() override { transport_.shield(); }
+  void set_uninterruptible() override { transport_.set_uninterruptible(); }
 
  private:
   std::unique_ptr<Server> server_;

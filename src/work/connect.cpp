@@ -144,12 +144,12 @@ link::Endpoint with_port(link::Endpoint endpoint, const catalogue::Profile& prof
 Result<device::Device> connect_device(const Target& target, const catalogue::Profile& profile,
                                       const Environment& environment,
                                       SimulatedOperator simulated_operator,
-                                      link::SessionOptions::Past past) {
+                                      link::SessionOptions::LateAnswers late_answers) {
   if (auto meant = check_addressing(target, profile); !meant) {
     return tl::unexpected(std::move(meant.error()));
   }
   device::LinkOptions options = link_options(target, profile, environment);
-  options.past = past;
+  options.late_answers = late_answers;
   auto device = device::Device::open(
       with_port(target.endpoint, profile), profile, options,
       with_simulated_tools(environment, simulated_options(simulated_operator)), environment.clock);

@@ -101,7 +101,7 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
   if (!profile_->identity || std::exchange(generation_is_checked_, true)) return {};
   link::Session& session = device.session();
   const Duration patience = session.options().answer_timeout;
-  session.shield();
+  session.set_uninterruptible();
   session.set_answer_timeout(std::min(patience, hurried_answer));
   const auto answer = device.report_server_id();
   session.set_answer_timeout(patience);

@@ -97,7 +97,7 @@ class ScriptedTransport final : public link::Transport {
     }
   }
 
-  void shield() override { script_->shielded = true; }
+  void set_uninterruptible() override { script_->shielded = true; }
   [[nodiscard]] std::string company() const override { return script_->company; }
   [[nodiscard]] TimePoint late_until() const override { return script_->late_until; }
   void leave_late(TimePoint until) override { script_->left_late = until; }

@@ -143,7 +143,7 @@ class Wire::Tap final : public link::Transport {
     }
   }
 
-  void shield() override { inner_->shield(); }
+  void set_uninterruptible() override { inner_->set_uninterruptible(); }
   [[nodiscard]] bool is_private() const override { return inner_->is_private(); }
 
  private:

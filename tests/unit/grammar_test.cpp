@@ -194,7 +194,7 @@ TEST_CASE("common options work before and behind the command's name") {
     CAPTURE(std::string(line));
     const Invocation typed = good(line);
     CHECK(typed.format == report::Format::csv);
-    CHECK(typed.talk == report::Talk::quiet);
+    CHECK(typed.user.verbosity == report::Verbosity::quiet);
     CHECK(typed.color == cli::ColorChoice::never);
     CHECK(typed.common.tools_file == "t.yaml");
     CHECK(typed.common.profile == "doga-bm");
@@ -202,7 +202,7 @@ TEST_CASE("common options work before and behind the command's name") {
     CHECK(typed.common.connect_timeout == std::chrono::seconds(2));
     CHECK(typed.common.retries == 3U);
     CHECK(typed.user.consent == commands::Consent::given);
-    CHECK(typed.user.verbosity == commands::Verbosity::frames);
+    CHECK(typed.user.frames == commands::Frames::shown);
     CHECK(typed.run);
   }
 }
@@ -210,12 +210,12 @@ TEST_CASE("common options work before and behind the command's name") {
 TEST_CASE("nothing given: the defaults") {
   const Invocation typed = good("get sim:doga-bm");
   CHECK(typed.format == report::Format::table);
-  CHECK(typed.talk == report::Talk::normal);
+  CHECK(typed.user.verbosity == report::Verbosity::normal);
   CHECK(typed.color == cli::ColorChoice::automatic);
   CHECK_FALSE(typed.common.timeout.has_value());
   CHECK_FALSE(typed.common.retries.has_value());
   CHECK(typed.user.consent == commands::Consent::ask);
-  CHECK(typed.user.verbosity == commands::Verbosity::normal);
+  CHECK(typed.user.frames == commands::Frames::hidden);
 }
 
 TEST_CASE("--json is -o json, and of several the last one wins") {
@@ -245,9 +245,9 @@ TEST_CASE("--json is -o json, and of several the last one wins") {
 }
 
 TEST_CASE("repeated options and flags are no error") {
-  CHECK(good("-v get t -v --verbose").user.verbosity == commands::Verbosity::frames);
-  CHECK(good("get t -qq").talk == report::Talk::quiet);
-  CHECK(good("get t -yv").user.verbosity == commands::Verbosity::frames);
+  CHECK(good("-v get t -v --verbose").user.frames == commands::Frames::shown);
+  CHECK(good("get t -qq").user.verbosity == report::Verbosity::quiet);
+  CHECK(good("get t -yv").user.frames == commands::Frames::shown);
   CHECK(good("--timeout 1s get t --timeout 2s").common.timeout == std::chrono::seconds(2));
   CHECK(good("get t --profile a --profile b").common.profile == "b");
   CHECK(good("set t a=1 --dry-run --dry-run").run);

@@ -291,7 +291,7 @@ TEST_CASE("following tells what happens, and why it is over") {
   CommandWordStopper stopper(motor, StopMode::decelerate);
   std::vector<device::MotorTransition> news;
   device::MotorFollowOptions options{.deadline = rig.clock.now() + 3s, .fastest = Decimal(1000)};
-  options.hear = [&](const device::MotorTransition& one) { news.push_back(one); };
+  options.on_transition = [&](const device::MotorTransition& one) { news.push_back(one); };
   SUBCASE("elapsed") {
     rig.write(command, 0x2A);
     CHECK(follow_motor(device, *motor.monitor(), stopper, options) == device::MotorEnding::elapsed);

@@ -18,7 +18,7 @@ const std::vector<Column> actions = {{"ACTION", "action"}};
 /// A renderer whose two streams end up in one text, as on a terminal; breaks after some writes.
 struct Screen {
   explicit Screen(report::Format format = report::Format::table, int lasts = 1000) : left(lasts) {
-    renderer = report::make_renderer(format, streams, report::Talk::normal);
+    renderer = report::make_renderer(format, streams, report::Verbosity::normal);
   }
   std::string shown = {};
   int left;

@@ -62,7 +62,7 @@ std::string rendered(Format format, const std::vector<Column>& columns,
                      const std::vector<Record>& records, Color color = Color::off) {
   Caught caught;
   caught.streams.color = color;
-  const auto renderer = make_renderer(format, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(format, caught.streams, Verbosity::normal);
   REQUIRE(renderer->begin(columns));
   for (const Record& record : records) REQUIRE(renderer->record(record));
   REQUIRE(renderer->end());
@@ -109,7 +109,7 @@ TEST_CASE("lines for programs begin on a line of their own behind one that was c
   for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\nf\r\n"}}) {
     Caught caught;
     caught.streams.out_ends_within_line = [] { return true; };
-    const auto renderer = make_renderer(row.format, caught.streams, Talk::normal);
+    const auto renderer = make_renderer(row.format, caught.streams, Verbosity::normal);
     REQUIRE(renderer->begin(std::vector<Column>{{"F", "f"}}));
     REQUIRE(renderer->record(one_field(Decimal(1))));
     REQUIRE(renderer->record(one_field(Decimal(2))));
@@ -130,7 +130,7 @@ TEST_CASE("lines for programs: after a failure the next one is as careful as the
     if (is_full) return tl::unexpected(Error{.code = Errc::storage});
     return {};
   };
-  const auto renderer = make_renderer(Format::json, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(Format::json, caught.streams, Verbosity::normal);
   CHECK_FALSE(renderer->record(one_field(Decimal(1))));
   is_full = false;
   CHECK(renderer->record(one_field(Decimal(2))));
@@ -194,7 +194,7 @@ TEST_CASE("JSON: every byte, alone and between others, gives one valid line with
 
 TEST_CASE("JSON: each record is written at once, by one call") {
   Caught caught;
-  const auto renderer = make_renderer(Format::json, caught.streams, Talk::quiet);
+  const auto renderer = make_renderer(Format::json, caught.streams, Verbosity::quiet);
   REQUIRE(renderer->record(value_record("a", Decimal(1))));
   CHECK(caught.writes.size() == 1);
   REQUIRE(renderer->record(value_record("b", Decimal(2))));
@@ -309,7 +309,7 @@ TEST_CASE("table: no rows, no output; a blank line stands between tables that ha
   CHECK(rendered(Format::table, value_columns, {}).empty());
 
   Caught caught;
-  const auto renderer = make_renderer(Format::table, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(Format::table, caught.streams, Verbosity::normal);
   const std::vector<Column> columns = {{"F", "f"}};
   const auto round = [&](const std::vector<std::string>& cells) {
     REQUIRE(renderer->begin(columns));
@@ -325,7 +325,7 @@ TEST_CASE("table: no rows, no output; a blank line stands between tables that ha
 
 TEST_CASE("table: rows wait for end(), or for the next begin()") {
   Caught caught;
-  const auto renderer = make_renderer(Format::table, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(Format::table, caught.streams, Verbosity::normal);
   const std::vector<Column> columns = {{"F", "f"}};
   REQUIRE(renderer->begin(columns));
   REQUIRE(renderer->record(one_field(std::string("one"))));
@@ -338,7 +338,7 @@ TEST_CASE("table: rows wait for end(), or for the next begin()") {
 
 TEST_CASE("table: with all widths given, rows are drawn as they come") {
   Caught caught;
-  const auto renderer = make_renderer(Format::table, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(Format::table, caught.streams, Verbosity::normal);
   const std::vector<Column> columns = {
       {.title = "NAME", .key = "name", .width = 6},
       {.title = "VALUE", .key = "value", .align = Align::right, .width = 7}};
@@ -386,7 +386,7 @@ TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is sh
 
 TEST_CASE("CSV: cells as they are, the target, and a header only when the columns change") {
   Caught caught;
-  const auto renderer = make_renderer(Format::csv, caught.streams, Talk::normal);
+  const auto renderer = make_renderer(Format::csv, caught.streams, Verbosity::normal);
   const std::vector<Column> columns = {{"TARGET", "target"}, {"F", "f"}};
   Record record = one_field(Decimal(1, -1));
   record.target = "station3";
@@ -404,7 +404,7 @@ TEST_CASE("a line stands for itself at once, a note is for people only") {
   const Record record = one_field(Decimal(1));
   for (const Format format : {Format::table, Format::csv, Format::json}) {
     Caught caught;
-    const auto renderer = make_renderer(format, caught.streams, Talk::normal);
+    const auto renderer = make_renderer(format, caught.streams, Verbosity::normal);
     REQUIRE(renderer->line(record, "tcp://127.0.0.1:5000"));
     const bool is_json = format == Format::json;
     CHECK(caught.out().starts_with(is_json ? "{\"schema\"" : "tcp://127.0.0.1:5000\n"));
@@ -412,7 +412,7 @@ TEST_CASE("a line stands for itself at once, a note is for people only") {
     CHECK(caught.err == "mind the gap\n");
 
     Caught hushed;
-    make_renderer(format, hushed.streams, Talk::quiet)->note("mind the gap");
+    make_renderer(format, hushed.streams, Verbosity::quiet)->note("mind the gap");
     CHECK(hushed.err.empty());
   }
 }
@@ -428,23 +428,24 @@ TEST_CASE("a summary is a line on stdout for JSON, and a sentence on stderr for 
       "\n";
   struct Row {
     Format format;
-    Talk talk;
+    Verbosity verbosity;
     std::string sentence;
     std::string out;
     std::string err;
   };
   const Row rows[] = {
-      {Format::json, Talk::normal, "2 written", line, ""},
-      {Format::json, Talk::quiet, "2 written", line, ""},
-      {Format::table, Talk::normal, "2 written", "", "2 written\n"},
-      {Format::table, Talk::quiet, "2 written", "", ""},
-      {Format::table, Talk::normal, "", "", ""},
-      {Format::csv, Talk::normal, "2 \x1bwritten", "", "2 \\x1bwritten\n"},
-      {Format::csv, Talk::quiet, "2 written", "", ""},
+      {Format::json, Verbosity::normal, "2 written", line, ""},
+      {Format::json, Verbosity::quiet, "2 written", line, ""},
+      {Format::table, Verbosity::normal, "2 written", "", "2 written\n"},
+      {Format::table, Verbosity::quiet, "2 written", "", ""},
+      {Format::table, Verbosity::normal, "", "", ""},
+      {Format::csv, Verbosity::normal, "2 \x1bwritten", "", "2 \\x1bwritten\n"},
+      {Format::csv, Verbosity::quiet, "2 written", "", ""},
   };
   for (const Row& row : rows) {
     Caught caught;
-    REQUIRE(make_renderer(row.format, caught.streams, row.talk)->summary(counts, row.sentence));
+    REQUIRE(
+        make_renderer(row.format, caught.streams, row.verbosity)->summary(counts, row.sentence));
     CHECK(caught.out() == row.out);
     CHECK(caught.err == row.err);
   }
@@ -458,7 +459,7 @@ TEST_CASE("an error is always a sentence on stderr, and for JSON also a line on 
                     .name = "preset.1.target-torque"};
   for (const Format format : {Format::table, Format::json, Format::csv}) {
     Caught caught;
-    REQUIRE(make_renderer(format, caught.streams, Talk::quiet)->error(error, moment));
+    REQUIRE(make_renderer(format, caught.streams, Verbosity::quiet)->error(error, moment));
     CHECK(caught.err == "spindle: " + describe(error) + "\n");
     const std::string line =
         R"({"schema":"spindle/1","type":"error","time":"2026-11-22T10:15:30.123Z",)"
@@ -472,7 +473,7 @@ TEST_CASE("an error is always a sentence on stderr, and for JSON also a line on 
 TEST_CASE("an error sentence is one harmless line even when a device words it") {
   Caught caught;
   const Error error{.code = Errc::mismatch, .message = "read \x1b[2J\nback"};
-  REQUIRE(make_renderer(Format::table, caught.streams, Talk::normal)->error(error, moment));
+  REQUIRE(make_renderer(Format::table, caught.streams, Verbosity::normal)->error(error, moment));
   CHECK(caught.err.find('\x1b') == std::string::npos);
   CHECK(caught.err.find('\n') == caught.err.size() - 1);
 }
@@ -510,7 +511,7 @@ TEST_CASE("a closed pipe is handed on by every function that writes") {
     caught.streams.out = [](std::string_view) -> Result<void> {
       return tl::unexpected(Error{.code = Errc::closed_pipe});
     };
-    const auto renderer = make_renderer(format, caught.streams, Talk::normal);
+    const auto renderer = make_renderer(format, caught.streams, Verbosity::normal);
     const auto wrote =
         renderer->begin(value_columns)
             .and_then([&] { return renderer->record(value_record("a", Decimal(1))); })

@@ -380,7 +380,7 @@ TEST_CASE("a long run: the output stays armed, progress is told, and no read loo
   for (const auto& [at, request] : rig.wire.requests) {
     CHECK_FALSE((request.function == 4 && request.data.back() == 14));
   }
-  bench.follower.leave();
+  bench.follower.disarm();
   CHECK(rig.wire.writes().back() == test::Wire::Write(BmRig::arm_register, 0));
 }
 

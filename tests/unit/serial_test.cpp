@@ -263,7 +263,7 @@ TEST_CASE("serial: an interrupt ends a wait at once, and a shield lets the last 
     CHECK(receive(**line, began + never_waited_out).error().code == Errc::interrupted);
   }
   CHECK((*line)->send(hex("01"), began + never_waited_out).error().code == Errc::interrupted);
-  (*line)->shield();
+  (*line)->set_uninterruptible();
   CHECK((*line)->send(hex("02"), began + never_waited_out));
   CHECK(pty.hear() == hex("02"));
   pty.say(hex("03"));

@@ -461,7 +461,7 @@ TEST_CASE("tcp: an interrupt ends the wait at once, and a shield lets the last w
   CHECK(line.session.transact(read_two).error().code == Errc::terminated);
   CHECK(line.elapsed() == 300ms);
   CHECK(line.session.transact(arm).error().code == Errc::terminated);
-  line.session.shield();
+  line.session.set_uninterruptible();
   CHECK(line.session.transact(arm) == arm);
 }
 
@@ -710,7 +710,7 @@ TEST_CASE("rtu: an answer that comes later than the quarantine lasts is not the 
 
 TEST_CASE("rtu: a session behind one that had trouble believes only what is proved") {
   SessionOptions options = rtu(SessionOptions::Proof::loopback);
-  options.past = SessionOptions::Past::doubtful;
+  options.late_answers = SessionOptions::LateAnswers::possible;
   Line line(options);
   line.script.arrive(line.clock.now() + 10ms, rtu_frame(1, holding({1, 1})));
   line.script.on_request(repeat);  // it proves the line
@@ -806,7 +806,7 @@ TEST_CASE("rtu: behind a program that gave up an answer only what is proved is b
 
 TEST_CASE("rtu: behind a device server that others may use the first answer is proved") {
   SessionOptions options = rtu(SessionOptions::Proof::loopback);
-  options.past = SessionOptions::Past::shared;
+  options.late_answers = SessionOptions::LateAnswers::shared;
   SUBCASE("it was meant for this request") {
     Line line(options);
     line.script.on_request(rtu_answer(15ms, two_values));
@@ -947,7 +947,7 @@ TEST_CASE("rtu: an interrupted read is abandoned, the shielded stop goes out wit
   CHECK(line.session.transact(read_two).error().code == Errc::interrupted);
   CHECK(line.session.transact(stop).error().code == Errc::interrupted);
   CHECK(line.elapsed() == 10ms);
-  line.session.shield();
+  line.session.set_uninterruptible();
   line.script.arrive(FakeClock::start + 11ms, hex("00"));
   CHECK(line.session.transact(stop) == stop);
   CHECK(line.sent_at(1) == 10ms);
@@ -1089,26 +1089,26 @@ TEST_CASE(
     line.clock.at(FakeClock::start + 10ms, [&] { line.interrupt.raise(2); });
     line.script.on_request([&](ByteView) { return row.late; });
     CHECK(line.session.transact(read_two).error().code == Errc::interrupted);
-    line.session.settle();
+    line.session.drain_late_answer();
     CHECK(line.elapsed() == 10ms + row.settled);
     CHECK(line.script.sent.size() == 1);
   }
   Line done(rtu());
   done.script.on_request(rtu_answer(15ms, two_values));
   CHECK(done.session.transact(read_two));
-  done.session.settle();
+  done.session.drain_late_answer();
   CHECK(done.elapsed() == 15ms);
 
   Line told(rtu());  // an answer that repeats its request is the unit's own
   told.script.on_request(silence());
   CHECK_FALSE(told.session.transact(arm));
-  told.session.settle();
+  told.session.drain_late_answer();
   CHECK(told.elapsed() == timeout);
 
   Line gone(rtu());
   gone.script.on_request([](ByteView) { return std::vector<Arrival>{{10ms, Errc::reset}}; });
   CHECK_FALSE(gone.session.transact(read_two));
-  gone.session.settle();
+  gone.session.drain_late_answer();
   CHECK(gone.elapsed() == 10ms);
 }
 

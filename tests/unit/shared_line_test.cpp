@@ -59,7 +59,7 @@ struct World : test::ScriptedPeer {
     Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
       return peer->receive(into, deadline);
     }
-    void shield() override { peer->shield(); }
+    void set_uninterruptible() override { peer->set_uninterruptible(); }
     World* world;
     std::unique_ptr<Transport> peer;
   };
@@ -133,9 +133,9 @@ TEST_CASE("shared line: outside of a turn nothing is received, and a wait can be
   const TimePoint deadline = world.clock.now() + 1s;
   CHECK(idle->receive(bytes, deadline).value() == 0);
   CHECK(world.clock.now() == deadline);
-  idle->begin_turn();
+  idle->acquire_bus();
   CHECK(idle->receive(bytes, deadline).value() == 3);
-  idle->end_turn({.used_until = deadline});
+  idle->release_bus({.used_until = deadline});
   world.interrupt.raise(SIGINT);
   CHECK(idle->receive(bytes, deadline + 1s).error().code == Errc::interrupted);
 }
@@ -159,13 +159,13 @@ TEST_CASE("shared line: when it breaks it does so for all, and the next opens it
 TEST_CASE("shared line: the end of an old share does not close a new opening") {
   World world;
   auto old = world.join();
-  old->begin_turn();
+  old->acquire_bus();
   world.script.arrive(world.clock.now(), Bytes());
   world.script.pending.clear();
   world.script.pending.emplace(world.clock.now(), Errc::closed);
   std::array<std::uint8_t, 8> bytes{};
   CHECK_FALSE(old->receive(bytes, world.clock.now()));
-  old->end_turn({});
+  old->release_bus({});
   world.script.pending.clear();
   const auto fresh = world.join();
   old.reset();

@@ -147,7 +147,7 @@ TEST_CASE("an interrupt ends a wait at once") {
 TEST_CASE("behind the shield the last words get their answers though no wait is possible") {
   Bench bench({"lost@2"});
   bench.interrupt.raise(15);
-  bench.transport->shield();
+  bench.transport->set_uninterruptible();
   REQUIRE(bench.send(read_two).has_value());
   CHECK(bench.receive(1s) == two);
   REQUIRE(bench.send(read_two).has_value());

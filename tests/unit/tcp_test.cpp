@@ -444,7 +444,7 @@ TEST_CASE("receive: an interrupt wins over data, until the transport is shielded
   const Bytes stop = {0};
   CHECK_FALSE(connected.transport->send(stop, connected.in(patience)).has_value());
 
-  connected.transport->shield();
+  connected.transport->set_uninterruptible();
   CHECK(connected.receive() == "endless");
   CHECK(connected.receive(10ms) == "");
   CHECK(connected.transport->send(stop, connected.in(patience)).has_value());

@@ -141,7 +141,7 @@ inline auto fields(const CodeTables& v) {
   return std::tie(error, warning);
 }
 
-inline auto fields(const RefusalSpec& v) {
+inline auto fields(const ExtendedErrorSpec& v) {
   const auto& [parameter, codes, busy, retry_every, give_up_after] = v;
   return std::tie(parameter, codes, busy, retry_every, give_up_after);
 }

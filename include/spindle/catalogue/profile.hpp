@@ -234,7 +234,7 @@ struct CodeTables {
 };
 
 /// What a product says, in a register of its own, of the exception response that it sent last.
-struct RefusalSpec {
+struct ExtendedErrorSpec {
   Text parameter = {};
   CodeTexts codes = {};
   List<std::int64_t> busy = {};  ///< codes of a tool that only has to be waited for
@@ -300,7 +300,7 @@ class Profile {
   List<Action> actions;
   CodeTexts exceptions;  ///< by exception code; meanings of error codes are loaded apart
   std::optional<RunSpec> run = std::nullopt;  ///< how it is started and stopped; may be missing
-  std::optional<RefusalSpec> refusals = std::nullopt;
+  std::optional<ExtendedErrorSpec> refusals = std::nullopt;
   List<AlarmList> alarm_lists = {};
   Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named

@@ -23,13 +23,15 @@ enum class Consent : std::uint8_t {
   no_input,  ///< --no-input: never ask, so refuse
 };
 
-enum class Verbosity : std::uint8_t { normal, frames };
+/// Whether every frame stands on stderr (--verbose), which leaves no room for progress.
+enum class Frames : std::uint8_t { hidden, shown };
 
 /// The options that every command takes about what is said and asked.
 struct UserOptions {
   Consent consent = Consent::ask;
-  Verbosity verbosity = Verbosity::normal;
-  /// Not with --quiet, not beside frames, not on a terminal that cannot draw over a line.
+  report::Verbosity verbosity = report::Verbosity::normal;
+  Frames frames = Frames::hidden;
+  /// Not on a terminal that cannot draw over a line, and not where there is one for all tools.
   report::Showing progress = report::Showing::wanted;
 };
 

@@ -33,7 +33,7 @@ struct LinkOptions {
   std::optional<unsigned> retries = std::nullopt;  ///< of reads
   link::Trace trace = {};
   std::string shown = {};  ///< how errors name the tool; empty: by its endpoint's text
-  link::SessionOptions::Past past = link::SessionOptions::Past::clean;
+  link::SessionOptions::LateAnswers late_answers = link::SessionOptions::LateAnswers::none;
   /// Of a product that is not known: what it may send unasked. Nothing is asked whose answer could
   /// look like that.
   std::vector<link::SpontaneousShape> unasked = {};

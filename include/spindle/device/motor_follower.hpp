@@ -30,7 +30,7 @@ struct MotorFollowOptions {
   /// Hears how long it has run and how, several times a second; an error ends the following.
   std::function<Result<void>(Duration elapsed, const MotorState&)> progress = {};
   /// Hears what happens when it is seen; must not use the device.
-  std::function<void(const MotorTransition&)> hear = {};
+  std::function<void(const MotorTransition&)> on_transition = {};
 };
 
 /// Follows a motor from just behind its start. Starts and stops nothing. Errors: interrupts and

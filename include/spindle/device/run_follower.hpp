@@ -30,15 +30,16 @@ struct FollowOptions {
 };
 
 /// Hears every new event of a run when it becomes known, the result among them.
-using HearEvent = std::function<void(const ToolEvent&)>;
+using HandleEvent = std::function<void(const ToolEvent&)>;
 
 /// Follows one run of a tool with events, from just before the start until its result: listens,
 /// keeps the output armed and reads the running state. Starts and stops nothing. Its time limits
 /// hold however many frames the tool sends.
 class RunFollower {
  public:
-  /// `start` must outlive it. `hear` may be empty, and must not use the device.
-  RunFollower(Device& device, const catalogue::Action& start, Clock& clock, HearEvent hear = {});
+  /// `start` must outlive it. `handle` may be empty, and must not use the device.
+  RunFollower(Device& device, const catalogue::Action& start, Clock& clock,
+              HandleEvent handle = {});
 
   /// Remembers the last event and arms the output. Call before the start. Error `usage`, before the
   /// tool is asked, where the profile names no counter of events.
@@ -52,7 +53,7 @@ class RunFollower {
   Result<std::optional<ToolEvent>> late_event();
 
   /// Switches the output off again.
-  void leave();
+  void disarm();
 
  private:
   Result<std::optional<FollowedRun>> step(TimePoint deadline);
@@ -67,7 +68,7 @@ class RunFollower {
   Device* device_;
   const catalogue::Action* start_;
   Clock* clock_;
-  HearEvent hear_;
+  HandleEvent handle_;
   catalogue::EventLayout layout_;
   EventTracker tracker_ = {};
   Duration answer_timeout_ = {};  ///< the user's or the profile's

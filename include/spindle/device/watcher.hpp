@@ -97,8 +97,8 @@ class Watcher {
   Result<void> watch(const Until& until);
   Result<void> connect(const Until& until);
   Result<void> pause(const Until& until);
-  Result<void> greet(Link link);
-  Result<void> learn(const catalogue::Profile& profile);
+  Result<void> attach(Link link);
+  Result<void> adopt_profile(const catalogue::Profile& profile);
   void compare_identity(const std::string& identity);
   Result<void> begin();
   Result<void> serve(const Until& until);
@@ -118,10 +118,10 @@ class Watcher {
   [[nodiscard]] bool polls() const { return (source_ && source_->polls()) || polls_values(); }
   void tell_reading(std::size_t index, Reading& reading);
   void hear_waiting();
-  void hear(const link::Spontaneous& frame);
+  void handle(const link::Spontaneous& frame);
   void tell(const WatchEvent& news);
   void tell_trouble(const Error& error);
-  void leave();
+  void disarm();
   [[nodiscard]] bool goes_on(const Until& until) const;
   [[nodiscard]] TimePoint next_due() const;
   [[nodiscard]] Duration back_off(unsigned failures) const;

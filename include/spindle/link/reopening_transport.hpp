@@ -26,7 +26,7 @@ class ReopeningTransport final : public Transport {
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
-  void shield() override;
+  void set_uninterruptible() override;
 
  private:
   Result<std::size_t> take(TimePoint deadline);

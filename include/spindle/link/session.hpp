@@ -37,7 +37,8 @@ struct SessionOptions {
   TimePoint in_use_until = {};
   /// RTU: whether a late answer may come that an earlier session on this line did not wait for, or
   /// other clients use the line that cannot be seen.
-  enum class Past : std::uint8_t { clean, doubtful, shared } past = Past::clean;
+  enum class LateAnswers : std::uint8_t { none, possible, shared };
+  LateAnswers late_answers = LateAnswers::none;
   /// RTU: whether other programs, other masters or a gateway may be on the line. Then it is
   /// listened to before the first read and behind the first answers.
   enum class Others : std::uint8_t { none, possible } others = Others::none;
@@ -118,19 +119,21 @@ class Session {
   Result<std::optional<Spontaneous>> next_spontaneous(TimePoint deadline);
 
   /// From now on spontaneous frames are told as they come, also while an answer is awaited, instead
-  /// of being kept; an empty function ends that. What was kept before stays. `hear` must not use
+  /// of being kept; an empty function ends that. What was kept before stays. `handle` must not use
   /// the session.
-  void set_hearer(std::function<void(const Spontaneous&)> hear) { hear_ = std::move(hear); }
+  void on_spontaneous(std::function<void(const Spontaneous&)> handle) {
+    handle_spontaneous_ = std::move(handle);
+  }
 
   /// For traces: the request is about to be sent once more.
   void tell_retry(const modbus::Pdu& request) const;
 
   /// RTU: before the line is left to others, waits for the answer to a request that was abandoned,
   /// though not for long: they would take it for theirs. Interrupts do not end this wait.
-  void settle();
+  void drain_late_answer();
 
   /// After this, interrupts no longer end waits on this connection.
-  void shield() { transport_->shield(); }
+  void set_uninterruptible() { transport_->set_uninterruptible(); }
 
   /// RTU: from now on answers are believed without a proof behind them, also after trouble: a stop
   /// and its confirmation must not wait for more answers than they need.
@@ -151,7 +154,7 @@ class Session {
 
  private:
   struct Outstanding;
-  class Turn;
+  class Lease;
 
   using Others = std::vector<OtherRead>;
 
@@ -220,7 +223,7 @@ class Session {
   Bytes buffer_ = {};
   Bytes came_ = {};  ///< since the last request, the beginning of it as it came
   std::deque<Spontaneous> queue_ = {};
-  std::function<void(const Spontaneous&)> hear_ = {};
+  std::function<void(const Spontaneous&)> handle_spontaneous_ = {};
   std::uint16_t next_transaction_;
   TimePoint created_;
   TimePoint last_activity_;

@@ -59,7 +59,7 @@ class SharedLine {
 
   Clock* clock_;
   FairLock turn_ = {};
-  Transport::Turn left_ = {};  ///< belongs to the share that has the turn
+  Transport::BusLease left_ = {};  ///< belongs to the share that has the turn
 
   std::mutex mutex_ = {};                           ///< guards everything below
   std::unique_ptr<Transport> transport_ = nullptr;  ///< empty: not open

@@ -27,20 +27,20 @@ class Transport {
 
   /// From now on an interrupt no longer ends a wait: for the last words that leave a tool safe
   /// (disarm, stop).
-  virtual void shield() = 0;
+  virtual void set_uninterruptible() = 0;
 
   /// How a line is left to the others of this program who have it, too.
-  struct Turn {
+  struct BusLease {
     TimePoint used_until = {};  ///< when the last byte was sent or received
     TimePoint late_until = {};  ///< until when an answer may come that was given up
   };
 
   /// Where others of this program have the same line: waits until none of them awaits an answer,
-  /// and keeps them from it until end_turn(). Returns how they left it. A line of one's own is
+  /// and keeps them from it until release_bus(). Returns how they left it. A line of one's own is
   /// always free.
-  virtual Turn begin_turn() { return {}; }
-  /// What the next one learns from begin_turn().
-  virtual void end_turn(const Turn& left) { static_cast<void>(left); }
+  virtual BusLease acquire_bus() { return {}; }
+  /// What the next one learns from acquire_bus().
+  virtual void release_bus(const BusLease& left) { static_cast<void>(left); }
 
   /// Another program that has the line open, as far as the system tells: "minicom (process 4711)";
   /// empty when there is none.

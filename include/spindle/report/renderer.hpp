@@ -44,7 +44,7 @@ class Renderer {
   /// A record that stands for itself, at once: a JSON line, or `plain` as a line of its own on
   /// stdout.
   virtual Result<void> line(const Record& record, std::string_view plain) = 0;
-  /// Something that people should know: a sentence on stderr, left out when talk is quiet.
+  /// Something that people should know: a sentence on stderr, left out when verbosity is quiet.
   virtual void note(std::string_view sentence) = 0;
   /// The closing counts: a JSON line on stdout, or `sentence` on stderr.
   virtual Result<void> summary(const Record& record, std::string_view sentence) = 0;
@@ -52,10 +52,10 @@ class Renderer {
   virtual Result<void> error(const Error& error, WallTime time) = 0;
 };
 
-/// Whether summaries and hints for people are wanted (--quiet).
-enum class Talk : std::uint8_t { normal, quiet };
+/// Whether summaries, notes and progress stand beside the records (--quiet).
+enum class Verbosity : std::uint8_t { quiet, normal };
 
-std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Talk talk);
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity);
 
 /// What users have to know about the values that are shown: one line on stderr, quiet or not. May
 /// be called from any thread.
