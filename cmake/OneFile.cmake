@@ -1,5 +1,5 @@
 # Makes spindle one file that needs nothing but the C library: loading the others is a quarter of a short
-# run (bench/README.md). Where they can not be had as static libraries, it stays as it is.
+# run (bench/README.md). Where they cannot be had as static libraries, it stays as it is.
 set(SPINDLE_FMT fmt::fmt)
 set(SPINDLE_YAML PkgConfig::YAML)
 set(SPINDLE_LINK_OPTIONS "")
