@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "files/profile_run.hpp"
+#include "files/profile_rules.hpp"
 
 namespace spindle::files {
 namespace {
