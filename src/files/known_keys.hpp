@@ -9,7 +9,7 @@ namespace spindle::files {
 
 /// The keys of one map of a file, as the manual lists them.
 struct KeyList {
-  std::string map;  ///< "document", "link", "command-word"
+  std::string map;  ///< "profile", "link", "command-word"
   std::vector<Key> keys;
 };
 

@@ -673,7 +673,7 @@ void check_simulation(const catalogue::Profile& profile, const YamlNode& documen
 }
 
 std::vector<KeyList> profile_keys() {
-  KeyList document{"document", keys_of<head_fields, title_fields>()};
+  KeyList document{"profile", keys_of<head_fields, title_fields>()};
   for (const Section& section : sections) document.keys.push_back(section.field.key);
   for (const Key& key : keys_of<list_fields>()) document.keys.push_back(key);
   std::vector<KeyList> lists;
