@@ -138,9 +138,8 @@ std::string beside(const std::string& tools_file, std::string profile) {
 }
 
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, const ReadText& read,
-                              Diagnostics& findings) {
-  const auto text = read(path);
+Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
+  const auto text = disk.read_trusted(path);
   if (!text) return tl::unexpected(text.error());
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
@@ -164,24 +163,24 @@ Error refusal_of(const Diagnostics& findings) {
 
 bool may_name_tools(std::string_view word) { return word.starts_with('@') || is_tool_name(word); }
 
-Result<Tools> load_tools(const std::string& path, const ReadText& read) {
+Result<Tools> load_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools || findings.empty()) return tools;
   return tl::unexpected(refusal_of(findings));
 }
 
-Tools salvage_tools(const std::string& path, const ReadText& read) {
+Tools salvage_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
   return std::move(*tools);
 }
 
-Result<CheckedTools> check_tools(const std::string& path, const ReadText& read) {
+Result<CheckedTools> check_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   return CheckedTools{std::move(*tools), findings.list()};
 }

@@ -5,11 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <filesystem>
-#include <fstream>
 #include <optional>
-#include <system_error>
 #include <unordered_set>
 #include <utility>
 
@@ -20,8 +16,6 @@ namespace {
 
 /// Far above any profile (tens of kilobytes) or tools file; keeps a wrong path from filling memory.
 constexpr std::size_t largest_file = std::size_t{1} << 20;
-
-constexpr std::size_t read_step = 16384;
 
 /// No format of ours nests deeper than six; bounds recursion over the tree.
 constexpr std::size_t deepest_nesting = 32;
@@ -380,19 +374,6 @@ bool check_characters(std::string_view text, std::size_t file, Diagnostics& find
   return true;
 }
 
-Error unreadable(const std::string& path, std::string message) {
-  return {.code = Errc::bad_file, .message = std::move(message), .name = path};
-}
-
-/// Why the system would not open it, in its own words but for what everybody knows.
-Error not_opened(const std::string& path, int code) {
-  if (code == ENOENT || code == ENOTDIR) return unreadable(path, "no such file");
-  Error error = unreadable(path, fmt::format("the file cannot be opened for reading: {}",
-                                             std::generic_category().message(code)));
-  if (code == EACCES) error.hint = "check who may read it, and who may look into its folder";
-  return error;
-}
-
 }  // namespace
 
 std::string Diagnostic::to_string() const {
@@ -449,28 +430,6 @@ const YamlNode* YamlNode::find(std::string_view key) const {
     if (entry.key == key) return &entry.value;
   }
   return nullptr;
-}
-
-Result<std::string> read_text_file(const std::string& path) {
-  std::error_code problem;
-  if (std::filesystem::is_directory(path, problem)) {
-    return tl::unexpected(unreadable(path, "is a folder, not a file"));
-  }
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return tl::unexpected(not_opened(path, errno));
-  std::string text;
-  std::array<char, read_step> step{};
-  while (stream && text.size() <= largest_file) {
-    stream.read(step.data(), step.size());
-    text.append(step.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  if (stream.bad()) return tl::unexpected(unreadable(path, "the file cannot be read"));
-  if (text.size() > largest_file) {
-    return tl::unexpected(unreadable(
-        path, fmt::format("larger than {} bytes; this is no file of spindle's", largest_file)));
-  }
-  return text;
 }
 
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,

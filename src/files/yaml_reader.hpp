@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "spindle/base/error.hpp"
-#include "spindle/files/profile_store.hpp"
-#include "spindle/files/read_text.hpp"
+#include "spindle/files/finding.hpp"
 
 namespace spindle::files {
 

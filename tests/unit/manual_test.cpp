@@ -18,6 +18,7 @@
 #include "files/known_keys.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/posix/disk.hpp"
 #include "support/key_manual.hpp"
 #include "support/schema_manual.hpp"
 
@@ -247,14 +248,15 @@ TEST_CASE("manual: the words of a profile are explained") {
 }
 
 TEST_CASE("manual: the examples of files are valid") {
-  const files::ProfileStore store({(root / "profiles").string()});
+  const files::ProfileStore store({(root / "profiles").string()}, posix::source_disk());
   for (const char* name : {"my-driver.yaml", "bm-line1.yaml"}) {
     CAPTURE(name);
     const auto findings = store.check((manual / "examples" / name).string());
     REQUIRE(findings.has_value());
     CHECK(findings->empty());
   }
-  const auto tools = files::load_tools((manual / "examples" / "tools.yaml").string());
+  const auto tools =
+      files::load_tools((manual / "examples" / "tools.yaml").string(), posix::source_disk());
   REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
   CHECK(tools->tools.size() == 2);
 }

@@ -210,14 +210,3 @@ TEST_CASE("findings: sorted by place, the same fault once") {
   CHECK(findings.error().code == Errc::bad_file);
   CHECK(findings.error().message == "f:1:9: first (and 3 more faults)");
 }
-
-TEST_CASE("read_text_file: what cannot be read is bad_file") {
-  const auto missing = read_text_file("/no/such/file.yaml");
-  REQUIRE_FALSE(missing.has_value());
-  CHECK(missing.error().code == Errc::bad_file);
-  CHECK(describe(missing.error()) == "/no/such/file.yaml: no such file");
-  const auto folder = read_text_file(SPINDLE_SOURCE_DIR);
-  REQUIRE_FALSE(folder.has_value());
-  CHECK(folder.error().message == "is a folder, not a file");
-  CHECK(read_text_file(SPINDLE_SOURCE_DIR "/CMakeLists.txt")->starts_with("cmake_minimum"));
-}
