@@ -75,7 +75,7 @@ class ToolsCheck {
     }
   }
 
-  void add(const files::Place& place, const Error& error) {
+  void add(const files::SourceLocation& place, const Error& error) {
     checked_.findings.push_back({.file = checked_.tools.path,
                                  .line = place.line,
                                  .column = place.column,

@@ -147,8 +147,6 @@ std::string lines_of_missing(const Snapshot& snapshot) {
 
 // ---- reading the form ----
 
-Place place_of(const YamlNode& node) { return {node.at.line, node.at.column}; }
-
 std::optional<Registers> read_raw(const YamlNode& node, Diagnostics& findings) {
   Registers raw;
   const auto add = [&](const YamlNode& item) {
@@ -173,12 +171,12 @@ constexpr Field<BackupLine> place_fields[] = {
 
 void read_raw_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
   line.raw = read_raw(node, asked.findings);
-  line.value_at = place_of(node);
+  line.value_at = node.at;
 }
 
 void read_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
   line.value = to_text(node, asked.findings);
-  line.value_at = place_of(node);
+  line.value_at = node.at;
 }
 
 constexpr Field<BackupLine> entry_fields[] = {
@@ -198,7 +196,7 @@ void read_line(const Field<BackupLine> (&fields)[count], const YamlNode& node, B
                Diagnostics& findings) {
   YamlMap map(node, findings);
   BackupLine line;
-  line.at = place_of(node);
+  line.at = node.at;
   line.value_at = line.at;
   read_fields(place_fields, map, line);
   read_fields(fields, map, line);
@@ -310,7 +308,7 @@ bool has_form(const YamlNode& document, Diagnostics& findings) {
   return false;
 }
 
-Position end_of(std::string_view text, std::size_t file) {
+SourceLocation end_of(std::string_view text, std::size_t file) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   return {file, static_cast<int>(lines) + 1, 1};
 }
@@ -358,7 +356,8 @@ class Names {
   }
 
   /// The stored parameter that a line means; a finding where there is none.
-  const Parameter* find(const BackupLine& line, const Position& at, Diagnostics& findings) const {
+  const Parameter* find(const BackupLine& line, const SourceLocation& at,
+                        Diagnostics& findings) const {
     if (const auto named = by_name_.find(line.name); named != by_name_.end()) {
       return at_its_register(*named->second, line, at, findings) ? named->second : nullptr;
     }
@@ -386,7 +385,7 @@ class Names {
   }
 
  private:
-  bool at_its_register(const Parameter& parameter, const BackupLine& line, const Position& at,
+  bool at_its_register(const Parameter& parameter, const BackupLine& line, const SourceLocation& at,
                        Diagnostics& findings) const {
     if (parameter.address.value == line.address && parameter.table == line.table) return true;
     findings.add(at, fmt::format("'{}' is register {} ({}) in profile {}, not {} ({})", line.name,
@@ -412,7 +411,7 @@ bool says(std::string_view text, const Value& value, const Parameter& parameter)
 
 /// The registers that a line stands for; a finding where it is not clear.
 std::optional<Registers> registers_of(const BackupLine& line, const Parameter& parameter,
-                                      const Position& at, Diagnostics& findings) {
+                                      const SourceLocation& at, Diagnostics& findings) {
   if (!line.raw) {
     auto registers =
         catalogue::parse_value(parameter, *line.value).and_then([&](const Value& value) {
@@ -440,10 +439,12 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
   return line.raw;
 }
 
-class Understanding {
+class BackupResolver {
  public:
-  Understanding(const BackupFile& file, const Profile& profile)
-      : names_(profile), file_(findings_.add_file(file.path)), snapshot_(file.head) {}
+  BackupResolver(const BackupFile& file, const Profile& profile)
+      : names_(profile), snapshot_(file.head) {
+    findings_.add_file(file.path);
+  }
 
   Result<Snapshot> run(const std::vector<BackupLine>& lines) {
     for (const BackupLine& line : lines) take(line);
@@ -452,25 +453,22 @@ class Understanding {
   }
 
  private:
-  [[nodiscard]] Position at(const Place& place) const { return {file_, place.line, place.column}; }
-
   void take(const BackupLine& line) {
     if (const auto dangerous = names_.find_dangerous(line)) {
       snapshot_.dangerous.push_back(*dangerous);
       return;
     }
-    const Parameter* parameter = names_.find(line, at(line.at), findings_);
+    const Parameter* parameter = names_.find(line, line.at, findings_);
     if (parameter == nullptr) return;
     if (!seen_.insert(parameter->name).second) {
-      findings_.add(at(line.at), fmt::format("register {} is here twice", line.address));
+      findings_.add(line.at, fmt::format("register {} is here twice", line.address));
       return;
     }
     if (line.missing) {
       snapshot_.missing.push_back({*parameter, *line.missing});
       return;
     }
-    auto raw =
-        registers_of(line, names_.as_written(line, *parameter), at(line.value_at), findings_);
+    auto raw = registers_of(line, names_.as_written(line, *parameter), line.value_at, findings_);
     if (!raw) return;
     auto value = catalogue::decode(*parameter, *raw);
     if (!value) return;  // it has as many registers under both names
@@ -484,7 +482,6 @@ class Understanding {
 
   Names names_;
   Diagnostics findings_ = {};
-  std::size_t file_;
   Snapshot snapshot_;
   std::set<std::string> seen_ = {};
 };
@@ -529,7 +526,7 @@ Result<BackupFile> read_backup(std::string_view text, const std::string& path) {
 }
 
 Result<Snapshot> resolve_backup(const BackupFile& file, const Profile& profile) {
-  return Understanding(file, profile).run(file.lines);
+  return BackupResolver(file, profile).run(file.lines);
 }
 
 std::vector<KeyList> backup_keys() { return {{"document", keys_of<document_fields>()}}; }

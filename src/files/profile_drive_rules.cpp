@@ -28,7 +28,7 @@ class DriveRules {
                                                  : &draft_.profile.parameters[found->second];
   }
 
-  const catalogue::Parameter* require(const std::string& name, const Position& at) {
+  const catalogue::Parameter* require(const std::string& name, const SourceLocation& at) {
     const catalogue::Parameter* parameter = known(name);
     if (draft_.lacks(name)) {
       findings_.add_once(at, fmt::format("'{}' is no parameter of this profile", name));

@@ -221,7 +221,7 @@ constexpr Field<catalogue::EventColumn> column_fields[] = {
     field_as<std::uint8_t, &catalogue::EventColumn::width>("width"),
 };
 
-std::optional<catalogue::EventKind> to_kind(const std::string& name, const Position& at,
+std::optional<catalogue::EventKind> to_kind(const std::string& name, const SourceLocation& at,
                                             Diagnostics& findings) {
   const auto kind = catalogue::event_kind_words.find(name);
   if (!kind) {
@@ -510,7 +510,7 @@ void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry
 
 }  // namespace
 
-Position Origin::of(std::string_view key) const {
+SourceLocation Origin::of(std::string_view key) const {
   if (const YamlNode* own = entry->find(key)) return own->at;
   if (group != nullptr) {
     if (const YamlNode* shared = group->find(key)) return shared->at;

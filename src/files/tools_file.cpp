@@ -79,13 +79,13 @@ Tool read_tool(const YamlEntry& entry, Diagnostics& findings) {
   Tool tool;
   tool.name = entry.key;
   read_map(tool_fields, entry.value, tool, findings);
-  const auto place_of = [&](std::string_view key) {
+  const auto location_of = [&](std::string_view key) {
     const YamlNode* value = entry.value.find(key);
-    return value == nullptr ? Place() : Place{value->at.line, value->at.column};
+    return value == nullptr ? SourceLocation() : value->at;
   };
-  tool.url_at = place_of("url");
-  tool.profile_at = place_of("profile");
-  tool.verified_at = place_of("verified");
+  tool.url_at = location_of("url");
+  tool.profile_at = location_of("profile");
+  tool.verified_at = location_of("verified");
   return tool;
 }
 

@@ -72,13 +72,13 @@ inline std::string group_keys(const std::vector<files::Key>& keys) {
 }
 
 /// The placeholders for each list of the profile's keys, and GROUP_KEYS.
-inline std::vector<Hole> key_holes() {
-  std::vector<Hole> holes;
+inline std::vector<Placeholder> key_placeholders() {
+  std::vector<Placeholder> placeholders;
   for (const files::KeyList& list : files::profile_keys()) {
-    holes.push_back({name_of_keys(list.map), key_list(list)});
-    if (list.map == "parameters") holes.push_back({"GROUP_KEYS", group_keys(list.keys)});
+    placeholders.push_back({name_of_keys(list.map), key_list(list)});
+    if (list.map == "parameters") placeholders.push_back({"GROUP_KEYS", group_keys(list.keys)});
   }
-  return holes;
+  return placeholders;
 }
 
 }  // namespace spindle::test

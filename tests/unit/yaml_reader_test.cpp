@@ -52,11 +52,11 @@ TEST_CASE("order and places are kept; lines and columns count from 1") {
   const YamlNode& map = parsed.documents[0];
   REQUIRE(map.entries.size() == 2);
   CHECK(map.entries[0].key == "z");
-  CHECK(map.entries[0].key_at == Position{0, 2, 1});
-  CHECK(map.entries[0].value.at == Position{0, 2, 4});
+  CHECK(map.entries[0].key_at == SourceLocation{0, 2, 1});
+  CHECK(map.entries[0].value.at == SourceLocation{0, 2, 4});
   const YamlNode& inner = map.entries[1].value.items.at(0);
-  CHECK(inner.at == Position{0, 4, 5});
-  CHECK(inner.find("x")->items.at(1).at == Position{0, 4, 13});
+  CHECK(inner.at == SourceLocation{0, 4, 5});
+  CHECK(inner.find("x")->items.at(1).at == SourceLocation{0, 4, 13});
 }
 
 TEST_CASE("columns count bytes, as compilers do") {

@@ -21,9 +21,9 @@ struct Tool {
   std::string profile = {};
   std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
-  Place url_at = {};
-  Place profile_at = {};
-  Place verified_at = {};
+  SourceLocation url_at = {};
+  SourceLocation profile_at = {};
+  SourceLocation verified_at = {};
 };
 
 struct Tools {
