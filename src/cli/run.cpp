@@ -57,7 +57,7 @@ std::vector<std::string> profile_folders(const World& world) {
 }
 
 files::ProfileStore profile_store(const World& world) {
-  return files::ProfileStore(profile_folders(world), world.disk.read_trusted, world.shipped);
+  return files::ProfileStore(profile_folders(world), world.disk, world.shipped);
 }
 
 /// The tools file that counts; empty when there is none.
@@ -79,9 +79,9 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   if (path.empty()) return files::Tools();
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
-      return files::load_tools(path, world.disk.read_trusted);
+      return files::load_tools(path, world.disk);
     case Invocation::ToolsFile::salvaged:
-      return files::salvage_tools(path, world.disk.read_trusted);
+      return files::salvage_tools(path, world.disk);
     case Invocation::ToolsFile::only_found:
       break;
   }

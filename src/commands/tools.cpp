@@ -75,7 +75,7 @@ class ToolsCheck {
     }
   }
 
-  void add(const files::Place& place, const Error& error) {
+  void add(const files::SourceLocation& place, const Error& error) {
     checked_.findings.push_back({.file = checked_.tools.path,
                                  .line = place.line,
                                  .column = place.column,
@@ -109,7 +109,7 @@ Result<Outcome> check_tools(Context& context) {
               .message = "no tools file was found",
               .hint = "name one with --tools; 'man 5 spindle-tools' says where it is looked for"});
   }
-  auto checked = files::check_tools(path, context.disk.read_trusted);
+  auto checked = files::check_tools(path, context.disk);
   if (!checked) return tl::unexpected(std::move(checked.error()));
   return tell_findings(ToolsCheck(std::move(*checked), context).run(), path, "tools file", context);
 }

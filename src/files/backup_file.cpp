@@ -10,7 +10,8 @@
 #include <set>
 #include <utility>
 
-#include "files/yaml_map.hpp"
+#include "files/fields.hpp"
+#include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
@@ -96,7 +97,7 @@ std::string quoted(std::string_view text) {
   return out + '"';
 }
 
-std::string word(std::string_view text) {
+std::string scalar(std::string_view text) {
   return is_plain(text) ? std::string(text) : quoted(text);
 }
 
@@ -108,7 +109,7 @@ std::string to_text(const Registers& raw) {
 /// Where a parameter is; the usual table needs no word.
 std::string place_of(const Parameter& parameter) {
   std::string text =
-      fmt::format("name: {}, register: {}", word(parameter.name), parameter.address.value);
+      fmt::format("name: {}, register: {}", scalar(parameter.name), parameter.address.value);
   if (parameter.table != modbus::RegisterTable::holding) {
     text += fmt::format(", table: {}", catalogue::to_text(parameter.table));
   }
@@ -119,7 +120,7 @@ std::string line_of(const SnapshotEntry& entry) {
   std::string line = fmt::format(
       "  - {{{}, raw: {}, value: {}", place_of(entry.parameter), to_text(entry.raw),
       entry.value.label.empty() ? entry.value.number.to_string() : quoted(entry.value.label));
-  if (!entry.unit.empty()) line += fmt::format(", unit: {}", word(entry.unit));
+  if (!entry.unit.empty()) line += fmt::format(", unit: {}", scalar(entry.unit));
   if (entry.minimum) line += fmt::format(", minimum: {}", entry.minimum->to_string());
   if (entry.maximum) line += fmt::format(", maximum: {}", entry.maximum->to_string());
   return line + "}\n";
@@ -146,8 +147,6 @@ std::string lines_of_missing(const Snapshot& snapshot) {
 
 // ---- reading the form ----
 
-Place place_of(const YamlNode& node) { return {node.at.line, node.at.column}; }
-
 std::optional<Registers> read_raw(const YamlNode& node, Diagnostics& findings) {
   Registers raw;
   const auto add = [&](const YamlNode& item) {
@@ -164,45 +163,56 @@ std::optional<Registers> read_raw(const YamlNode& node, Diagnostics& findings) {
   return std::all_of(node.items.begin(), node.items.end(), add) ? std::optional(raw) : std::nullopt;
 }
 
-BackupLine read_place(YamlMap& map) {
+constexpr Field<BackupLine> place_fields[] = {
+    field<&BackupLine::name>("name", Need::required),
+    field<&BackupLine::address>("register", Need::required),
+    word<modbus::table_words, &BackupLine::table>("table"),
+};
+
+void read_raw_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
+  line.raw = read_raw(node, asked.findings);
+  line.value_at = node.at;
+}
+
+void read_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
+  line.value = to_text(node, asked.findings);
+  line.value_at = node.at;
+}
+
+constexpr Field<BackupLine> entry_fields[] = {
+    custom("raw", Need::optional, "one register, or a list of two", read_raw_value),
+    custom("value", Need::optional, "text", read_value),
+    field<&BackupLine::unit>("unit"),
+    field<&BackupLine::minimum>("minimum"),
+    field<&BackupLine::maximum>("maximum"),
+};
+
+constexpr Field<BackupLine> missing_fields[] = {
+    word<missing_words, &BackupLine::missing>("why", Need::required, "reason"),
+};
+
+template <std::size_t count>
+void read_line(const Field<BackupLine> (&fields)[count], const YamlNode& node, BackupFile& file,
+               Diagnostics& findings) {
+  YamlMap map(node, findings);
   BackupLine line;
-  line.at = place_of(map.node());
+  line.at = node.at;
   line.value_at = line.at;
-  assign(line.name, map.text("name", Need::required));
-  assign(line.address, map.number<std::uint16_t>("register", Need::required));
-  assign(line.table, map.word("table", "table", modbus::table_words));
-  return line;
+  read_fields(place_fields, map, line);
+  read_fields(fields, map, line);
+  map.finish();
+  file.lines.push_back(std::move(line));
 }
 
 void read_entry(const YamlNode& node, BackupFile& file, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  BackupLine line = read_place(map);
-  const YamlNode* raw = map.get("raw");
-  const YamlNode* value = map.get("value");
-  if (raw != nullptr) {
-    line.raw = read_raw(*raw, findings);
-    line.value_at = place_of(*raw);
-  }
-  if (value != nullptr) {
-    line.value = to_text(*value, findings);
-    line.value_at = place_of(*value);
-  }
-  if (raw == nullptr && value == nullptr && node.kind == YamlNode::Kind::map) {
-    findings.add(node.at, "neither 'value' nor 'raw' is given");
-  }
-  assign(line.unit, map.text("unit"));
-  line.minimum = map.decimal("minimum");
-  line.maximum = map.decimal("maximum");
-  map.finish();
-  file.lines.push_back(std::move(line));
+  read_line(entry_fields, node, file, findings);
+  const bool has_value = node.find("raw") != nullptr || node.find("value") != nullptr;
+  if (has_value || node.kind != YamlNode::Kind::map) return;
+  findings.add(node.at, "neither 'value' nor 'raw' is given");
 }
 
 void read_missing(const YamlNode& node, BackupFile& file, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  BackupLine line = read_place(map);
-  line.missing = map.word("why", "reason", missing_words, Need::required);
-  map.finish();
-  file.lines.push_back(std::move(line));
+  read_line(missing_fields, node, file, findings);
 }
 
 /// Reads a list line by line; returns how many lines it has.
@@ -221,23 +231,63 @@ Bytes read_hex(const YamlNode& node, Diagnostics& findings) {
   return to_bytes(node, words, findings);
 }
 
-SnapshotIdentity read_identity(const YamlNode& node, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  SnapshotIdentity identity;
-  assign(identity.model, map.text("model"));
-  identity.model_code = map.number<std::uint16_t>("model-code");
-  assign(identity.serial, map.text("serial"));
-  identity.firmware = map.number<std::uint16_t>("firmware");
-  if (const YamlNode* raw = map.get("raw")) identity.raw = read_hex(*raw, findings);
-  map.finish();
-  return identity;
+void read_identity_bytes(const YamlNode& node, SnapshotIdentity& identity, const Asked& asked) {
+  identity.raw = read_hex(node, asked.findings);
 }
 
-void read_profile_facts(const YamlNode& node, Snapshot& head, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(head.profile, map.text("id", Need::required));
-  assign(head.fingerprint, map.text("fingerprint", Need::required));
-  map.finish();
+constexpr Field<SnapshotIdentity> identity_fields[] = {
+    field<&SnapshotIdentity::model>("model"),
+    field_as<std::uint16_t, &SnapshotIdentity::model_code>("model-code"),
+    field<&SnapshotIdentity::serial>("serial"),
+    field_as<std::uint16_t, &SnapshotIdentity::firmware>("firmware"),
+    custom("raw", Need::optional, "bytes in hexadecimal digits", read_identity_bytes),
+};
+
+constexpr Field<Snapshot> profile_fields[] = {
+    field<&Snapshot::profile>("id", Need::required),
+    field<&Snapshot::fingerprint>("fingerprint", Need::required),
+};
+
+/// How many lines were written.
+struct Counts {
+  std::optional<std::uint32_t> parameters = std::nullopt;
+  std::optional<std::uint32_t> missing = std::nullopt;
+};
+
+constexpr Field<Counts> count_fields[] = {
+    field<&Counts::parameters>("parameters", Need::required),
+    field<&Counts::missing>("missing", Need::required),
+};
+
+struct BackupDocument {
+  Snapshot head = {};
+  const YamlNode* parameters = nullptr;
+  const YamlNode* missing = nullptr;
+  const YamlNode* end = nullptr;
+};
+
+void skip(const YamlNode&, BackupDocument&, const Asked&) {}
+
+constexpr Field<BackupDocument> document_fields[] = {
+    // Both were checked before anything else is read.
+    custom("format", Need::required, "1", skip),
+    custom("kind", Need::required, kind, skip),
+    field<&BackupDocument::head, &Snapshot::time>("time", Need::required),
+    field<&BackupDocument::head, &Snapshot::version>("spindle", Need::required),
+    field<&BackupDocument::head, &Snapshot::target>("target", Need::required),
+    map_of<profile_fields, &BackupDocument::head>("profile", Need::required),
+    map_of<identity_fields, &BackupDocument::head, &Snapshot::identity>("identity"),
+    field<&BackupDocument::parameters>("parameters", Need::required)
+        .with(keys_of<place_fields, entry_fields>),
+    field<&BackupDocument::missing>("missing").with(keys_of<place_fields, missing_fields>),
+    field<&BackupDocument::end>("end", Need::required).with(keys_of<count_fields>),
+};
+
+void check_count(const YamlNode& end, std::string_view key, std::optional<std::uint32_t> count,
+                 std::size_t lines, Diagnostics& findings) {
+  if (!count || *count == lines) return;
+  findings.add(end.find(key)->at,
+               fmt::format("{} lines of '{}' were written, but {} are there", *count, key, lines));
 }
 
 bool has_form(const YamlNode& document, Diagnostics& findings) {
@@ -258,29 +308,7 @@ bool has_form(const YamlNode& document, Diagnostics& findings) {
   return false;
 }
 
-void read_head(YamlMap& map, Snapshot& head) {
-  map.allow("format");
-  map.allow("kind");
-  assign(head.time, map.text("time", Need::required));
-  assign(head.version, map.text("spindle", Need::required));
-  assign(head.target, map.text("target", Need::required));
-  if (const YamlNode* node = map.get("profile", Need::required)) {
-    read_profile_facts(*node, head, map.findings());
-  }
-  if (const YamlNode* node = map.get("identity")) {
-    head.identity = read_identity(*node, map.findings());
-  }
-}
-
-void check_count(YamlMap& end, std::string_view key, std::size_t lines) {
-  const auto count = end.number<std::uint32_t>(key, Need::required);
-  if (!count || *count == lines) return;
-  end.findings().add(
-      end.get(key)->at,
-      fmt::format("{} lines of '{}' were written, but {} are there", *count, key, lines));
-}
-
-Position end_of(std::string_view text, std::size_t file) {
+SourceLocation end_of(std::string_view text, std::size_t file) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   return {file, static_cast<int>(lines) + 1, 1};
 }
@@ -293,18 +321,15 @@ void read_document(const YamlNode& document, std::string_view text, BackupFile& 
                  "the end marker is missing: the file is cut off; take another backup");
     return;
   }
-  YamlMap map(document, findings);
-  read_head(map, file.head);
-  const YamlNode* parameters = map.get("parameters", Need::required);
-  const YamlNode* missing = map.get("missing");
-  const YamlNode* end = map.get("end", Need::required);
-  map.finish();
-  const std::size_t values = read_lines(parameters, read_entry, file, findings);
-  const std::size_t others = read_lines(missing, read_missing, file, findings);
-  YamlMap counts(*end, findings);
-  check_count(counts, "parameters", values);
-  check_count(counts, "missing", others);
-  counts.finish();
+  BackupDocument parts;
+  read_map(document_fields, document, parts, findings);
+  file.head = std::move(parts.head);
+  const std::size_t values = read_lines(parts.parameters, read_entry, file, findings);
+  const std::size_t others = read_lines(parts.missing, read_missing, file, findings);
+  Counts counts;
+  read_map(count_fields, *parts.end, counts, findings);
+  check_count(*parts.end, "parameters", counts.parameters, values, findings);
+  check_count(*parts.end, "missing", counts.missing, others, findings);
 }
 
 // ---- reading the meaning ----
@@ -331,7 +356,8 @@ class Names {
   }
 
   /// The stored parameter that a line means; a finding where there is none.
-  const Parameter* find(const BackupLine& line, const Position& at, Diagnostics& findings) const {
+  const Parameter* find(const BackupLine& line, const SourceLocation& at,
+                        Diagnostics& findings) const {
     if (const auto named = by_name_.find(line.name); named != by_name_.end()) {
       return at_its_register(*named->second, line, at, findings) ? named->second : nullptr;
     }
@@ -359,7 +385,7 @@ class Names {
   }
 
  private:
-  bool at_its_register(const Parameter& parameter, const BackupLine& line, const Position& at,
+  bool at_its_register(const Parameter& parameter, const BackupLine& line, const SourceLocation& at,
                        Diagnostics& findings) const {
     if (parameter.address.value == line.address && parameter.table == line.table) return true;
     findings.add(at, fmt::format("'{}' is register {} ({}) in profile {}, not {} ({})", line.name,
@@ -385,7 +411,7 @@ bool says(std::string_view text, const Value& value, const Parameter& parameter)
 
 /// The registers that a line stands for; a finding where it is not clear.
 std::optional<Registers> registers_of(const BackupLine& line, const Parameter& parameter,
-                                      const Position& at, Diagnostics& findings) {
+                                      const SourceLocation& at, Diagnostics& findings) {
   if (!line.raw) {
     auto registers =
         catalogue::parse_value(parameter, *line.value).and_then([&](const Value& value) {
@@ -413,10 +439,12 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
   return line.raw;
 }
 
-class Understanding {
+class BackupResolver {
  public:
-  Understanding(const BackupFile& file, const Profile& profile)
-      : names_(profile), file_(findings_.add_file(file.path)), snapshot_(file.head) {}
+  BackupResolver(const BackupFile& file, const Profile& profile)
+      : names_(profile), snapshot_(file.head) {
+    findings_.add_file(file.path);
+  }
 
   Result<Snapshot> run(const std::vector<BackupLine>& lines) {
     for (const BackupLine& line : lines) take(line);
@@ -425,25 +453,22 @@ class Understanding {
   }
 
  private:
-  [[nodiscard]] Position at(const Place& place) const { return {file_, place.line, place.column}; }
-
   void take(const BackupLine& line) {
     if (const auto dangerous = names_.find_dangerous(line)) {
       snapshot_.dangerous.push_back(*dangerous);
       return;
     }
-    const Parameter* parameter = names_.find(line, at(line.at), findings_);
+    const Parameter* parameter = names_.find(line, line.at, findings_);
     if (parameter == nullptr) return;
     if (!seen_.insert(parameter->name).second) {
-      findings_.add(at(line.at), fmt::format("register {} is here twice", line.address));
+      findings_.add(line.at, fmt::format("register {} is here twice", line.address));
       return;
     }
     if (line.missing) {
       snapshot_.missing.push_back({*parameter, *line.missing});
       return;
     }
-    auto raw =
-        registers_of(line, names_.as_written(line, *parameter), at(line.value_at), findings_);
+    auto raw = registers_of(line, names_.as_written(line, *parameter), line.value_at, findings_);
     if (!raw) return;
     auto value = catalogue::decode(*parameter, *raw);
     if (!value) return;  // it has as many registers under both names
@@ -457,7 +482,6 @@ class Understanding {
 
   Names names_;
   Diagnostics findings_ = {};
-  std::size_t file_;
   Snapshot snapshot_;
   std::set<std::string> seen_ = {};
 };
@@ -473,7 +497,7 @@ std::string render_backup(const Snapshot& snapshot) {
   text += fmt::format("time: {}\n", quoted(snapshot.time));
   text += fmt::format("spindle: {}\n", quoted(snapshot.version));
   text += fmt::format("target: {}\n", quoted(snapshot.target));
-  text += fmt::format("profile: {{id: {}, fingerprint: {}}}\n", word(snapshot.profile),
+  text += fmt::format("profile: {{id: {}, fingerprint: {}}}\n", scalar(snapshot.profile),
                       quoted(snapshot.fingerprint));
   if (snapshot.identity) text += line_of(*snapshot.identity);
   text += snapshot.entries.empty() ? "parameters: []\n" : "parameters:\n";
@@ -502,7 +526,9 @@ Result<BackupFile> read_backup(std::string_view text, const std::string& path) {
 }
 
 Result<Snapshot> resolve_backup(const BackupFile& file, const Profile& profile) {
-  return Understanding(file, profile).run(file.lines);
+  return BackupResolver(file, profile).run(file.lines);
 }
+
+std::vector<KeyList> backup_keys() { return {{"document", keys_of<document_fields>()}}; }
 
 }  // namespace spindle::files

@@ -5,9 +5,61 @@
 #include <algorithm>
 #include <limits>
 
+#include "files/fields.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::files {
+namespace {
+
+/// "0..6.00", where either side may be left out.
+std::optional<catalogue::Range> parse_limits(std::string_view text) {
+  const std::size_t dots = text.find("..");
+  if (dots == std::string_view::npos || text.size() == 2) return std::nullopt;
+  const std::string_view low = text.substr(0, dots);
+  const std::string_view high = text.substr(dots + 2);
+  catalogue::Range range{Decimal::parse(low), Decimal::parse(high)};
+  const bool wrong = (!low.empty() && !range.minimum) || (!high.empty() && !range.maximum);
+  if (wrong) return std::nullopt;
+  return range;
+}
+
+}  // namespace
+
+template <>
+struct ValueReader<catalogue::Range> {
+  static constexpr std::string_view value = "range of decimal numbers";
+  static bool read(const YamlNode& node, catalogue::Range& target, const Asked& asked) {
+    if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
+    const auto range = parse_limits(node.text);
+    if (range) {
+      target = *range;
+    } else {
+      asked.findings.add(node.at, fmt::format("'{}' is not a range such as 0..6.00", node.text));
+    }
+    return range.has_value();
+  }
+};
+
+template <>
+struct ValueReader<catalogue::List<catalogue::Label>> {
+  static constexpr std::string_view value = "text by number";
+  static bool read(const YamlNode& node, catalogue::List<catalogue::Label>& target,
+                   const Asked& asked) {
+    std::vector<catalogue::Label> labels;
+    expect(node, YamlNode::Kind::map, asked.findings);
+    for (const YamlEntry& entry : node.entries) {
+      const auto number = parse_integer(entry.key);
+      if (!number) {
+        asked.findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
+      }
+      auto text = to_text(entry.value, asked.findings);
+      if (number && text) labels.push_back({*number, std::move(*text)});
+    }
+    target = std::move(labels);
+    return true;
+  }
+};
+
 namespace {
 
 using catalogue::Action;
@@ -43,66 +95,37 @@ constexpr auto motion_words = enum_table<catalogue::Motion>({{"start", catalogue
 /// One entry before it is repeated.
 struct Template {
   Parameter parameter;
-  NumberRange numbers = {};  ///< of {n}
-  std::uint64_t stride = 0;
+  std::optional<std::pair<std::uint16_t, std::uint16_t>> numbers = std::nullopt;  ///< of {n}
+  std::optional<std::uint16_t> stride = std::nullopt;
   std::optional<Evidence> repeats = std::nullopt;  ///< evidence of all but the first
+  bool overlaps = false;
   bool repeated = false;
   Origin origin = {};
 };
 
-std::vector<Label> read_labels(const YamlNode& map, Diagnostics& findings) {
-  std::vector<Label> labels;
-  expect(map, YamlNode::Kind::map, findings);
-  for (const YamlEntry& entry : map.entries) {
-    const auto number = parse_integer(entry.key);
-    if (!number) {
-      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
-    }
-    auto text = to_text(entry.value, findings);
-    if (number && text) labels.push_back({*number, std::move(*text)});
-  }
-  return labels;
+/// Behind the name of the group, if there is one.
+void read_name(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  const auto text = to_text(node, asked.findings);
+  if (!text) return;
+  parameter.name = parameter.name.to_string() + *text;
+  if (parameter.name.empty()) asked.findings.add(node.at, "key 'name' is empty");
 }
 
-/// "0..6.00", where either side may be left out.
-std::optional<catalogue::Range> parse_limits(std::string_view text) {
-  const std::size_t dots = text.find("..");
-  if (dots == std::string_view::npos || text.size() == 2) return std::nullopt;
-  const std::string_view low = text.substr(0, dots);
-  const std::string_view high = text.substr(dots + 2);
-  catalogue::Range range{Decimal::parse(low), Decimal::parse(high)};
-  const bool wrong = (!low.empty() && !range.minimum) || (!high.empty() && !range.maximum);
-  if (wrong) return std::nullopt;
-  return range;
-}
-
-std::optional<catalogue::Range> read_decimals(YamlMap& map, std::string_view key) {
-  const YamlNode* node = map.get(key);
-  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, map.findings())) {
-    return std::nullopt;
-  }
-  auto range = parse_limits(node->text);
-  if (!range) {
-    map.findings().add(node->at, fmt::format("'{}' is not a range such as 0..6.00", node->text));
-  }
-  return range;
-}
-
-void read_limits(YamlMap& map, Parameter& parameter) {
-  assign(parameter.range, read_decimals(map, "range"));
-  const auto except = read_decimals(map, "except");
-  if (!except) return;
-  if (except->minimum && except->maximum) {
+void read_except(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  catalogue::Range except;
+  if (!ValueReader<catalogue::Range>::read(node, except, asked)) return;
+  if (except.minimum && except.maximum) {
     parameter.except = except;
   } else {
-    map.findings().add(map.get("except")->at, "a hole in a range has two ends");
+    asked.findings.add(node.at, "a hole in a range has two ends");
   }
 }
 
-void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
-                    std::vector<catalogue::BitName>& bits, Diagnostics& findings) {
+std::vector<catalogue::BitName> to_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
+                                             Diagnostics& findings) {
   constexpr std::uint64_t highest_bit = 31;
   expect(node, YamlNode::Kind::map, findings);
+  std::vector<catalogue::BitName> bits;
   for (const YamlEntry& entry : node.entries) {
     const auto bit = parse_unsigned(entry.key, highest_bit);
     if (!bit) {
@@ -112,128 +135,124 @@ void read_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
     auto text = to_text(entry.value, findings);
     if (bit && text) bits.push_back({static_cast<std::uint8_t>(*bit), std::move(*text), when});
   }
+  return bits;
 }
 
-void read_bits_by(const YamlNode& by, Parameter& parameter, std::vector<catalogue::BitName>& bits,
-                  Diagnostics& findings) {
-  YamlMap choice(by, findings);
-  assign(parameter.bits_by, choice.text("parameter", Need::required));
-  const YamlNode* names = choice.get("names", Need::required);
-  choice.finish();
-  if (names == nullptr || !expect(*names, YamlNode::Kind::map, findings)) return;
-  for (const YamlEntry& entry : names->entries) {
-    const auto value = parse_integer(entry.key);
-    if (!value) {
-      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
-      continue;
+void add_bits(Parameter& parameter, std::vector<catalogue::BitName> more) {
+  more.insert(more.begin(), parameter.bits.begin(), parameter.bits.end());
+  parameter.bits = std::move(more);
+}
+
+void read_bits(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  add_bits(parameter, to_bit_names(node, std::nullopt, asked.findings));
+}
+
+/// {0: {3: FWD}, 1: {3: START/STOP}}
+void read_names_of_bits(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  if (!expect(node, YamlNode::Kind::map, asked.findings)) return;
+  for (const YamlEntry& entry : node.entries) {
+    if (const auto value = parse_integer(entry.key)) {
+      add_bits(parameter, to_bit_names(entry.value, *value, asked.findings));
+    } else {
+      asked.findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
     }
-    read_bit_names(entry.value, *value, bits, findings);
   }
 }
 
-/// bits: {0: M0}, and those that depend on another parameter: bits-by: {parameter: NAME, names:
-/// {0: {3: FWD}, 1: {3: START/STOP}}}.
-void read_bits(YamlMap& map, Parameter& parameter) {
-  std::vector<catalogue::BitName> bits;
-  if (const YamlNode* node = map.get("bits")) {
-    read_bit_names(*node, std::nullopt, bits, map.findings());
-  }
-  if (const YamlNode* by = map.get("bits-by")) read_bits_by(*by, parameter, bits, map.findings());
-  parameter.bits = std::move(bits);
-}
+constexpr Field<Parameter> bits_by_fields[] = {
+    field<&Parameter::bits_by>("parameter", Need::required),
+    custom("names", Need::required, "names of bits by number", read_names_of_bits),
+};
 
-void read_scale(YamlMap& map, Parameter& parameter) {
-  const auto scale = map.decimal("scale");
-  if (!scale) return;
-  if (*scale > Decimal(0)) {
-    parameter.encoding.scale = *scale;
+void read_scale(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  Decimal scale;
+  if (!ValueReader<Decimal>::read(node, scale, asked)) return;
+  if (scale > Decimal(0)) {
+    parameter.encoding.scale = scale;
   } else {
-    map.findings().add(map.node().at, "scale must be above zero");
+    asked.findings.add(asked.map.at, "scale must be above zero");
   }
 }
 
 /// As documents print it; "torque" stands for the torque unit that is set on the tool.
-void read_unit(YamlMap& map, Parameter& parameter) {
-  auto unit = map.text("unit");
+void read_unit(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  auto unit = to_text(node, asked.findings);
   if (!unit) return;
   const bool is_word = std::none_of(unit->begin(), unit->end(),
                                     [](unsigned char c) { return c <= ' ' || c == 0x7F; });
   if (is_word && unit->size() <= longest_unit) {
     parameter.unit = std::move(*unit);
   } else {
-    map.findings().add(map.get("unit")->at,
+    asked.findings.add(node.at,
                        fmt::format("a unit is one word of at most {} bytes", longest_unit));
   }
 }
 
-std::string read_name(YamlMap& map, const YamlNode* group) {
-  if (group == nullptr) return map.text("name", Need::required).value_or("");
-  map.allow("name");
-  const YamlNode* prefix = group->find("name");
-  const YamlNode* own = map.node().find("name");
-  if (own == nullptr) {
-    map.findings().add(map.node().at, "key 'name' is missing");
-    return {};
-  }
-  return (prefix != nullptr ? prefix->text : std::string()) +
-         to_text(*own, map.findings()).value_or("");
+void read_secret(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  bool secret = false;
+  ValueReader<bool>::read(node, secret, asked);
+  if (secret) parameter.secrecy = catalogue::Secrecy::secret;
 }
 
-void read_repetition(YamlMap& map, Template& entry) {
-  const auto numbers = map.range("n", last_register);
-  const auto stride = map.number<std::uint16_t>("stride");
-  entry.repeats = map.word("repeats", "evidence", catalogue::evidence_words);
+constexpr Field<Parameter> parameter_fields[] = {
+    custom("name", Need::required, "text", read_name),
+    field<&Parameter::title>("title", Need::required),
+    word<modbus::table_words, &Parameter::table>("table").shared(),
+    field<&Parameter::address>("register", Need::required),
+    word<catalogue::kind_words, &Parameter::encoding, &catalogue::Encoding::kind>("encoding",
+                                                                                  Need::required)
+        .shared(),
+    custom("scale", Need::optional, "decimal number", read_scale).shared(),
+    custom("unit", Need::optional, "text", read_unit).shared(),
+    field<&Parameter::range>("range").shared(),
+    custom("except", Need::optional, "range of decimal numbers", read_except),
+    field<&Parameter::default_value>("default"),
+    field<&Parameter::labels>("labels"),
+    custom("bits", Need::optional, "text by number", read_bits),
+    map_here<bits_by_fields>("bits-by"),
+    word<notation_words, &Parameter::notation>("notation").shared(),
+    word<catalogue::effect_words, &Parameter::effect>("effect").shared(),
+    field<&Parameter::risk>("risk"),
+    field<&Parameter::settle>("settle").shared(),
+    word<catalogue::hazard_words, &Parameter::hazard>("hazard").shared(),
+    word<catalogue::access_words, &Parameter::access>("access", Need::required).shared(),
+    word<reading_words, &Parameter::reading>("reading"),
+    word<catalogue::evidence_words, &Parameter::evidence>("evidence", Need::required).shared(),
+    field<&Parameter::source>("source", Need::required).shared(),
+    field<&Parameter::note>("note").shared(),
+    word<clone_words, &Parameter::cloning>("clone", Need::optional, "value of clone").shared(),
+    custom("secret", Need::optional, "true | false", read_secret).shared(),
+};
+
+constexpr Field<Template> template_fields[] = {
+    field<&Template::overlaps>("overlaps").shared(),
+    field<&Template::numbers>("n").shared(),
+    field<&Template::stride>("stride").shared(),
+    word<catalogue::evidence_words, &Template::repeats>("repeats", Need::optional, "evidence")
+        .shared(),
+};
+
+void check_repetition(YamlMap& map, Template& entry) {
   const bool has_counter = entry.parameter.name.view().find(counter) != std::string_view::npos;
-  const bool has_range = map.get("n") != nullptr;
+  const bool has_range = map.find("n", true) != nullptr;
   if (has_counter != has_range) {
     map.findings().add(map.node().at, has_counter ? "the name has {n}, but key 'n' is missing"
                                                   : "key 'n' is given, but the name has no {n}");
     return;
   }
-  if (!numbers) return;
-  if (!stride || *stride == 0) {
-    map.findings().add(map.node().at, "key 'n' needs a 'stride' above zero");
-    return;
-  }
-  entry.repeated = true;
-  entry.numbers = *numbers;
-  entry.stride = *stride;
+  if (!entry.numbers) return;
+  entry.repeated = entry.stride.value_or(0) != 0;
+  if (!entry.repeated) map.findings().add(map.node().at, "key 'n' needs a 'stride' above zero");
 }
 
-Template read_template(YamlMap& map, const YamlNode* group, bool& overlaps) {
+Template read_template(YamlMap& map, const YamlNode* group) {
   Template entry;
-  Parameter& parameter = entry.parameter;
-  parameter.name = read_name(map, group);
-  assign(parameter.title, map.text("title", Need::required));
-  assign(parameter.table, map.word("table", "table", modbus::table_words));
-  if (auto address = map.number<std::uint16_t>("register", Need::required)) {
-    parameter.address = {*address};
-  }
-  assign(parameter.encoding.kind,
-         map.word("encoding", "encoding", catalogue::kind_words, Need::required));
-  read_scale(map, parameter);
-  read_unit(map, parameter);
-  read_limits(map, parameter);
-  parameter.default_value = map.decimal("default");
-  if (const YamlNode* labels = map.get("labels")) {
-    parameter.labels = read_labels(*labels, map.findings());
-  }
-  read_bits(map, parameter);
-  assign(parameter.notation, map.word("notation", "notation", notation_words));
-  assign(parameter.effect, map.word("effect", "effect", catalogue::effect_words));
-  assign(parameter.risk, map.text("risk"));
-  parameter.settle = map.duration("settle");
-  assign(parameter.hazard, map.word("hazard", "hazard", catalogue::hazard_words));
-  assign(parameter.access, map.word("access", "access", catalogue::access_words, Need::required));
-  assign(parameter.reading, map.word("reading", "reading", reading_words));
-  assign(parameter.evidence,
-         map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
-  assign(parameter.source, map.text("source", Need::required));
-  assign(parameter.note, map.text("note"));
-  overlaps = map.flag("overlaps").value_or(false);
-  assign(parameter.cloning, map.word("clone", "value of clone", clone_words));
-  if (map.flag("secret").value_or(false)) parameter.secrecy = catalogue::Secrecy::secret;
-  read_repetition(map, entry);
+  const YamlNode* prefix = group == nullptr ? nullptr : group->find("name");
+  if (prefix != nullptr && map.node().find("name") != nullptr) entry.parameter.name = prefix->text;
+  read_fields(parameter_fields, map, entry.parameter);
+  read_fields(template_fields, map, entry);
+  check_repetition(map, entry);
+  map.finish();
   return entry;
 }
 
@@ -263,9 +282,9 @@ void add_parameter(Parameter parameter, const Origin& origin, ProfileDraft& draf
 /// Adds repetition `step` (from 0) of an entry. False when there is none, or no room for it.
 bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& draft,
                     Diagnostics& findings) {
-  const std::uint64_t n = entry.numbers.from + step;
-  if (n > entry.numbers.to) return false;
-  const std::uint64_t address = entry.parameter.address.value + step * entry.stride;
+  const std::uint64_t n = entry.numbers->first + step;
+  if (n > entry.numbers->second) return false;
+  const std::uint64_t address = entry.parameter.address.value + step * *entry.stride;
   if (address > last_register || draft.read_parameters.size() >= most_parameters) {
     draft.incomplete = true;
     findings.add_once(
@@ -279,7 +298,7 @@ bool add_repetition(const Template& entry, std::uint64_t step, ProfileDraft& dra
   parameter.name = substitute(parameter.name, n);
   parameter.title = substitute(parameter.title, n);
   parameter.address = {static_cast<std::uint16_t>(address)};
-  if (step != 0) assign(parameter.evidence, std::optional(entry.repeats));
+  if (step != 0 && entry.repeats) parameter.evidence = *entry.repeats;
   add_parameter(std::move(parameter), entry.origin, draft, findings);
   return true;
 }
@@ -304,9 +323,8 @@ void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft
                 std::vector<Template>& entries, Diagnostics& findings) {
   const std::size_t before = findings.told();
   YamlMap map(node, findings, group);
-  Origin origin{.entry = &node, .group = group, .layer = draft.layers};
-  Template entry = read_template(map, group, origin.overlaps);
-  map.finish();
+  Template entry = read_template(map, group);
+  Origin origin{.entry = &node, .group = group, .layer = draft.layers, .overlaps = entry.overlaps};
   origin.sound = findings.told() == before;
   entry.origin = origin;
   const std::string_view name = entry.parameter.name;
@@ -315,15 +333,20 @@ void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft
   if (!name.empty()) entries.push_back(std::move(entry));
 }
 
+/// What a group may say for all its fields.
+std::vector<Key> group_keys() {
+  std::vector<Key> keys = {{.name = "name", .value = "text"}};
+  for (const Key& key : parameter_keys()) {
+    if (key.shared) keys.push_back(key);
+  }
+  keys.push_back({.name = "fields", .need = Need::required, .value = "list of maps"});
+  return keys;
+}
+
 void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draft,
                 Diagnostics& findings) {
   YamlMap group(node, findings);
-  for (const std::string_view key :
-       {"name",     "n",        "stride",  "table",  "encoding", "scale",    "unit",
-        "access",   "evidence", "repeats", "source", "note",     "overlaps", "effect",
-        "notation", "range",    "clone",   "secret", "settle",   "hazard",   "fields"}) {
-    group.allow(key);
-  }
+  for (const Key& key : group_keys()) group.know(key.name);
   group.finish();
   if (!expect(fields, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
   std::vector<Template> entries;
@@ -333,78 +356,68 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
   add_entries(entries, draft, findings);
 }
 
-void read_given_value(YamlMap& map, Action& action) {
-  if (const YamlNode* labels = map.get("labels")) {
-    std::vector<Label> fitting = read_labels(*labels, map.findings());
-    std::erase_if(fitting, [&](const Label& label) {
-      const bool wrong = label.number < catalogue::lowest(action.kind) ||
-                         label.number > catalogue::highest(action.kind);
-      if (wrong) {
-        map.findings().add(labels->at, fmt::format("{} does not fit {}", label.number,
-                                                   catalogue::to_text(action.kind)));
-      }
-      return wrong;
-    });
-    action.labels = std::move(fitting);
+void read_action_range(const YamlNode& node, Action& action, const Asked& asked) {
+  std::pair<std::uint16_t, std::uint16_t> range;
+  action.has_range = ValueReader<decltype(range)>::read(node, range, asked);
+  if (action.has_range) std::tie(action.minimum, action.maximum) = range;
+}
+
+constexpr Field<catalogue::Preparation> preparation_fields[] = {
+    field<&catalogue::Preparation::address>("register", Need::required),
+    field<&catalogue::Preparation::clear>("clear", Need::required),
+};
+
+constexpr Field<Action> action_fields[] = {
+    field<&Action::name>("name", Need::required),
+    field<&Action::title>("title"),
+    field<&Action::address>("register", Need::required),
+    field<&Action::value>("value"),
+    field<&Action::stop_value>("stop"),
+    word<catalogue::kind_words, &Action::kind>("encoding"),
+    word<motion_words, &Action::motion>("motion"),
+    field<&Action::rest>("rest"),
+    field<&Action::busy>("busy"),
+    map_of<preparation_fields, &Action::prepare>("prepare"),
+    field<&Action::labels>("labels"),
+    custom("range", Need::optional, "range 0..65535", read_action_range),
+    word<catalogue::hazard_words, &Action::hazard>("hazard", Need::required),
+    word<catalogue::evidence_words, &Action::evidence>("evidence", Need::required),
+    field<&Action::source>("source", Need::required),
+    field<&Action::note>("note"),
+    field<&Action::check>("check"),
+    field<&Action::tells>("tells"),
+    field<&Action::effects>("effects"),
+    field<&Action::confirm>("confirm"),
+    field_as<std::uint32_t, &Action::confirm_value>("confirm-value"),
+};
+
+/// Leaves out labels that the encoding has no number for.
+void check_labels(const YamlNode& node, Action& action, Diagnostics& findings) {
+  std::vector<Label> fitting;
+  for (const Label& label : action.labels) {
+    if (label.number >= catalogue::lowest(action.kind) &&
+        label.number <= catalogue::highest(action.kind)) {
+      fitting.push_back(label);
+    } else {
+      findings.add(node.find("labels")->at, fmt::format("{} does not fit {}", label.number,
+                                                        catalogue::to_text(action.kind)));
+    }
   }
-  if (const auto range = map.range("range", last_register)) {
-    action.has_range = true;
-    action.minimum = static_cast<std::uint16_t>(range->from);
-    action.maximum = static_cast<std::uint16_t>(range->to);
-  } else if (!action.labels.empty()) {
+  if (fitting.size() != action.labels.size()) action.labels = std::move(fitting);
+}
+
+/// Without a range of its own a value is one of the labels.
+void find_range(const YamlNode& node, Action& action, Diagnostics& findings) {
+  if (action.has_range) return;
+  if (!action.labels.empty()) {
     const auto [low, high] =
         std::minmax_element(action.labels.begin(), action.labels.end(),
                             [](const Label& a, const Label& b) { return a.number < b.number; });
     action.minimum = static_cast<std::uint16_t>(low->number);
     action.maximum = static_cast<std::uint16_t>(high->number);
   } else if (!action.value && action.motion == catalogue::Motion::none) {
-    map.findings().add(map.node().at, "an action needs a 'value', or a 'range' or 'labels'");
+    findings.add(node.at, "an action needs a 'value', or a 'range' or 'labels'");
   }
-}
-
-/// How an action is carried out beyond one write.
-void read_procedure(YamlMap& map, Action& action) {
-  assign(action.kind, map.word("encoding", "encoding", catalogue::kind_words));
-  assign(action.motion, map.word("motion", "motion", motion_words));
-  action.rest = map.number<std::uint16_t>("rest");
-  assign(action.busy, map.duration("busy"));
-  if (const YamlNode* node = map.get("prepare")) {
-    YamlMap preparation(*node, map.findings());
-    catalogue::Preparation& prepare = action.prepare.emplace();
-    if (auto address = preparation.number<std::uint16_t>("register", Need::required)) {
-      prepare.address = {*address};
-    }
-    assign(prepare.clear, preparation.number<std::uint16_t>("clear", Need::required));
-    preparation.finish();
-  }
-}
-
-Action read_action(YamlMap& map) {
-  Action action;
-  assign(action.name, map.text("name", Need::required));
-  assign(action.title, map.text("title"));
-  if (auto address = map.number<std::uint16_t>("register", Need::required)) {
-    action.address = {*address};
-  }
-  action.value = map.number<std::uint16_t>("value");
-  action.stop_value = map.number<std::uint16_t>("stop");
-  read_procedure(map, action);
-  read_given_value(map, action);
-  assign(action.hazard, map.word("hazard", "hazard", catalogue::hazard_words, Need::required));
-  assign(action.evidence,
-         map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
-  assign(action.source, map.text("source", Need::required));
-  assign(action.note, map.text("note"));
-  assign(action.check, map.text("check"));
-  assign(action.tells, map.text("tells"));
-  if (const YamlNode* effects = map.get("effects")) {
-    action.effects = read_labels(*effects, map.findings());
-  }
-  assign(action.confirm, map.text("confirm"));
-  if (const auto confirmed = map.number<std::uint32_t>("confirm-value")) {
-    action.confirm_value = *confirmed;
-  }
-  return action;
 }
 
 void add_action(Action action, const Origin& origin, ProfileDraft& draft, Diagnostics& findings) {
@@ -427,7 +440,11 @@ void add_action(Action action, const Origin& origin, ProfileDraft& draft, Diagno
 
 }  // namespace
 
-void read_parameters(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings) {
+std::vector<Key> parameter_keys() { return keys_of<parameter_fields, template_fields>(); }
+std::vector<Key> action_keys() { return keys_of<action_fields>(); }
+
+void read_parameters(const YamlNode& list, ProfileDraft& draft, const Asked& asked) {
+  Diagnostics& findings = asked.findings;
   if (!expect(list, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
   for (const YamlNode& node : list.items) {
     if (const YamlNode* fields = node.find("fields")) {
@@ -440,13 +457,15 @@ void read_parameters(const YamlNode& list, ProfileDraft& draft, Diagnostics& fin
   }
 }
 
-void read_actions(const YamlNode& list, ProfileDraft& draft, Diagnostics& findings) {
+void read_actions(const YamlNode& list, ProfileDraft& draft, const Asked& asked) {
+  Diagnostics& findings = asked.findings;
   expect(list, YamlNode::Kind::sequence, findings);
   for (const YamlNode& node : list.items) {
     const std::size_t before = findings.told();
-    YamlMap map(node, findings);
-    Action action = read_action(map);
-    map.finish();
+    Action action;
+    read_map(action_fields, node, action, findings);
+    check_labels(node, action, findings);
+    find_range(node, action, findings);
     if (action.name.empty()) continue;
     const bool sound = findings.told() == before;
     add_action(std::move(action), {.entry = &node, .layer = draft.layers, .sound = sound}, draft,

@@ -8,22 +8,116 @@
 #include <set>
 #include <utility>
 
-#include "files/profile_drive.hpp"
+#include "files/fields.hpp"
+#include "files/known_keys.hpp"
+#include "files/profile_codes.hpp"
 #include "files/profile_entries.hpp"
 #include "files/profile_run.hpp"
-#include "files/yaml_map.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/files/profile_store.hpp"
 
 namespace spindle::files {
+
+template <>
+struct ValueReader<catalogue::UnitRange> : ValueReader<std::pair<std::uint8_t, std::uint8_t>> {
+  static bool read(const YamlNode& node, catalogue::UnitRange& target, const Asked& asked) {
+    std::pair<std::uint8_t, std::uint8_t> units;
+    if (!ValueReader<decltype(units)>::read(node, units, asked)) return false;
+    target = {units.first, units.second};
+    return true;
+  }
+};
+
+/// From the first byte to the last.
+template <>
+struct ValueReader<catalogue::Slice> : ValueReader<std::pair<std::uint8_t, std::uint8_t>> {
+  static bool read(const YamlNode& node, catalogue::Slice& target, const Asked& asked) {
+    std::pair<std::uint8_t, std::uint8_t> bytes;
+    if (!ValueReader<decltype(bytes)>::read(node, bytes, asked)) return false;
+    target = {bytes.first, static_cast<std::uint8_t>(bytes.second - bytes.first + 1)};
+    return true;
+  }
+};
+
+/// Laid over what is there.
+template <std::integral Number>
+struct ValueReader<catalogue::Table<Number, catalogue::Text>> {
+  static constexpr std::string_view value = "text by number";
+  static bool read(const YamlNode& node, catalogue::Table<Number, catalogue::Text>& target,
+                   const Asked& asked) {
+    constexpr std::uint64_t last = std::numeric_limits<std::uint16_t>::max();
+    std::map<Number, catalogue::Text> names = target.to_map();
+    expect(node, YamlNode::Kind::map, asked.findings);
+    for (const YamlEntry& entry : node.entries) {
+      const auto number = parse_unsigned(entry.key, last);
+      if (!number) {
+        asked.findings.add(entry.key_at,
+                           fmt::format("'{}' is not a number up to {}", entry.key, last));
+      }
+      auto text = to_text(entry.value, asked.findings);
+      if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
+    }
+    target = std::move(names);
+    return true;
+  }
+};
+
 namespace {
 
 using catalogue::Area;
-using catalogue::CodeText;
-using catalogue::Evidence;
+using catalogue::EventSpec;
+using catalogue::IdentitySpec;
+using catalogue::LinkSpec;
+using catalogue::Profile;
+using catalogue::SerialSpec;
+using catalogue::SimulationSpec;
 
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
-constexpr std::uint64_t last_byte = std::numeric_limits<std::uint8_t>::max();
+
+// ---- register areas ----
+
+constexpr Field<Area> area_fields[] = {
+    range<&Area::from, &Area::to>("at", Need::required),
+    field<&Area::note>("note"),
+};
+
+/// [1..725, {at: 564..568, note: "..."}]
+void read_area_list(const YamlNode& node, std::vector<Area>& areas, const Asked& asked) {
+  if (!expect(node, YamlNode::Kind::sequence, asked.findings)) return;
+  const Field<Area>& bare = area_fields[0];
+  for (const YamlNode& item : node.items) {
+    const std::size_t before = asked.findings.told();
+    Area area{.table = *modbus::table_words.find(asked.key.name)};
+    if (item.kind == YamlNode::Kind::map) {
+      read_map(area_fields, item, area, asked.findings);
+    } else {
+      bare.read(item, area, asked);
+    }
+    if (asked.findings.told() == before) areas.push_back(std::move(area));
+  }
+}
+
+constexpr Field<std::vector<Area>> areas_fields[] = {
+    custom("holding", Need::optional, "list of ranges", read_area_list),
+    custom("input", Need::optional, "list of ranges", read_area_list),
+};
+
+}  // namespace
+
+template <>
+struct ValueReader<catalogue::List<Area>> {
+  static constexpr std::string_view value = "map";
+  static bool read(const YamlNode& node, catalogue::List<Area>& target, const Asked& asked) {
+    std::vector<Area> areas;
+    read_map(areas_fields, node, areas, asked.findings);
+    target = std::move(areas);
+    return true;
+  }
+};
+
+namespace {
+
+// ---- link ----
 
 constexpr auto framing_words =
     enum_table<modbus::Framing>({{"tcp", modbus::Framing::tcp}, {"rtu", modbus::Framing::rtu}});
@@ -31,161 +125,80 @@ constexpr auto pair_words = enum_table<bool>({{"even", true}, {"any", false}});
 /// A tool that does not copy the transaction id cannot be told from its own pushed frames.
 constexpr auto transaction_words = enum_table<bool>({{"echoed", true}, {"", false}});
 
-Need need_of(bool inherited) { return inherited ? Need::optional : Need::required; }
-
-// ---- register areas ----
-
-std::optional<Area> read_area(const YamlNode& node, modbus::RegisterTable table,
-                              Diagnostics& findings) {
-  Area area{.table = table};
-  std::optional<NumberRange> range;
-  if (node.kind == YamlNode::Kind::map) {
-    YamlMap map(node, findings);
-    range = map.range("at", last_register, Need::required);
-    assign(area.note, map.text("note"));
-    map.finish();
-  } else {
-    range = to_range(node, last_register, findings);
-  }
-  if (!range) return std::nullopt;
-  area.from = static_cast<std::uint16_t>(range->from);
-  area.to = static_cast<std::uint16_t>(range->to);
-  return area;
+void read_transaction(const YamlNode& node, LinkSpec&, const Asked& asked) {
+  bool echoed = true;
+  read_word(transaction_words, node, echoed, asked);
 }
 
-/// {holding: [1..725, {at: 564..568, note: "..."}], input: [...]}
-std::optional<std::vector<Area>> read_areas(const YamlNode* node, Diagnostics& findings) {
-  if (node == nullptr) return std::nullopt;
-  YamlMap map(*node, findings);
-  std::vector<Area> areas;
-  for (const auto& [name, table] : modbus::table_words) {
-    const YamlNode* list = map.get(name);
-    if (list == nullptr || !expect(*list, YamlNode::Kind::sequence, findings)) continue;
-    for (const YamlNode& item : list->items) {
-      if (auto area = read_area(item, table, findings)) areas.push_back(std::move(*area));
-    }
-  }
-  map.finish();
-  return areas;
-}
+constexpr Field<catalogue::GapRule> gap_fields[] = {
+    field<&catalogue::GapRule::up_to_baud>("up-to"),
+    field<&catalogue::GapRule::gap>("gap", Need::required),
+};
 
-// ---- link ----
+constexpr Field<SerialSpec> serial_fields[] = {
+    field<&SerialSpec::line, &modbus::SerialSettings::baud>("baud"),
+    word<modbus::parity_words, &SerialSpec::line, &modbus::SerialSettings::parity>("parity"),
+    field<&SerialSpec::line, &modbus::SerialSettings::stop_bits>("stop"),
+    list_of<gap_fields, &SerialSpec::gaps>("gaps"),
+    field<&SerialSpec::broadcast_pause>("broadcast-pause"),
+};
 
-std::optional<std::vector<catalogue::GapRule>> read_gaps(const YamlNode* node,
-                                                         Diagnostics& findings) {
-  if (node == nullptr || !expect(*node, YamlNode::Kind::sequence, findings)) return std::nullopt;
-  std::vector<catalogue::GapRule> gaps;
-  for (const YamlNode& item : node->items) {
-    YamlMap map(item, findings);
-    catalogue::GapRule rule;
-    assign(rule.up_to_baud, map.number<unsigned>("up-to"));
-    map.get("gap", Need::required);
-    assign(rule.gap, map.duration("gap"));
-    map.finish();
-    gaps.push_back(rule);
-  }
-  return gaps;
-}
-
-void read_serial(const YamlNode& node, catalogue::SerialSpec& serial, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(serial.line.baud, map.number<unsigned>("baud"));
-  assign(serial.line.parity, map.word("parity", "parity", modbus::parity_words));
-  assign(serial.line.stop_bits, map.number<unsigned>("stop"));
-  assign(serial.gaps, read_gaps(map.get("gaps"), findings));
-  assign(serial.broadcast_pause, map.duration("broadcast-pause"));
-  map.finish();
-}
-
-void read_link(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  catalogue::LinkSpec& link = draft.profile.link;
-  assign(link.framing, map.word("framing", "framing", framing_words,
-                                need_of(draft.link.entry != nullptr || draft.incomplete)));
-  assign(link.port, map.number<std::uint16_t>("port"));
-  assign(link.unit, map.number<std::uint8_t>("unit"));
-  if (const auto units = map.range("units", last_byte)) {
-    link.units = {static_cast<std::uint8_t>(units->from), static_cast<std::uint8_t>(units->to)};
-  }
-  map.word("transaction", "transaction", transaction_words);
-  assign(link.max_read, map.number<std::uint16_t>("max-read"));
-  assign(link.max_write, map.number<std::uint16_t>("max-write"));
-  assign(link.keep_alive, map.duration("keep-alive"));
-  assign(link.answer, map.duration("answer"));
-  assign(link.connect, map.duration("connect"));
-  assign(link.retries, map.number<unsigned>("retries"));
-  assign(link.settle, map.duration("settle"));
-  assign(link.loopback, map.flag("loopback"));
-  assign(link.any_unit, map.flag("any-unit"));
-  assign(link.even_pairs, map.word("pairs", "pairs", pair_words));
-  if (const YamlNode* serial = map.get("serial")) read_serial(*serial, link.serial, findings);
-  assign(link.contiguous, read_areas(map.get("contiguous"), findings));
-  assign(link.absent, read_areas(map.get("absent"), findings));
-  map.finish();
-}
+constexpr Field<LinkSpec> link_fields[] = {
+    word<framing_words, &LinkSpec::framing>("framing", Need::inherited),
+    field<&LinkSpec::port>("port"),
+    field<&LinkSpec::unit>("unit"),
+    field<&LinkSpec::units>("units"),
+    custom("transaction", Need::optional, "echoed", read_transaction),
+    field<&LinkSpec::max_read>("max-read"),
+    field<&LinkSpec::max_write>("max-write"),
+    field<&LinkSpec::keep_alive>("keep-alive"),
+    field<&LinkSpec::answer>("answer"),
+    field<&LinkSpec::connect>("connect"),
+    field<&LinkSpec::retries>("retries"),
+    field<&LinkSpec::settle>("settle"),
+    field<&LinkSpec::loopback>("loopback"),
+    field<&LinkSpec::any_unit>("any-unit"),
+    word<pair_words, &LinkSpec::even_pairs>("pairs"),
+    map_of<serial_fields, &LinkSpec::serial>("serial"),
+    field<&LinkSpec::contiguous>("contiguous").with(keys_of<areas_fields>),
+    field<&LinkSpec::absent>("absent").with(keys_of<areas_fields>),
+};
 
 // ---- identity ----
 
-template <typename Number>
-void read_names(const YamlNode* node, catalogue::Table<Number, catalogue::Text>& table,
-                Diagnostics& findings) {
-  if (node == nullptr) return;
-  std::map<Number, catalogue::Text> names = table.to_map();
-  expect(*node, YamlNode::Kind::map, findings);
-  for (const YamlEntry& entry : node->entries) {
-    const auto number = parse_unsigned(entry.key, last_register);
-    if (!number) {
-      findings.add(entry.key_at,
-                   fmt::format("'{}' is not a number up to {}", entry.key, last_register));
-    }
-    auto text = to_text(entry.value, findings);
-    if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
-  }
-  table = std::move(names);
+constexpr Field<IdentitySpec> long_serial_fields[] = {
+    field<&IdentitySpec::long_serial_bytes>("from-bytes", Need::inherited),
+    field<&IdentitySpec::long_serial>("at", Need::inherited),
+    field<&IdentitySpec::product_byte>("product-at"),
+    field<&IdentitySpec::products>("products"),
+};
+
+constexpr Field<IdentitySpec> total_fields[] = {
+    field<&IdentitySpec::total_bytes>("from-bytes", Need::inherited),
+    field<&IdentitySpec::total>("at", Need::inherited),
+};
+
+void read_long_serial(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
+  read_map(long_serial_fields, node, identity, asked.findings, identity.long_serial_bytes != 0);
 }
 
-std::optional<catalogue::Slice> read_slice(YamlMap& map, std::string_view key,
-                                           Need need = Need::optional) {
-  const auto range = map.range(key, last_byte, need);
-  if (!range) return std::nullopt;
-  return catalogue::Slice{static_cast<std::uint8_t>(range->from),
-                          static_cast<std::uint8_t>(range->to - range->from + 1)};
+void read_total(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
+  read_map(total_fields, node, identity, asked.findings, identity.total_bytes != 0);
 }
 
-void read_long_serial(const YamlNode& node, catalogue::IdentitySpec& identity,
-                      Diagnostics& findings) {
-  YamlMap map(node, findings);
-  const Need need = need_of(identity.long_serial_bytes != 0);
-  assign(identity.long_serial_bytes, map.number<std::uint8_t>("from-bytes", need));
-  assign(identity.long_serial, read_slice(map, "at", need));
-  assign(identity.product_byte, map.number<std::uint8_t>("product-at"));
-  read_names(map.get("products"), identity.products, findings);
-  map.finish();
-}
-
-void read_total(const YamlNode& node, catalogue::IdentitySpec& identity, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  const Need need = need_of(identity.total_bytes != 0);
-  assign(identity.total_bytes, map.number<std::uint8_t>("from-bytes", need));
-  assign(identity.total, read_slice(map, "at", need));
-  map.finish();
-}
-
-void read_identity(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [identity, need] = section_of(draft.profile.identity);
-  assign(identity.minimum_bytes, map.number<std::uint8_t>("minimum-bytes", need));
-  assign(identity.id, read_slice(map, "id"));
-  assign(identity.controller_model, read_slice(map, "controller-model"));
-  assign(identity.tool_model, read_slice(map, "tool-model", need));
-  assign(identity.firmware, read_slice(map, "firmware", need));
-  assign(identity.serial, read_slice(map, "serial", need));
-  if (const YamlNode* part = map.get("long-serial")) read_long_serial(*part, identity, findings);
-  if (const YamlNode* part = map.get("total")) read_total(*part, identity, findings);
-  read_names(map.get("models", need), identity.models, findings);
-  assign(identity.firmware_below, map.number<unsigned>("firmware-below"));
-  map.finish();
-}
+constexpr Field<IdentitySpec> identity_fields[] = {
+    field<&IdentitySpec::minimum_bytes>("minimum-bytes", Need::inherited),
+    field<&IdentitySpec::id>("id"),
+    field<&IdentitySpec::controller_model>("controller-model"),
+    field<&IdentitySpec::tool_model>("tool-model", Need::inherited),
+    field<&IdentitySpec::firmware>("firmware", Need::inherited),
+    field<&IdentitySpec::serial>("serial", Need::inherited),
+    custom("long-serial", Need::optional, "map", read_long_serial)
+        .with(keys_of<long_serial_fields>),
+    custom("total", Need::optional, "map", read_total).with(keys_of<total_fields>),
+    field<&IdentitySpec::models>("models", Need::inherited),
+    field<&IdentitySpec::firmware_below>("firmware-below"),
+};
 
 // ---- events, limits, numbered ----
 
@@ -194,18 +207,21 @@ constexpr auto source_words =
                                        {"counter", catalogue::EventModel::counter},
                                        {"flag", catalogue::EventModel::flag}});
 
-void read_arm(const YamlNode& node, catalogue::EventSpec& events, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [arm, need] = section_of(events.arm);
-  assign(arm.address, map.number<std::uint16_t>("register", need));
-  assign(arm.value, map.number<std::uint16_t>("value"));
-  assign(arm.disarm, map.number<std::uint16_t>("disarm"));
-  assign(arm.every, map.duration("every"));
-  assign(arm.expires, map.duration("expires"));
-  map.finish();
-}
+constexpr Field<catalogue::Arming> arm_fields[] = {
+    field<&catalogue::Arming::address>("register", Need::inherited),
+    field<&catalogue::Arming::value>("value"),
+    field<&catalogue::Arming::disarm>("disarm"),
+    field<&catalogue::Arming::every>("every"),
+    field<&catalogue::Arming::expires>("expires"),
+};
 
-std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at,
+constexpr Field<catalogue::EventColumn> column_fields[] = {
+    field<&catalogue::EventColumn::heading>("heading", Need::required),
+    field<&catalogue::EventColumn::parameter>("parameter", Need::required),
+    field_as<std::uint8_t, &catalogue::EventColumn::width>("width"),
+};
+
+std::optional<catalogue::EventKind> to_kind(const std::string& name, const SourceLocation& at,
                                             Diagnostics& findings) {
   const auto kind = catalogue::event_kind_words.find(name);
   if (!kind) {
@@ -214,165 +230,169 @@ std::optional<catalogue::EventKind> to_kind(const std::string& name, Position at
   return kind;
 }
 
-void read_kinds(const YamlNode* node, catalogue::EventSpec& events, Diagnostics& findings) {
+void read_kinds(const YamlNode& node, EventSpec& events, const Asked& asked) {
   catalogue::Table<std::int64_t, catalogue::Text> names;
-  read_names(node, names, findings);
+  ValueReader<decltype(names)>::read(node, names, asked);
   std::map<std::int64_t, catalogue::EventKind> kinds = events.kinds.to_map();
   for (const auto& [number, name] : names) {
-    const auto kind = to_kind(name, node->at, findings);
+    const auto kind = to_kind(name, node.at, asked.findings);
     if (kind) kinds.insert_or_assign(number, *kind);
   }
   events.kinds = std::move(kinds);
 }
 
-void read_columns(const YamlNode& node, catalogue::EventSpec& events, Diagnostics& findings) {
-  expect(node, YamlNode::Kind::sequence, findings);
-  std::vector<catalogue::EventColumn> columns;
-  for (const YamlNode& item : node.items) {
-    YamlMap map(item, findings);
-    catalogue::EventColumn column;
-    assign(column.heading, map.text("heading", Need::required));
-    assign(column.parameter, map.text("parameter", Need::required));
-    assign(column.width, map.number<std::uint8_t>("width"));
-    map.finish();
-    columns.push_back(std::move(column));
-  }
-  events.columns = std::move(columns);
-}
-
-void read_events(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [events, need] = section_of(draft.profile.events);
-  assign(events.model, map.word("source", "source of events", source_words));
-  if (const YamlNode* arm = map.get("arm")) read_arm(*arm, events, findings);
-  assign(events.function, map.number<std::uint8_t>("function", need));
-  assign(events.first, map.number<std::uint16_t>("first", need));
-  assign(events.count, map.number<std::uint16_t>("count", need));
-  assign(events.number, map.text("number"));
-  assign(events.flag, map.text("flag"));
-  assign(events.kind, map.text("kind", need));
-  read_kinds(map.get("kinds"), events, findings);
-  assign(events.error, map.text("error"));
-  if (const YamlNode* columns = map.get("columns")) read_columns(*columns, events, findings);
-  if (auto interval = map.duration("interval")) events.interval = *interval;
-  map.finish();
-}
-
-void read_limits(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [limits, need] = section_of(draft.profile.limits);
-  assign(limits.minimum_offset, map.number<std::uint16_t>("minimum-offset", need));
-  assign(limits.maximum_offset, map.number<std::uint16_t>("maximum-offset", need));
-  assign(limits.from, map.number<std::uint16_t>("from", need));
-  assign(limits.to, map.number<std::uint16_t>("to", need));
-  map.finish();
-}
-
-void read_numbered(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [numbered, need] = section_of(draft.profile.numbered);
-  assign(numbered.prefix, map.text("prefix", need));
-  assign(numbered.table, map.word("table", "table", modbus::table_words));
-  assign(numbered.from, map.number<std::uint16_t>("from", need));
-  assign(numbered.to, map.number<std::uint16_t>("to", need));
-  assign(numbered.access, map.word("access", "access", catalogue::access_words));
-  assign(numbered.evidence, map.word("evidence", "evidence", catalogue::evidence_words));
-  assign(numbered.source, map.text("source"));
-  map.finish();
-}
-
-// ---- codes ----
-
-constexpr auto reset_words =
-    enum_table<catalogue::Resettable>({{"possible", catalogue::Resettable::yes},
-                                       {"power-cycle", catalogue::Resettable::no},
-                                       {"", catalogue::Resettable::unknown}});
-
-struct Provenance {
-  Evidence evidence = Evidence::inferred;
-  std::string source = {};
+constexpr Field<EventSpec> event_fields[] = {
+    word<source_words, &EventSpec::model>("source", Need::optional, "source of events"),
+    map_of<arm_fields, &EventSpec::arm>("arm"),
+    field<&EventSpec::function>("function", Need::inherited),
+    field<&EventSpec::first>("first", Need::inherited),
+    field<&EventSpec::count>("count", Need::inherited),
+    field<&EventSpec::number>("number"),
+    field<&EventSpec::flag>("flag"),
+    field<&EventSpec::kind>("kind", Need::inherited),
+    custom("kinds", Need::optional, "kind of event by number", read_kinds),
+    field<&EventSpec::error>("error"),
+    list_of<column_fields, &EventSpec::columns>("columns"),
+    field<&EventSpec::interval>("interval"),
 };
 
-std::optional<CodeText> read_code_text(const YamlNode& node, const Provenance& from,
-                                       Diagnostics& findings) {
-  CodeText code{.text = {}, .remedy = {}, .evidence = from.evidence, .source = from.source};
-  if (node.kind != YamlNode::Kind::map) {
-    auto text = to_text(node, findings);
-    if (!text) return std::nullopt;
-    code.text = std::move(*text);
-    return code;
-  }
-  YamlMap map(node, findings);
-  assign(code.text, map.text("text", Need::required));
-  assign(code.remedy, map.text("remedy"));
-  assign(code.evidence, map.word("evidence", "evidence", catalogue::evidence_words));
-  assign(code.source, map.text("source"));
-  assign(code.resettable, map.word("reset", "reset", reset_words));
-  map.finish();
-  return code;
+constexpr Field<catalogue::LimitSpec> limit_fields[] = {
+    field<&catalogue::LimitSpec::minimum_offset>("minimum-offset", Need::inherited),
+    field<&catalogue::LimitSpec::maximum_offset>("maximum-offset", Need::inherited),
+    field<&catalogue::LimitSpec::from>("from", Need::inherited),
+    field<&catalogue::LimitSpec::to>("to", Need::inherited),
+};
+
+constexpr Field<catalogue::NumberedSpec> numbered_fields[] = {
+    field<&catalogue::NumberedSpec::prefix>("prefix", Need::inherited),
+    word<modbus::table_words, &catalogue::NumberedSpec::table>("table"),
+    field<&catalogue::NumberedSpec::from>("from", Need::inherited),
+    field<&catalogue::NumberedSpec::to>("to", Need::inherited),
+    word<catalogue::access_words, &catalogue::NumberedSpec::access>("access"),
+    word<catalogue::evidence_words, &catalogue::NumberedSpec::evidence>("evidence"),
+    field<&catalogue::NumberedSpec::source>("source"),
+};
+
+// ---- what a product says of refused requests, and its lists of codes ----
+
+constexpr auto code_table_words =
+    enum_table<catalogue::CodeTable>({{"error-codes", catalogue::CodeTable::error},
+                                      {"warning-codes", catalogue::CodeTable::warning},
+                                      {"refusals", catalogue::CodeTable::refusal},
+                                      {"none", catalogue::CodeTable::none}});
+
+constexpr Field<catalogue::RefusalSpec> refusal_fields[] = {
+    field<&catalogue::RefusalSpec::parameter>("parameter", Need::inherited),
+    field<&catalogue::RefusalSpec::codes>("codes", Need::inherited),
+    numbers<std::uint16_t, &catalogue::RefusalSpec::busy>("busy"),
+    field<&catalogue::RefusalSpec::retry_every>("retry-every"),
+    field<&catalogue::RefusalSpec::give_up_after>("give-up-after"),
+};
+
+void read_alarm_parameters(const YamlNode& node, catalogue::AlarmList& list, const Asked& asked) {
+  catalogue::Text pattern;
+  if (ValueReader<catalogue::Text>::read(node, pattern, asked)) list.parameters = {pattern};
 }
 
-using Codes = std::map<std::int64_t, CodeText>;
+constexpr Field<catalogue::AlarmList> alarm_list_fields[] = {
+    field<&catalogue::AlarmList::name>("list", Need::required),
+    custom("parameters", Need::required, "text", read_alarm_parameters),
+    word<code_table_words, &catalogue::AlarmList::codes>("codes", Need::required, "table"),
+};
 
-void read_code_map(const YamlNode& node, const Provenance& from, Codes& codes,
-                   Diagnostics& findings) {
-  expect(node, YamlNode::Kind::map, findings);
-  std::vector<std::int64_t> seen;
-  for (const YamlEntry& entry : node.entries) {
-    const auto number = parse_unsigned(entry.key, last_register);
-    if (!number) {
-      findings.add(entry.key_at,
-                   fmt::format("'{}' is not a code from 0 to {}", entry.key, last_register));
-      continue;
-    }
-    const auto code = static_cast<std::int64_t>(*number);
-    if (std::find(seen.begin(), seen.end(), code) != seen.end()) {
-      findings.add(entry.key_at, fmt::format("code {} is given twice", entry.key));
-    }
-    seen.push_back(code);
-    auto text = read_code_text(entry.value, from, findings);
-    if (text) codes.insert_or_assign(code, std::move(*text));
-  }
+// ---- the first document ----
+
+void read_format(const YamlNode& node, ProfileHead&, const Asked& asked) {
+  if (node.text == std::to_string(profile_format)) return;
+  asked.findings.add(node.at, fmt::format("unknown format '{}'; this version reads format {}",
+                                          node.text, profile_format));
 }
 
-void read_code_maps(const YamlNode& node, Codes& codes, Diagnostics& findings) {
-  if (node.kind != YamlNode::Kind::sequence) {
-    read_code_map(node, {}, codes, findings);
-    return;
-  }
-  for (const YamlNode& item : node.items) {
-    YamlMap map(item, findings);
-    Provenance from;
-    assign(from.evidence,
-           map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
-    assign(from.source, map.text("source", Need::required));
-    const YamlNode* list = map.get("codes", Need::required);
-    map.finish();
-    if (list != nullptr) read_code_map(*list, from, codes, findings);
-  }
+void read_extends(const YamlNode& node, ProfileHead& head, const Asked& asked) {
+  ValueReader<std::string>::read(node, head.extends, asked);
+  head.extends_at = node.at;
 }
 
-}  // namespace
+constexpr Field<ProfileHead> head_fields[] = {
+    custom("format", Need::required, "1", read_format),
+    custom("extends", Need::optional, "text", read_extends),
+    field<&ProfileHead::abstract>("abstract"),
+};
 
-void read_codes(const YamlNode& node, catalogue::CodeTexts& table, Diagnostics& findings) {
-  Codes codes = table.to_map();
-  read_code_maps(node, codes, findings);
-  table = std::move(codes);
+constexpr Field<ProfileDraft> title_fields[] = {
+    field<&ProfileDraft::profile, &Profile::id>("id", Need::required),
+    field<&ProfileDraft::profile, &Profile::title>("title", Need::required),
+    field<&ProfileDraft::profile, &Profile::maker>("maker"),
+    field<&ProfileDraft::profile, &Profile::series>("series"),
+};
+
+constexpr Field<ProfileDraft> list_fields[] = {
+    field<&ProfileDraft::profile, &Profile::exceptions>("exceptions").with(code_list_keys),
+    custom("parameters", Need::optional, "list of maps", read_parameters).with(parameter_keys),
+    custom("actions", Need::optional, "list of maps", read_actions).with(action_keys),
+};
+
+/// A section that may be left out, and where it is remembered.
+struct Section {
+  Field<ProfileDraft> field;
+  Origin ProfileDraft::*origin;
+  bool (*is_there)(const Profile& profile);
+  void (*drop)(Profile& profile);
+};
+
+bool is_there(const LinkSpec&) { return true; }
+bool is_there(const auto& list) { return !list.empty(); }
+template <typename Facts>
+bool is_there(const std::optional<Facts>& facts) {
+  return facts.has_value();
 }
 
-namespace {
+/// How to talk to it is asked of every profile.
+void drop(LinkSpec&) {}
+template <typename Facts>
+void drop(Facts& facts) {
+  facts = Facts();
+}
 
-using ReadSection = void (*)(const YamlNode&, ProfileDraft&, Diagnostics&);
+template <auto facts>
+constexpr Section section(const Field<ProfileDraft>& field, Origin ProfileDraft::*origin) {
+  return {field, origin, [](const Profile& profile) { return is_there(profile.*facts); },
+          [](Profile& profile) { drop(profile.*facts); }};
+}
 
-/// Reads a section that may be left out, and remembers where it stands.
-void read_section(YamlMap& map, std::string_view key, ReadSection read, Origin& origin,
-                  ProfileDraft& draft) {
-  const YamlNode* node = map.get(key);
-  if (node == nullptr) return;
-  const std::size_t before = map.findings().told();
-  read(*node, draft, map.findings());
-  const bool sound = origin.sound && map.findings().told() == before;
-  origin = {.entry = node, .layer = draft.layers, .sound = sound};
+template <auto facts, const auto& fields>
+constexpr Section map_section(std::string_view name, Origin ProfileDraft::*origin) {
+  return section<facts>(map_of<fields, &ProfileDraft::profile, facts>(name), origin);
+}
+
+constexpr Section sections[] = {
+    map_section<&Profile::link, link_fields>("link", &ProfileDraft::link),
+    map_section<&Profile::identity, identity_fields>("identity", &ProfileDraft::identity),
+    map_section<&Profile::events, event_fields>("events", &ProfileDraft::events),
+    map_section<&Profile::limits, limit_fields>("limits", &ProfileDraft::limits),
+    map_section<&Profile::numbered, numbered_fields>("numbered", &ProfileDraft::numbered),
+    section<&Profile::run>(custom("run", Need::optional, "map", read_run).with(run_keys),
+                           &ProfileDraft::run),
+    map_section<&Profile::refusals, refusal_fields>("refusals", &ProfileDraft::refusals),
+    section<&Profile::alarm_lists>(
+        list_of<alarm_list_fields, &ProfileDraft::profile, &Profile::alarm_lists>("alarm-lists"),
+        &ProfileDraft::alarm_lists),
+    section<&Profile::watched>(field<&ProfileDraft::profile, &Profile::watched>("watch"),
+                               &ProfileDraft::watched),
+    section<&Profile::alarm_reset>(
+        field<&ProfileDraft::profile, &Profile::alarm_reset>("alarm-reset"),
+        &ProfileDraft::alarm_reset),
+};
+
+/// Reads a section where it is there, and remembers where it stands.
+void read_section(const Section& section, YamlMap& map, ProfileDraft& draft, bool inherited) {
+  const Diagnostics& findings = map.findings();
+  const std::size_t before = findings.told();
+  if (!read_field(section.field, map, draft, inherited)) return;
+  Origin& origin = draft.*section.origin;
+  const bool sound = origin.sound && findings.told() == before;
+  origin = {
+      .entry = map.node().find(section.field.key.name), .layer = draft.layers, .sound = sound};
 }
 
 /// Erases entries that are not sound, side by side with where they were written.
@@ -393,32 +413,33 @@ void erase_half_read(std::vector<Entry>& entries, std::vector<Origin>& origins) 
 
 // ---- simulation ----
 
-void read_simulated_identity(const YamlNode& node, catalogue::SimulationSpec& facts,
-                             Diagnostics& findings) {
-  YamlMap map(node, findings);
-  if (const YamlNode* bytes = map.get("bytes", Need::required)) {
-    Bytes identity = to_bytes(*bytes, split(bytes->text, ' '), findings);
-    // Behind function code and byte count.
-    constexpr std::size_t most = modbus::max_pdu_size - 2;
-    if (identity.size() > most) {
-      findings.add(node.at, fmt::format("an answer holds at most {} bytes", most));
-      identity.resize(most);
-    }
-    facts.identity = std::move(identity);
+void read_identity_bytes(const YamlNode& node, SimulationSpec& facts, const Asked& asked) {
+  Bytes identity = to_bytes(node, split(node.text, ' '), asked.findings);
+  // Behind function code and byte count.
+  constexpr std::size_t most = modbus::max_pdu_size - 2;
+  if (identity.size() > most) {
+    asked.findings.add(asked.map.at, fmt::format("an answer holds at most {} bytes", most));
+    identity.resize(most);
   }
-  facts.identity_bytes =
-      map.number<std::uint8_t>("answer").value_or(static_cast<std::uint8_t>(facts.identity.size()));
-  if (facts.identity_bytes > facts.identity.size()) {
-    findings.add(node.at, fmt::format("the answer has {} bytes, but only {} are given",
-                                      facts.identity_bytes, facts.identity.size()));
-  }
-  map.finish();
+  facts.identity_bytes = identity.size();
+  facts.identity = std::move(identity);
 }
 
-std::vector<catalogue::SimulationSpec::Value> read_raw_values(const YamlNode& node,
-                                                              Diagnostics& findings) {
+constexpr Field<SimulationSpec> simulated_identity_fields[] = {
+    custom("bytes", Need::required, "bytes in hexadecimal digits", read_identity_bytes),
+    field_as<std::uint8_t, &SimulationSpec::identity_bytes>("answer"),
+};
+
+void read_simulated_identity(const YamlNode& node, SimulationSpec& facts, const Asked& asked) {
+  read_map(simulated_identity_fields, node, facts, asked.findings);
+  if (facts.identity_bytes <= facts.identity.size()) return;
+  asked.findings.add(node.at, fmt::format("the answer has {} bytes, but only {} are given",
+                                          facts.identity_bytes, facts.identity.size()));
+}
+
+std::vector<SimulationSpec::Value> to_raw_values(const YamlNode& node, Diagnostics& findings) {
   expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationSpec::Value> values;
+  std::vector<SimulationSpec::Value> values;
   for (const YamlEntry& entry : node.entries) {
     const auto raw = parse_integer(entry.value.text);
     if (raw) {
@@ -430,12 +451,15 @@ std::vector<catalogue::SimulationSpec::Value> read_raw_values(const YamlNode& no
   return values;
 }
 
-void read_simulated_limits(const YamlNode& node, catalogue::SimulationSpec& facts,
-                           Diagnostics& findings) {
-  expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationSpec::Limits> limits;
+void read_raw_values(const YamlNode& node, SimulationSpec& facts, const Asked& asked) {
+  facts.values = to_raw_values(node, asked.findings);
+}
+
+void read_simulated_limits(const YamlNode& node, SimulationSpec& facts, const Asked& asked) {
+  expect(node, YamlNode::Kind::map, asked.findings);
+  std::vector<SimulationSpec::Limits> limits;
   for (const YamlEntry& entry : node.entries) {
-    const auto range = to_range(entry.value, last_register, findings);
+    const auto range = to_range(entry.value, last_register, asked.findings);
     if (!range) continue;
     limits.push_back(
         {entry.key, static_cast<std::int64_t>(range->from), static_cast<std::int64_t>(range->to)});
@@ -443,20 +467,31 @@ void read_simulated_limits(const YamlNode& node, catalogue::SimulationSpec& fact
   facts.limits = std::move(limits);
 }
 
-void read_simulated_events(const YamlNode& node, catalogue::SimulationSpec& facts,
-                           Diagnostics& findings) {
-  expect(node, YamlNode::Kind::map, findings);
-  std::vector<catalogue::SimulationSpec::Event> events;
+void read_simulated_events(const YamlNode& node, SimulationSpec& facts, const Asked& asked) {
+  expect(node, YamlNode::Kind::map, asked.findings);
+  std::vector<SimulationSpec::Event> events;
   for (const YamlEntry& entry : node.entries) {
-    const auto kind = to_kind(entry.key, entry.key_at, findings);
-    expect(entry.value, YamlNode::Kind::sequence, findings);
+    const auto kind = to_kind(entry.key, entry.key_at, asked.findings);
+    expect(entry.value, YamlNode::Kind::sequence, asked.findings);
     for (const YamlNode& item : entry.value.items) {
-      auto values = read_raw_values(item, findings);
+      auto values = to_raw_values(item, asked.findings);
       if (kind) events.push_back({*kind, std::move(values)});
     }
   }
   facts.events = std::move(events);
 }
+
+constexpr Field<SimulationSpec> simulation_fields[] = {
+    custom("identity", Need::optional, "map", read_simulated_identity)
+        .with(keys_of<simulated_identity_fields>),
+    custom("values", Need::optional, "numbers by pattern", read_raw_values),
+    custom("limits", Need::optional, "ranges by pattern", read_simulated_limits),
+    custom("events", Need::optional, "lists of maps by kind of event", read_simulated_events),
+    field<&SimulationSpec::limit_exception>("limit-exception"),
+    field<&SimulationSpec::stopped_error>("stopped-error"),
+    numbers<std::uint16_t, &SimulationSpec::permanent_alarms>("permanent-alarms"),
+    field<&SimulationSpec::absent>("absent").with(keys_of<areas_fields>),
+};
 
 void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry, std::int64_t raw,
                        Diagnostics& findings) {
@@ -475,7 +510,7 @@ void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry
 
 }  // namespace
 
-Position Origin::of(std::string_view key) const {
+SourceLocation Origin::of(std::string_view key) const {
   if (const YamlNode* own = entry->find(key)) return own->at;
   if (group != nullptr) {
     if (const YamlNode* shared = group->find(key)) return shared->at;
@@ -513,18 +548,8 @@ void ProfileDraft::begin_with(const catalogue::Profile& base, const YamlNode& no
     parameter_index.emplace(read_parameters[i].name, i);
   }
   for (const std::size_t index : sharing(read_parameters)) parameters[index].overlaps = true;
-  const std::pair<bool, Origin*> sections[] = {{true, &link},
-                                               {base.identity.has_value(), &identity},
-                                               {base.events.has_value(), &events},
-                                               {base.limits.has_value(), &limits},
-                                               {base.numbered.has_value(), &numbered},
-                                               {base.run.has_value(), &run},
-                                               {base.refusals.has_value(), &refusals},
-                                               {!base.alarm_lists.empty(), &alarm_lists},
-                                               {!base.watched.empty(), &watched},
-                                               {!base.alarm_reset.empty(), &alarm_reset}};
-  for (const auto& [is_there, section] : sections) {
-    if (is_there) *section = origin;
+  for (const Section& section : sections) {
+    if (section.is_there(base)) this->*section.origin = origin;
   }
 }
 
@@ -540,71 +565,59 @@ void ProfileDraft::finish() {
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     parameter_index.emplace(profile.parameters[i].name, i);
   }
-  if (!identity.sound) profile.identity.reset();
-  if (!events.sound) profile.events.reset();
-  if (!limits.sound) profile.limits.reset();
-  if (!numbered.sound) profile.numbered.reset();
-  if (!run.sound) profile.run.reset();
-  if (!refusals.sound) profile.refusals.reset();
-  if (!alarm_lists.sound) profile.alarm_lists = {};
-  if (!watched.sound) profile.watched = {};
-  if (!alarm_reset.sound) profile.alarm_reset = {};
+  for (const Section& section : sections) {
+    if (!(this->*section.origin).sound) section.drop(profile);
+  }
 }
 
 ProfileHead read_head(const YamlNode& document, Diagnostics& findings) {
   ProfileHead head;
   if (!expect(document, YamlNode::Kind::map, findings)) return head;
   YamlMap map(document, findings);
-  const YamlNode* format = map.get("format", Need::required);
-  if (format != nullptr && format->text != std::to_string(profile_format)) {
-    findings.add(format->at, fmt::format("unknown format '{}'; this version reads format {}",
-                                         format->text, profile_format));
-  }
-  if (const YamlNode* base = map.get("extends")) {
-    assign(head.extends, to_text(*base, findings));
-    head.extends_at = base->at;
-  }
-  assign(head.abstract, map.flag("abstract"));
+  read_fields(head_fields, map, head);
   return head;
 }
 
 void read_profile(const YamlNode& document, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(document, findings);
-  catalogue::Profile& profile = draft.profile;
   draft.top = {.entry = &document, .layer = draft.layers};
-  for (const std::string_view head : {"format", "extends", "abstract"}) map.allow(head);
-  assign(profile.id, map.text("id", Need::required));
-  assign(profile.title, map.text("title", Need::required));
-  assign(profile.maker, map.text("maker"));
-  assign(profile.series, map.text("series"));
-  read_section(map, "link", read_link, draft.link, draft);
-  read_section(map, "identity", read_identity, draft.identity, draft);
-  read_section(map, "events", read_events, draft.events, draft);
-  read_section(map, "limits", read_limits, draft.limits, draft);
-  read_section(map, "numbered", read_numbered, draft.numbered, draft);
-  read_section(map, "run", read_run, draft.run, draft);
-  read_section(map, "refusals", read_refusals, draft.refusals, draft);
-  read_section(map, "alarm-lists", read_alarm_lists, draft.alarm_lists, draft);
-  read_section(map, "watch", read_watched, draft.watched, draft);
-  read_section(map, "alarm-reset", read_alarm_reset, draft.alarm_reset, draft);
-  if (const YamlNode* codes = map.get("exceptions")) {
-    read_codes(*codes, profile.exceptions, findings);
-  }
-  if (const YamlNode* list = map.get("parameters")) read_parameters(*list, draft, findings);
-  if (const YamlNode* list = map.get("actions")) read_actions(*list, draft, findings);
+  for (const Field<ProfileHead>& head : head_fields) map.know(head.key.name);
+  read_fields(title_fields, map, draft);
+  const bool has_link = draft.link.entry != nullptr || draft.incomplete;
+  for (const Section& section : sections) read_section(section, map, draft, has_link);
+  read_fields(list_fields, map, draft);
   map.finish();
   ++draft.layers;
 }
+
+namespace {
+
+constexpr auto part_words =
+    enum_table<Part>({{"texts", Part::texts}, {"simulation", Part::simulation}});
+
+struct PartHead {
+  std::optional<Part> part = std::nullopt;
+};
+
+constexpr Field<PartHead> part_fields[] = {
+    word<part_words, &PartHead::part>("part", Need::required),
+};
+
+constexpr Field<catalogue::CodeTables> text_fields[] = {
+    field<&catalogue::CodeTables::error>("error-codes", Need::required).with(code_list_keys),
+    field<&catalogue::CodeTables::warning>("warning-codes").with(code_list_keys),
+};
+
+}  // namespace
 
 const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part,
                           Diagnostics& findings) {
   const YamlNode* found = nullptr;
   for (std::size_t i = 1; i < documents.size(); ++i) {
+    PartHead head;
     YamlMap map(documents[i], findings);
-    constexpr auto part_words =
-        enum_table<Part>({{"texts", Part::texts}, {"simulation", Part::simulation}});
-    const auto name = map.word("part", "part", part_words, Need::required);
-    if (!name || *name != part) continue;
+    read_fields(part_fields, map, head);
+    if (head.part != part) continue;
     if (found != nullptr) {
       findings.add(documents[i].at,
                    fmt::format("a second document of part '{}'", part_words.text(part)));
@@ -614,41 +627,27 @@ const YamlNode* find_part(const std::vector<YamlNode>& documents, Part part,
   return found;
 }
 
-void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Diagnostics& findings) {
+namespace {
+
+template <typename T, std::size_t count>
+void read_part(const Field<T> (&fields)[count], const YamlNode& document, T& facts,
+               Diagnostics& findings) {
   YamlMap map(document, findings);
-  map.allow("part");
-  if (const YamlNode* node = map.get("error-codes", Need::required)) {
-    read_codes(*node, tables.error, findings);
-  }
-  if (const YamlNode* node = map.get("warning-codes")) {
-    read_codes(*node, tables.warning, findings);
-  }
+  PartHead head;
+  read_fields(part_fields, map, head);
+  read_fields(fields, map, facts);
   map.finish();
+}
+
+}  // namespace
+
+void read_texts(const YamlNode& document, catalogue::CodeTables& tables, Diagnostics& findings) {
+  read_part(text_fields, document, tables, findings);
 }
 
 catalogue::SimulationSpec read_simulation(const YamlNode& document, Diagnostics& findings) {
   catalogue::SimulationSpec facts;
-  YamlMap map(document, findings);
-  map.allow("part");
-  if (const YamlNode* node = map.get("identity")) {
-    read_simulated_identity(*node, facts, findings);
-  }
-  if (const YamlNode* node = map.get("values")) facts.values = read_raw_values(*node, findings);
-  if (const YamlNode* node = map.get("limits")) read_simulated_limits(*node, facts, findings);
-  if (const YamlNode* node = map.get("events")) read_simulated_events(*node, facts, findings);
-  assign(facts.limit_exception, map.number<std::uint8_t>("limit-exception"));
-  assign(facts.stopped_error, map.number<std::uint16_t>("stopped-error"));
-  if (const YamlNode* alarms = map.get("permanent-alarms")) {
-    expect(*alarms, YamlNode::Kind::sequence, findings);
-    std::vector<std::int64_t> codes;
-    for (const YamlNode& item : alarms->items) {
-      const auto code = to_unsigned(item, last_register, findings);
-      if (code) codes.push_back(static_cast<std::int64_t>(*code));
-    }
-    facts.permanent_alarms = std::move(codes);
-  }
-  assign(facts.absent, read_areas(map.get("absent"), findings));
-  map.finish();
+  read_part(simulation_fields, document, facts, findings);
   return facts;
 }
 
@@ -671,6 +670,24 @@ void check_simulation(const catalogue::Profile& profile, const YamlNode& documen
       for (const YamlNode& item : event.value.items) check_values(item);
     }
   }
+}
+
+std::vector<KeyList> profile_keys() {
+  KeyList document{"profile", keys_of<head_fields, title_fields>()};
+  for (const Section& section : sections) document.keys.push_back(section.field.key);
+  for (const Key& key : keys_of<list_fields>()) document.keys.push_back(key);
+  std::vector<KeyList> lists;
+  for (Key& key : document.keys) {
+    // Those of a section stand in a list of their own.
+    if (const auto inner = std::exchange(key.inner, nullptr)) {
+      lists.push_back({std::string(key.name), inner()});
+    }
+  }
+  lists.push_back(std::move(document));
+  for (KeyList& list : run_model_keys()) lists.push_back(std::move(list));
+  lists.push_back({"texts", keys_of<part_fields, text_fields>()});
+  lists.push_back({"simulation", keys_of<part_fields, simulation_fields>()});
+  return lists;
 }
 
 }  // namespace spindle::files

@@ -19,7 +19,7 @@ struct Origin {
   bool sound = true;                ///< nothing was wrong when it was read
 
   /// The value of a key, else the entry as a whole. Requires an entry.
-  [[nodiscard]] Position of(std::string_view key) const;
+  [[nodiscard]] SourceLocation of(std::string_view key) const;
 };
 
 /// A profile while its files are read, base first: what each layer says overrides key by key.
@@ -64,7 +64,7 @@ struct ProfileDraft {
 /// What must be known of a document before anything else is read from it.
 struct ProfileHead {
   std::string extends;  ///< id of the base; empty: none
-  Position extends_at = {};
+  SourceLocation extends_at = {};
   bool abstract = false;
 };
 

@@ -7,8 +7,6 @@
 #include <filesystem>
 #include <limits>
 
-#include "files/profile_drive.hpp"
-#include "files/profile_run.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"

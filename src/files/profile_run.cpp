@@ -2,232 +2,185 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <limits>
+#include <map>
+#include <variant>
 
-#include "files/profile_entries.hpp"
-#include "files/yaml_map.hpp"
+#include "files/fields.hpp"
 
 namespace spindle::files {
 namespace {
 
 using catalogue::CommandRegisterSpec;
 using catalogue::CommandWordSpec;
+using catalogue::EnableSpec;
+using catalogue::InputFunction;
+using catalogue::InputSpec;
 using catalogue::MonitorSpec;
 using catalogue::RunKind;
 using catalogue::RunSpec;
 using catalogue::RunWords;
 using catalogue::StartActionSpec;
 
-constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
+constexpr Field<RunWords> word_fields[] = {
+    field<&RunWords::forward>("forward", Need::required),
+    field<&RunWords::reverse>("reverse", Need::required),
+    field<&RunWords::decelerate>("decelerate", Need::required),
+    field<&RunWords::instant>("instant", Need::required),
+};
 
-/// What may be selected before a start, as options behind two hyphens.
-constexpr std::array<std::string_view, 2> selectable = {"preset", "direction"};
-
-RunWords read_words(const YamlNode& node, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  RunWords words;
-  assign(words.forward, map.number<std::uint16_t>("forward", Need::required));
-  assign(words.reverse, map.number<std::uint16_t>("reverse", Need::required));
-  assign(words.decelerate, map.number<std::uint16_t>("decelerate", Need::required));
-  assign(words.instant, map.number<std::uint16_t>("instant", Need::required));
-  map.finish();
-  return words;
-}
-
-void read_modes(const YamlNode& node, CommandWordSpec& run, Diagnostics& findings) {
-  if (!expect(node, YamlNode::Kind::map, findings)) return;
+void read_modes(const YamlNode& node, CommandWordSpec& run, const Asked& asked) {
+  if (!expect(node, YamlNode::Kind::map, asked.findings)) return;
   std::map<std::int64_t, RunWords> modes = run.modes.to_map();
   for (const YamlEntry& entry : node.entries) {
-    const auto value = parse_integer(entry.key);
-    if (value) {
-      modes.insert_or_assign(*value, read_words(entry.value, findings));
+    if (const auto value = parse_integer(entry.key)) {
+      RunWords words;
+      read_map(word_fields, entry.value, words, asked.findings);
+      modes.insert_or_assign(*value, words);
     } else {
-      findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
+      asked.findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
     }
   }
   run.modes = std::move(modes);
 }
 
-void read_functions(const YamlNode& node, catalogue::InputSpec& inputs, Diagnostics& findings) {
-  expect(node, YamlNode::Kind::sequence, findings);
-  std::vector<catalogue::InputFunction> functions;
-  for (const YamlNode& item : node.items) {
-    YamlMap map(item, findings);
-    catalogue::InputFunction function;
-    assign(function.number, map.number<std::uint16_t>("number", Need::required));
-    function.bit = map.number<std::uint8_t>("bit");
-    assign(function.evidence,
-           map.word("evidence", "evidence", catalogue::evidence_words, Need::required));
-    assign(function.source, map.text("source", Need::required));
-    map.finish();
-    functions.push_back(std::move(function));
-  }
-  inputs.functions = std::move(functions);
-}
+constexpr Field<CommandWordSpec> always_fields[] = {
+    field<&CommandWordSpec::decelerate_always>("decelerate", Need::required),
+    field<&CommandWordSpec::instant_always>("instant", Need::required),
+};
 
-void read_inputs(const YamlNode& node, catalogue::InputSpec& inputs, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(inputs.parameter, map.text("parameter", Need::required));
-  if (const auto bits = map.range("bits", last_register, Need::required)) {
-    inputs.first = static_cast<std::uint16_t>(bits->from);
-    inputs.last = static_cast<std::uint16_t>(bits->to);
-  }
-  if (const YamlNode* functions = map.get("functions", Need::required)) {
-    read_functions(*functions, inputs, findings);
-  }
-  map.finish();
-}
+constexpr Field<InputFunction> function_fields[] = {
+    field_as<std::uint16_t, &InputFunction::number>("number", Need::required),
+    field<&InputFunction::bit>("bit"),
+    word<catalogue::evidence_words, &InputFunction::evidence>("evidence", Need::required),
+    field<&InputFunction::source>("source", Need::required),
+};
 
-void read_command(const YamlNode& node, CommandWordSpec& run, Need need, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(run.command, map.text("parameter", need));
-  assign(run.mode, map.text("mode", need));
-  if (const YamlNode* modes = map.get("modes", need)) read_modes(*modes, run, findings);
-  assign(run.starting, map.number<std::uint16_t>("starting", need));
-  assign(run.select, map.number<std::uint16_t>("select", need));
-  if (const YamlNode* always = map.get("always", need)) {
-    YamlMap words(*always, findings);
-    assign(run.decelerate_always, words.number<std::uint16_t>("decelerate", Need::required));
-    assign(run.instant_always, words.number<std::uint16_t>("instant", Need::required));
-    words.finish();
-  }
-  if (const YamlNode* inputs = map.get("inputs")) read_inputs(*inputs, run.inputs, findings);
-  map.finish();
-}
+constexpr Field<InputSpec> input_fields[] = {
+    field<&InputSpec::parameter>("parameter", Need::required),
+    range<&InputSpec::first, &InputSpec::last>("bits", Need::required),
+    list_of<function_fields, &InputSpec::functions>("functions", Need::required),
+};
 
-void read_codes_of_status(YamlMap& map, std::string_view key,
-                          catalogue::List<std::int64_t>& codes) {
-  const YamlNode* node = map.get(key);
-  if (node == nullptr) return;
-  expect(*node, YamlNode::Kind::sequence, map.findings());
-  std::vector<std::int64_t> values;
-  for (const YamlNode& item : node->items) {
-    const auto value = to_unsigned(item, std::numeric_limits<std::uint32_t>::max(), map.findings());
-    if (value) values.push_back(static_cast<std::int64_t>(*value));
+constexpr Field<CommandWordSpec> command_fields[] = {
+    field<&CommandWordSpec::command>("parameter", Need::inherited),
+    field<&CommandWordSpec::mode>("mode", Need::inherited),
+    custom("modes", Need::inherited, "maps by number", read_modes).with(keys_of<word_fields>),
+    field<&CommandWordSpec::starting>("starting", Need::inherited),
+    field<&CommandWordSpec::select>("select", Need::inherited),
+    map_here<always_fields>("always", Need::inherited),
+    map_of<input_fields, &CommandWordSpec::inputs>("inputs"),
+};
+
+void read_running(const YamlNode& node, MonitorSpec& monitor, const Asked& asked) {
+  if (node.kind == YamlNode::Kind::sequence) {
+    monitor.running_values = to_numbers<std::uint32_t>(node, asked.findings);
+  } else {
+    ValueReader<std::optional<std::uint8_t>>::read(node, monitor.running, asked);
   }
-  codes = std::move(values);
 }
 
 /// Of a command word all is needed but load and warning; of a command register nothing is.
-void read_status(const YamlNode& node, MonitorSpec& monitor, Need need, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(monitor.status, map.text("parameter", need));
-  const YamlNode* running = map.get("running", need);
-  const bool by_values = running != nullptr && running->kind == YamlNode::Kind::sequence;
-  if (by_values) {
-    read_codes_of_status(map, "running", monitor.running_values);
-  } else if (const auto bit = map.number<std::uint8_t>("running")) {
-    monitor.running = *bit;
+template <Need need>
+constexpr Field<MonitorSpec> status_fields[] = {
+    field<&MonitorSpec::status>("parameter", need),
+    custom("running", need, "number 0..255, or list of numbers", read_running),
+    numbers<std::uint32_t, &MonitorSpec::stopped_values>("stopped"),
+    field<&MonitorSpec::at_speed>("at-speed", need),
+    field<&MonitorSpec::busy>("busy", need),
+    field<&MonitorSpec::command_speed>("command-speed", need),
+    field<&MonitorSpec::feedback_speed>("feedback-speed", need),
+    field<&MonitorSpec::load>("load"),
+    field<&MonitorSpec::alarm>("alarm", need),
+    field<&MonitorSpec::warning>("warning"),
+};
+
+constexpr Field<CommandWordSpec> analog_fields[] = {
+    field<&CommandWordSpec::analog>("parameter", Need::required),
+    field_as<std::uint16_t, &CommandWordSpec::digital>("digital", Need::required),
+    field<&CommandWordSpec::analog_to>("up-to", Need::required),
+};
+
+constexpr Field<CommandWordSpec> operation_fields[] = {
+    field<&CommandWordSpec::speed>("speed", Need::inherited),
+    field<&CommandWordSpec::acceleration>("acceleration", Need::inherited),
+    field<&CommandWordSpec::deceleration>("deceleration", Need::inherited),
+    range<&CommandWordSpec::first, &CommandWordSpec::last>("numbers", Need::inherited),
+    field<&CommandWordSpec::preferred>("preferred", Need::inherited),
+    map_here<analog_fields>("analog"),
+};
+
+constexpr Field<CommandWordSpec> command_word_fields[] = {
+    map_here<command_fields>("command", Need::inherited),
+    map_of<status_fields<Need::inherited>, &CommandWordSpec::monitor>("status", Need::inherited),
+    map_here<operation_fields>("operation", Need::inherited),
+    field<&CommandWordSpec::watchdog>("watchdog"),
+    field<&CommandWordSpec::group>("group"),
+};
+
+using Selections = std::vector<catalogue::StartOption>;
+
+void read_selection(const YamlNode& node, Selections& selections, const Asked& asked) {
+  catalogue::StartOption option{.option = asked.key.name};
+  if (ValueReader<catalogue::Text>::read(node, option.action, asked)) {
+    selections.push_back(std::move(option));
   }
-  read_codes_of_status(map, "stopped", monitor.stopped_values);
-  for (auto [key, bit] : {std::pair("at-speed", &monitor.at_speed), {"busy", &monitor.busy}}) {
-    if (const auto read = map.number<std::uint8_t>(key, need)) *bit = *read;
-  }
-  assign(monitor.command_speed, map.text("command-speed", need));
-  assign(monitor.feedback_speed, map.text("feedback-speed", need));
-  assign(monitor.load, map.text("load"));
-  assign(monitor.alarm, map.text("alarm", need));
-  assign(monitor.warning, map.text("warning"));
-  map.finish();
 }
 
-void read_operation(const YamlNode& node, CommandWordSpec& run, Need need, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(run.speed, map.text("speed", need));
-  assign(run.acceleration, map.text("acceleration", need));
-  assign(run.deceleration, map.text("deceleration", need));
-  if (const auto numbers = map.range("numbers", last_register, need)) {
-    run.first = static_cast<std::uint16_t>(numbers->from);
-    run.last = static_cast<std::uint16_t>(numbers->to);
-  }
-  assign(run.preferred, map.number<std::uint16_t>("preferred", need));
-  if (const YamlNode* analog = map.get("analog")) {
-    YamlMap choice(*analog, findings);
-    assign(run.analog, choice.text("parameter", Need::required));
-    assign(run.digital, choice.number<std::uint16_t>("digital", Need::required));
-    assign(run.analog_to, choice.number<std::uint16_t>("up-to", Need::required));
-    choice.finish();
-  }
-  map.finish();
-}
+/// What may be selected before a start, as options behind two hyphens.
+constexpr Field<Selections> selection_fields[] = {
+    custom("preset", Need::optional, "text", read_selection),
+    custom("direction", Need::optional, "text", read_selection),
+};
 
-void read_command_word(YamlMap& map, CommandWordSpec& word, Need need) {
-  Diagnostics& findings = map.findings();
-  if (const YamlNode* part = map.get("command", need)) read_command(*part, word, need, findings);
-  if (const YamlNode* part = map.get("status", need)) {
-    read_status(*part, word.monitor, need, findings);
-  }
-  if (const YamlNode* part = map.get("operation", need)) {
-    read_operation(*part, word, need, findings);
-  }
-  assign(word.watchdog, map.text("watchdog"));
-  assign(word.group, map.text("group"));
-}
-
-void read_selections(const YamlNode& node, StartActionSpec& facts, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  std::vector<catalogue::StartOption> selections;
-  for (const std::string_view option : selectable) {
-    if (auto action = map.text(option)) {
-      selections.push_back({option, std::move(*action)});
-    }
-  }
+void read_selections(const YamlNode& node, StartActionSpec& facts, const Asked& asked) {
+  Selections selections;
+  read_map(selection_fields, node, selections, asked.findings);
   facts.selections = std::move(selections);
+}
+
+constexpr Field<StartActionSpec> start_action_fields[] = {
+    field<&StartActionSpec::start>("start", Need::inherited),
+    custom("select", Need::optional, "map", read_selections).with(keys_of<selection_fields>),
+    field<&StartActionSpec::alarm>("alarm"),
+};
+
+constexpr Field<CommandRegisterSpec> command_value_fields[] = {
+    field<&CommandRegisterSpec::command>("parameter", Need::inherited),
+    field<&CommandRegisterSpec::forward>("forward", Need::inherited),
+    field<&CommandRegisterSpec::reverse>("reverse"),
+    field<&CommandRegisterSpec::stop>("stop"),
+    field<&CommandRegisterSpec::instant>("instant"),
+};
+
+constexpr Field<EnableSpec> enable_fields[] = {
+    field<&EnableSpec::parameter>("parameter", Need::required),
+    field<&EnableSpec::bit>("bit"),
+    field<&EnableSpec::value>("value"),
+};
+
+void read_enable(const YamlNode& node, CommandRegisterSpec& facts, const Asked& asked) {
+  facts.enable = {};
+  YamlMap map(node, asked.findings);
+  read_fields(enable_fields, map, facts.enable);
+  if (!facts.enable.bit) map.require("value");
   map.finish();
 }
 
-void read_start_action(YamlMap& map, StartActionSpec& facts, Need need) {
-  assign(facts.start, map.text("start", need));
-  if (const YamlNode* part = map.get("select")) read_selections(*part, facts, map.findings());
-  assign(facts.alarm, map.text("alarm"));
-}
+constexpr Field<CommandRegisterSpec> stop_fields[] = {
+    field<&CommandRegisterSpec::stop_register>("parameter", Need::required),
+    field<&CommandRegisterSpec::stop_value>("value", Need::required),
+};
 
-void read_command_values(const YamlNode& node, CommandRegisterSpec& facts, Need need,
-                         Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(facts.command, map.text("parameter", need));
-  assign(facts.forward, map.number<std::uint32_t>("forward", need));
-  if (const auto value = map.number<std::uint32_t>("reverse")) facts.reverse = *value;
-  if (const auto value = map.number<std::uint32_t>("stop")) facts.stop = *value;
-  if (const auto value = map.number<std::uint32_t>("instant")) facts.instant = *value;
-  map.finish();
-}
+constexpr Field<CommandRegisterSpec> command_register_fields[] = {
+    map_here<command_value_fields>("command", Need::inherited),
+    custom("enable", Need::optional, "map", read_enable).with(keys_of<enable_fields>),
+    map_here<stop_fields>("stop"),
+    field<&CommandRegisterSpec::set_point>("set-point"),
+    map_of<status_fields<Need::optional>, &CommandRegisterSpec::monitor>("status"),
+    field<&CommandRegisterSpec::stopping>("stopping"),
+};
 
-void read_enable(const YamlNode& node, catalogue::EnableSpec& enable, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  enable = {};
-  assign(enable.parameter, map.text("parameter", Need::required));
-  if (const auto bit = map.number<std::uint8_t>("bit")) enable.bit = *bit;
-  assign(enable.value,
-         map.number<std::uint32_t>("value", enable.bit ? Need::optional : Need::required));
-  map.finish();
-}
-
-void read_stop(const YamlNode& node, CommandRegisterSpec& facts, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  assign(facts.stop_register, map.text("parameter", Need::required));
-  assign(facts.stop_value, map.number<std::uint32_t>("value", Need::required));
-  map.finish();
-}
-
-void read_command_register(YamlMap& map, CommandRegisterSpec& facts, Need need) {
-  Diagnostics& findings = map.findings();
-  if (const YamlNode* part = map.get("command", need)) {
-    read_command_values(*part, facts, need, findings);
-  }
-  if (const YamlNode* part = map.get("enable")) read_enable(*part, facts.enable, findings);
-  if (const YamlNode* part = map.get("stop")) read_stop(*part, facts, findings);
-  assign(facts.set_point, map.text("set-point"));
-  if (const YamlNode* part = map.get("status")) {
-    read_status(*part, facts.monitor, Need::optional, findings);
-  }
-  assign(facts.stopping, map.duration("stopping"));
-}
-
-/// A profile of another model than its base has nothing of the base's.
-Need begin_model(RunSpec& run, RunKind kind, Need need) {
-  if (run.kind() == kind) return need;
+void begin_model(RunSpec& run, RunKind kind) {
   switch (kind) {
     case RunKind::start_action:
       run.model = StartActionSpec{};
@@ -239,28 +192,54 @@ Need begin_model(RunSpec& run, RunKind kind, Need need) {
       run.model = CommandRegisterSpec{};
       break;
   }
-  return Need::required;
 }
+
+struct RunHead {
+  RunKind model;
+};
+
+constexpr Field<RunHead> model_fields[] = {
+    word<catalogue::run_words, &RunHead::model>("model", Need::optional, "run model"),
+};
+
+constexpr Field<RunSpec> run_fields[] = {
+    word<catalogue::evidence_words, &RunSpec::evidence>("evidence", Need::inherited),
+    field<&RunSpec::source>("source", Need::inherited),
+    field<&RunSpec::still_runs>("still-runs"),
+};
 
 }  // namespace
 
-void read_run(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [run, need] = section_of(draft.profile.run);
-  const auto named = map.word("model", "run model", catalogue::run_words);
-  if (!named && map.get("model") != nullptr) return;  // its keys are not known
-  const Need model = begin_model(run, named.value_or(run.kind()), need);
-  assign(run.evidence, map.word("evidence", "evidence", catalogue::evidence_words, need));
-  assign(run.source, map.text("source", need));
-  assign(run.still_runs, map.text("still-runs"));
-  if (auto* word = std::get_if<CommandWordSpec>(&run.model)) read_command_word(map, *word, model);
-  if (auto* action = std::get_if<StartActionSpec>(&run.model)) {
-    read_start_action(map, *action, model);
+void read_run(const YamlNode& node, ProfileDraft& draft, const Asked& asked) {
+  YamlMap map(node, asked.findings);
+  bool inherited = draft.profile.run.has_value();
+  RunSpec& run = inherited ? *draft.profile.run : draft.profile.run.emplace();
+  RunHead head{run.kind()};
+  const std::size_t before = asked.findings.told();
+  read_fields(model_fields, map, head);
+  if (asked.findings.told() != before) return;  // its keys are not known
+  read_fields(run_fields, map, run, inherited);
+  // A profile of another model than its base has nothing of the base's.
+  if (head.model != run.kind()) {
+    begin_model(run, head.model);
+    inherited = false;
   }
-  if (auto* values = std::get_if<CommandRegisterSpec>(&run.model)) {
-    read_command_register(map, *values, model);
+  if (auto* word = std::get_if<CommandWordSpec>(&run.model)) {
+    read_fields(command_word_fields, map, *word, inherited);
+  } else if (auto* action = std::get_if<StartActionSpec>(&run.model)) {
+    read_fields(start_action_fields, map, *action, inherited);
+  } else if (auto* values = std::get_if<CommandRegisterSpec>(&run.model)) {
+    read_fields(command_register_fields, map, *values, inherited);
   }
   map.finish();
+}
+
+std::vector<Key> run_keys() { return keys_of<model_fields, run_fields>(); }
+
+std::vector<KeyList> run_model_keys() {
+  return {{"start-action", keys_of<start_action_fields>()},
+          {"command-word", keys_of<command_word_fields>()},
+          {"command-register", keys_of<command_register_fields>()}};
 }
 
 void derive_run(ProfileDraft& draft) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "files/profile_run.hpp"
+#include "files/profile_rules.hpp"
 
 namespace spindle::files {
 namespace {
@@ -35,7 +35,7 @@ class RunRules {
   }
 
  private:
-  const Parameter* require(const std::string& name, const Position& at) {
+  const Parameter* require(const std::string& name, const SourceLocation& at) {
     if (draft_.lacks(name)) {
       findings_.add_once(at, fmt::format("'{}' is no parameter of this profile", name));
     }
@@ -44,11 +44,11 @@ class RunRules {
                                                  : &draft_.profile.parameters[found->second];
   }
 
-  void require_optional(const std::string& name, const Position& at) {
+  void require_optional(const std::string& name, const SourceLocation& at) {
     if (!name.empty()) require(name, at);
   }
 
-  const Parameter* require_writable(const std::string& name, const Position& at) {
+  const Parameter* require_writable(const std::string& name, const SourceLocation& at) {
     const Parameter* parameter = require(name, at);
     if (parameter != nullptr && parameter->access == catalogue::Access::read_only) {
       findings_.add_once(at, fmt::format("{} cannot be written", name));
@@ -56,7 +56,7 @@ class RunRules {
     return parameter;
   }
 
-  const Action* require_action(const std::string& name, const Position& at) {
+  const Action* require_action(const std::string& name, const SourceLocation& at) {
     const auto& actions = draft_.profile.actions;
     const auto found = std::find_if(actions.begin(), actions.end(),
                                     [&](const Action& each) { return each.name == name; });
@@ -70,7 +70,7 @@ class RunRules {
   // ---- start-action ----
 
   void check_start_action(const StartActionSpec& facts) {
-    const Position at = draft_.run.of("start");
+    const SourceLocation at = draft_.run.of("start");
     const Action* start = require_action(facts.start, at);
     if (start != nullptr && (!start->value || !start->stop_value)) {
       findings_.add_once(at, fmt::format("{}: a start needs 'value' and 'stop'", facts.start));
@@ -89,7 +89,7 @@ class RunRules {
     check_words(run, draft_.run.of("command"));
     check_operations(run, draft_.run.of("operation"));
     const MonitorSpec& monitor = run.monitor;
-    const Position status = draft_.run.of("status");
+    const SourceLocation status = draft_.run.of("status");
     for (const catalogue::Text* name :
          {&monitor.status, &monitor.command_speed, &monitor.feedback_speed, &monitor.alarm}) {
       require(*name, status);
@@ -99,7 +99,7 @@ class RunRules {
     require_optional(run.group, draft_.run.of("group"));
   }
 
-  void check_words(const CommandWordSpec& run, const Position& at) {
+  void check_words(const CommandWordSpec& run, const SourceLocation& at) {
     require_writable(run.command, at);
     require(run.mode, at);
     if (run.modes.empty()) findings_.add_once(at, "there is no mode in which the motor runs");
@@ -117,7 +117,7 @@ class RunRules {
   }
 
   /// Every bit of a word has one function by which it is found on a driver.
-  void check_inputs(const CommandWordSpec& run, const Position& at) {
+  void check_inputs(const CommandWordSpec& run, const SourceLocation& at) {
     const catalogue::InputSpec& inputs = run.inputs;
     if (inputs.parameter.empty()) return;
     constexpr std::uint16_t highest_bit = 15;
@@ -155,7 +155,7 @@ class RunRules {
   }
 
   void check_mode(std::int64_t mode, const RunWords& words, const CommandWordSpec& run,
-                  const Position& at) {
+                  const SourceLocation& at) {
     const unsigned all = unsigned{words.forward} | words.reverse | words.decelerate | words.instant;
     if ((all & run.select) != 0) {
       findings_.add_once(at, fmt::format("mode {}: a word has a bit that selects", mode));
@@ -171,7 +171,7 @@ class RunRules {
     if (!stops) findings_.add_once(at, fmt::format("mode {}: a stop equals a start", mode));
   }
 
-  void check_operations(const CommandWordSpec& run, const Position& at) {
+  void check_operations(const CommandWordSpec& run, const SourceLocation& at) {
     if (run.preferred < run.first || run.preferred > run.last) {
       findings_.add_once(at, "the preferred operation data is none of them");
     }
@@ -193,14 +193,14 @@ class RunRules {
   void check_command_register(const CommandRegisterSpec& facts) {
     check_values(facts, draft_.run.of("command"));
     check_enable(facts, draft_.run.of("enable"));
-    const Position stop = draft_.run.of("stop");
+    const SourceLocation stop = draft_.run.of("stop");
     if (!facts.stop_register.empty()) {
       check_fits(require_writable(facts.stop_register, stop), facts.stop_value, stop);
       if (facts.stop_register == facts.command) {
         findings_.add_once(stop, "the stop of the command register stands in 'command'");
       }
     }
-    const Position set_point = draft_.run.of("set-point");
+    const SourceLocation set_point = draft_.run.of("set-point");
     if (!facts.set_point.empty()) require_writable(facts.set_point, set_point);
     if (draft_.profile.run->is_command(facts.set_point)) {
       findings_.add_once(set_point, "the set-point is a command, too");
@@ -213,7 +213,7 @@ class RunRules {
   }
 
   void check_fits(const Parameter* parameter, std::optional<std::uint32_t> value,
-                  const Position& at) {
+                  const SourceLocation& at) {
     if (parameter == nullptr || !value) return;
     if (parameter->encoding.scale != Decimal(1)) {
       findings_.add_once(at, fmt::format("{}: a command has no scale", parameter->name));
@@ -222,7 +222,7 @@ class RunRules {
     }
   }
 
-  void check_values(const CommandRegisterSpec& facts, const Position& at) {
+  void check_values(const CommandRegisterSpec& facts, const SourceLocation& at) {
     const Parameter* command = require_writable(facts.command, at);
     for (const auto& value :
          {std::optional(facts.forward), facts.reverse, facts.stop, facts.instant}) {
@@ -240,7 +240,7 @@ class RunRules {
     if (facts.reverse == facts.forward) findings_.add_once(at, "forward and reverse are the same");
   }
 
-  void check_enable(const CommandRegisterSpec& facts, const Position& at) {
+  void check_enable(const CommandRegisterSpec& facts, const SourceLocation& at) {
     const catalogue::EnableSpec& enable = facts.enable;
     if (enable.parameter.empty()) return;
     const Parameter* parameter = require_writable(enable.parameter, at);
@@ -264,7 +264,7 @@ class RunRules {
 
   // ---- what a motor says ----
 
-  void check_monitor(const MonitorSpec& monitor, const Position& at) {
+  void check_monitor(const MonitorSpec& monitor, const SourceLocation& at) {
     for (const catalogue::Text* name : {&monitor.command_speed, &monitor.feedback_speed,
                                         &monitor.load, &monitor.alarm, &monitor.warning}) {
       require_optional(*name, at);

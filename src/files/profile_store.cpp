@@ -27,12 +27,6 @@ std::string in_folder(const std::string& folder, std::string_view id) {
   return fmt::format("{}/{}{}", folder, id, extension);
 }
 
-/// Where one may not look there may be one: reading it says why not.
-bool may_be_file(const std::string& path) {
-  std::error_code problem;
-  return std::filesystem::exists(path, problem) || problem == std::errc::permission_denied;
-}
-
 /// One file of a chain of bases.
 struct Layer {
   std::string path;
@@ -60,7 +54,7 @@ struct Chain {
 /// the program once.
 struct Places {
   std::vector<std::string> folders;
-  ReadText read;
+  Disk disk;
   ShippedProfiles shipped;
   mutable std::mutex mutex = {};  ///< of what was found
   mutable std::map<std::string, const ShippedProfile*> compared = {};
@@ -70,18 +64,24 @@ struct Places {
 /// Whether profiles of the program are used where their files would say the same.
 enum class Tables : std::uint8_t { used, not_used };
 
-/// The base of a file: beside it, else in the store's folders.
-std::optional<std::string> locate_base(const std::string& file, std::string_view id,
-                                       const std::vector<std::string>& folders) {
-  std::string folder = std::filesystem::path(file).parent_path().string();
-  if (folder.empty()) folder = ".";
-  std::string beside = in_folder(folder, id);
-  if (may_be_file(beside)) return beside;
-  for (const std::string& other : folders) {
-    std::string path = in_folder(other, id);
-    if (may_be_file(path)) return path;
+/// The file of a profile, in the first folder that has one. Where one may not look there may be
+/// one: reading it says why not.
+std::optional<std::string> locate_file(std::string_view id, const std::vector<std::string>& folders,
+                                       const Disk& disk) {
+  for (const std::string& folder : folders) {
+    std::string path = in_folder(folder, id);
+    if (!disk.absent(path)) return path;
   }
   return std::nullopt;
+}
+
+/// The base of a file: beside it, else in the store's folders.
+std::optional<std::string> locate_base(const std::string& file, std::string_view id,
+                                       const Places& places) {
+  std::string beside = std::filesystem::path(file).parent_path().string();
+  if (beside.empty()) beside = ".";
+  auto path = locate_file(id, {beside}, places.disk);
+  return path ? path : locate_file(id, places.folders, places.disk);
 }
 
 /// The profile of the program that was made from this file and from those that it extends; null
@@ -91,10 +91,10 @@ const ShippedProfile* shipped_as(const std::string& path, const Places& places);
 const ShippedProfile* compare(const std::string& path, const Places& places) {
   const ShippedProfile* shipped = find(places.shipped, std::filesystem::path(path).stem().string());
   if (shipped == nullptr) return nullptr;
-  const auto text = places.read(path);
+  const auto text = places.disk.read_trusted(path);
   if (!text || *text != shipped->yaml) return nullptr;
   if (shipped->extends.empty()) return shipped;
-  const auto base = locate_base(path, shipped->extends, places.folders);
+  const auto base = locate_base(path, shipped->extends, places);
   return !base || shipped_as(*base, places) != nullptr ? shipped : nullptr;
 }
 
@@ -110,19 +110,14 @@ const ShippedProfile* shipped_as(const std::string& path, const Places& places) 
   return places.compared.emplace(path, shipped).first->second;
 }
 
-bool same_file(const std::string& a, const std::string& b) {
-  std::error_code problem;
-  return std::filesystem::equivalent(a, b, problem);
-}
-
-Result<const Layer*> read_layer(const std::string& path, Documents documents, const ReadText& read,
+Result<const Layer*> read_layer(const std::string& path, Documents documents, const Disk& disk,
                                 Library& library, Diagnostics& findings) {
   if (const auto known = library.find(path); known != library.end()) {
     const bool sound = known->second.sound;
     if (!sound) findings.add({findings.add_file(path), 1, 1}, "the file has faults of its own");
     return &known->second;
   }
-  auto text = read(path);
+  auto text = disk.read_trusted(path);
   if (!text) return tl::unexpected(std::move(text.error()));
   Layer layer{.path = path, .file = findings.add_file(path), .documents = {}, .head = {}};
   layer.documents = parse_yaml(*text, layer.file, documents, findings);
@@ -143,7 +138,7 @@ struct Base {
 
 std::optional<Base> find_base(const Layer& layer, const Places& places, Tables tables) {
   const std::string& id = layer.head.extends;
-  auto path = locate_base(layer.path, id, places.folders);
+  auto path = locate_base(layer.path, id, places);
   if (!path) {
     const ShippedProfile* shipped = find(places.shipped, id);
     return shipped == nullptr ? std::nullopt : std::optional(Base{.shipped = shipped});
@@ -170,7 +165,7 @@ std::optional<Base> next_of(const Chain& chain, const Places& places, Tables tab
   }
   const bool cycle = !base->path.empty() &&
                      std::any_of(chain.layers.begin(), chain.layers.end(), [&](const Layer* layer) {
-                       return same_file(layer->path, base->path);
+                       return places.disk.same_file(layer->path, base->path);
                      });
   if (cycle || chain.layers.size() == deepest_chain) {
     findings.add(head.extends_at,
@@ -191,7 +186,7 @@ Result<Chain> read_chain(const std::string& path, Documents documents, const Pla
       chain.root_node.at = chain.layers.back()->head.extends_at;
       break;
     }
-    auto layer = read_layer(next->path, documents, places.read, library, findings);
+    auto layer = read_layer(next->path, documents, places.disk, library, findings);
     if (!layer) return tl::unexpected(std::move(layer.error()));
     chain.layers.push_back(*layer);
     next = next_of(chain, places, tables, findings);
@@ -252,13 +247,10 @@ const YamlNode* nearest_simulation(const Chain& chain, Diagnostics& findings) {
 }
 
 /// Every profile file by id; the first folder that has one wins.
-std::map<std::string, std::string> profile_files(const std::vector<std::string>& folders) {
+std::map<std::string, std::string> profile_files(const Places& places) {
   std::map<std::string, std::string> found;
-  for (const std::string& folder : folders) {
-    std::error_code problem;
-    for (auto file = std::filesystem::directory_iterator(folder, problem);
-         !problem && file != std::filesystem::directory_iterator(); file.increment(problem)) {
-      const std::filesystem::path& path = file->path();
+  for (const std::string& folder : places.folders) {
+    for (const std::filesystem::path path : places.disk.list(folder)) {
       const std::string id = path.stem().string();
       if (path.extension() == extension && is_catalogue_name(id)) {
         found.try_emplace(id, in_folder(folder, id));
@@ -272,12 +264,12 @@ bool is_abstract(const std::string& path, const Places& places) {
   if (const ShippedProfile* shipped = shipped_as(path, places)) return shipped->is_abstract;
   Library library;
   Diagnostics findings;
-  const auto layer = read_layer(path, Documents::first, places.read, library, findings);
+  const auto layer = read_layer(path, Documents::first, places.disk, library, findings);
   return layer && (*layer)->head.abstract;
 }
 
 std::vector<ProfileEntry> look_for_profiles(const Places& places) {
-  std::map<std::string, std::string> files = profile_files(places.folders);
+  std::map<std::string, std::string> files = profile_files(places);
   for (const ShippedProfile& shipped : places.shipped) {
     files.try_emplace(std::string(shipped.id), built_in);
   }
@@ -314,9 +306,8 @@ Result<Located> locate(std::string_view name_or_file, const Places& places) {
   };
   if (names_profile_file(name_or_file)) return file(std::string(name_or_file));
   if (is_catalogue_name(name_or_file)) {
-    for (const std::string& folder : places.folders) {
-      std::string path = in_folder(folder, name_or_file);
-      if (may_be_file(path)) return file(std::move(path));
+    if (auto path = locate_file(name_or_file, places.folders, places.disk)) {
+      return file(std::move(*path));
     }
     if (const ShippedProfile* shipped = find(places.shipped, name_or_file)) {
       return Located{{}, shipped};
@@ -421,8 +412,8 @@ const ShippedProfile* find(ShippedProfiles shipped, std::string_view id) {
 }
 
 struct ProfileStore::Memory {
-  Memory(std::vector<std::string> folders, ReadText read, ShippedProfiles shipped)
-      : places{std::move(folders), std::move(read), shipped} {}
+  Memory(std::vector<std::string> folders, Disk disk, ShippedProfiles shipped)
+      : places{std::move(folders), std::move(disk), shipped} {}
 
   Places places;
   std::mutex mutex = {};
@@ -444,8 +435,8 @@ struct ProfileStore::Memory {
   }
 };
 
-ProfileStore::ProfileStore(std::vector<std::string> folders, ReadText read, ShippedProfiles shipped)
-    : memory_(std::make_unique<Memory>(std::move(folders), std::move(read), shipped)) {}
+ProfileStore::ProfileStore(std::vector<std::string> folders, Disk disk, ShippedProfiles shipped)
+    : memory_(std::make_unique<Memory>(std::move(folders), std::move(disk), shipped)) {}
 ProfileStore::ProfileStore(ProfileStore&&) noexcept = default;
 ProfileStore& ProfileStore::operator=(ProfileStore&&) noexcept = default;
 ProfileStore::~ProfileStore() = default;

@@ -6,7 +6,8 @@
 #include <array>
 #include <filesystem>
 
-#include "files/yaml_map.hpp"
+#include "files/fields.hpp"
+#include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
 #include "spindle/files/profile_store.hpp"
 
@@ -51,36 +52,40 @@ std::vector<std::string> read_words(const YamlNode& list, Diagnostics& findings)
   return words;
 }
 
-std::optional<std::string> read_torque_unit(YamlMap& map) {
-  auto unit = map.text("torque-unit");
-  if (!unit || std::find(torque_units.begin(), torque_units.end(), *unit) != torque_units.end()) {
-    return unit;
+void read_torque_unit(const YamlNode& node, Tool& tool, const Asked& asked) {
+  auto unit = to_text(node, asked.findings);
+  if (!unit) return;
+  if (std::find(torque_units.begin(), torque_units.end(), *unit) != torque_units.end()) {
+    tool.torque_unit = std::move(*unit);
+  } else {
+    asked.findings.add(
+        node.at, unknown_word("torque unit", *unit, {torque_units.begin(), torque_units.end()}));
   }
-  map.findings().add(
-      map.get("torque-unit")->at,
-      unknown_word("torque unit", *unit, {torque_units.begin(), torque_units.end()}));
-  return std::nullopt;
 }
+
+void read_verified(const YamlNode& node, Tool& tool, const Asked& asked) {
+  tool.verified = read_words(node, asked.findings);
+}
+
+constexpr Field<Tool> tool_fields[] = {
+    field<&Tool::url>("url", Need::required),
+    field<&Tool::profile>("profile"),
+    custom("torque-unit", Need::optional, "text", read_torque_unit),
+    custom("verified", Need::optional, "list of text", read_verified),
+};
 
 Tool read_tool(const YamlEntry& entry, Diagnostics& findings) {
   check_name(entry, findings);
   Tool tool;
   tool.name = entry.key;
-  YamlMap map(entry.value, findings);
-  assign(tool.url, map.text("url", Need::required));
-  assign(tool.profile, map.text("profile"));
-  assign(tool.torque_unit, read_torque_unit(map));
-  const auto place_of = [&](std::string_view key) {
+  read_map(tool_fields, entry.value, tool, findings);
+  const auto location_of = [&](std::string_view key) {
     const YamlNode* value = entry.value.find(key);
-    return value == nullptr ? Place() : Place{value->at.line, value->at.column};
+    return value == nullptr ? SourceLocation() : value->at;
   };
-  tool.url_at = place_of("url");
-  tool.profile_at = place_of("profile");
-  tool.verified_at = place_of("verified");
-  if (const YamlNode* verified = map.get("verified")) {
-    tool.verified = read_words(*verified, findings);
-  }
-  map.finish();
+  tool.url_at = location_of("url");
+  tool.profile_at = location_of("profile");
+  tool.verified_at = location_of("verified");
   return tool;
 }
 
@@ -106,18 +111,22 @@ void read_group(const YamlEntry& entry, Tools& tools, Diagnostics& findings) {
   group.insert(group.end(), members.begin(), members.end());
 }
 
-void read_tools(const YamlNode& document, Tools& tools, Diagnostics& findings) {
-  YamlMap map(document, findings);
-  if (const YamlNode* list = map.get("tools", Need::required)) {
-    expect(*list, YamlNode::Kind::map, findings);
-    for (const YamlEntry& entry : list->entries) tools.tools.push_back(read_tool(entry, findings));
+void read_tool_map(const YamlNode& node, Tools& tools, const Asked& asked) {
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) {
+    tools.tools.push_back(read_tool(entry, asked.findings));
   }
-  if (const YamlNode* groups = map.get("groups")) {
-    expect(*groups, YamlNode::Kind::map, findings);
-    for (const YamlEntry& entry : groups->entries) read_group(entry, tools, findings);
-  }
-  map.finish();
 }
+
+void read_group_map(const YamlNode& node, Tools& tools, const Asked& asked) {
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) read_group(entry, tools, asked.findings);
+}
+
+constexpr Field<Tools> document_fields[] = {
+    custom("tools", Need::required, "maps by name", read_tool_map).with(keys_of<tool_fields>),
+    custom("groups", Need::optional, "lists of names by name", read_group_map),
+};
 
 /// A profile's file where the tools file means it; ids and absolute paths as they are.
 std::string beside(const std::string& tools_file, std::string profile) {
@@ -129,15 +138,14 @@ std::string beside(const std::string& tools_file, std::string profile) {
 }
 
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, const ReadText& read,
-                              Diagnostics& findings) {
-  const auto text = read(path);
+Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
+  const auto text = disk.read_trusted(path);
   if (!text) return tl::unexpected(text.error());
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
   Tools tools;
   tools.path = path;
-  if (!documents.empty()) read_tools(documents.front(), tools, findings);
+  if (!documents.empty()) read_map(document_fields, documents.front(), tools, findings);
   for (Tool& tool : tools.tools) tool.profile = beside(path, std::move(tool.profile));
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
@@ -155,26 +163,28 @@ Error refusal_of(const Diagnostics& findings) {
 
 bool may_name_tools(std::string_view word) { return word.starts_with('@') || is_tool_name(word); }
 
-Result<Tools> load_tools(const std::string& path, const ReadText& read) {
+Result<Tools> load_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools || findings.empty()) return tools;
   return tl::unexpected(refusal_of(findings));
 }
 
-Tools salvage_tools(const std::string& path, const ReadText& read) {
+Tools salvage_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
   return std::move(*tools);
 }
 
-Result<CheckedTools> check_tools(const std::string& path, const ReadText& read) {
+Result<CheckedTools> check_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, read, findings);
+  auto tools = read_tools_file(path, disk, findings);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   return CheckedTools{std::move(*tools), findings.list()};
 }
+
+std::vector<KeyList> tools_keys() { return {{"document", keys_of<document_fields>()}}; }
 
 }  // namespace spindle::files

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::files {
@@ -101,70 +100,22 @@ std::string unknown_word(std::string_view what, std::string_view text,
   return fmt::format("unknown {} '{}'; known: {}", what, text, fmt::join(words, ", "));
 }
 
-YamlMap::YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* defaults)
-    : map_(map), defaults_(defaults), findings_(findings) {
+YamlMap::YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* group)
+    : map_(map), group_(group), findings_(findings) {
   expect(map, YamlNode::Kind::map, findings);
 }
 
-const YamlNode* YamlMap::get(std::string_view key, Need need) {
-  known_.push_back(key);
+const YamlNode* YamlMap::find(std::string_view key, bool shared) const {
   const YamlNode* node = map_.find(key);
-  if (node == nullptr && defaults_ != nullptr) node = defaults_->find(key);
-  if (node == nullptr && need == Need::required && map_.kind == YamlNode::Kind::map) {
+  return node == nullptr && shared && group_ != nullptr ? group_->find(key) : node;
+}
+
+const YamlNode* YamlMap::require(std::string_view key, bool shared) {
+  const YamlNode* node = find(key, shared);
+  if (node == nullptr && map_.kind == YamlNode::Kind::map) {
     findings_.add(map_.at, fmt::format("key '{}' is missing", key));
   }
   return node;
-}
-
-std::optional<std::string> YamlMap::text(std::string_view key, Need need) {
-  const YamlNode* node = get(key, need);
-  if (node == nullptr) return std::nullopt;
-  auto read = files::to_text(*node, findings_);
-  if (read && read->empty() && need == Need::required) {
-    findings_.add(node->at, fmt::format("key '{}' is empty", key));
-  }
-  return read;
-}
-
-std::optional<Decimal> YamlMap::decimal(std::string_view key) {
-  const YamlNode* node = get(key);
-  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
-  auto number = Decimal::parse(node->text);
-  if (!number) findings_.add(node->at, fmt::format("'{}' is not a number", node->text));
-  return number;
-}
-
-std::optional<Duration> YamlMap::duration(std::string_view key) {
-  const YamlNode* node = get(key);
-  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
-  const auto read = parse_duration(node->text);
-  if (!read) {
-    findings_.add(node->at, fmt::format("'{}' is not a duration such as 500ms or 2s", node->text));
-    return std::nullopt;
-  }
-  return *read;
-}
-
-std::optional<bool> YamlMap::flag(std::string_view key) {
-  const YamlNode* node = get(key);
-  if (node == nullptr || !expect(*node, YamlNode::Kind::scalar, findings_)) return std::nullopt;
-  if (node->text == "true") return true;
-  if (node->text == "false") return false;
-  findings_.add(node->at, fmt::format("'{}' is neither true nor false", node->text));
-  return std::nullopt;
-}
-
-std::optional<NumberRange> YamlMap::range(std::string_view key, std::uint64_t maximum, Need need) {
-  const YamlNode* node = get(key, need);
-  if (node == nullptr) return std::nullopt;
-  return to_range(*node, maximum, findings_);
-}
-
-std::optional<std::uint64_t> YamlMap::number_up_to(std::string_view key, std::uint64_t maximum,
-                                                   Need need) {
-  const YamlNode* node = get(key, need);
-  if (node == nullptr) return std::nullopt;
-  return to_unsigned(*node, maximum, findings_);
 }
 
 void YamlMap::finish() {

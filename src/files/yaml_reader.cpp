@@ -5,11 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <filesystem>
-#include <fstream>
 #include <optional>
-#include <system_error>
 #include <unordered_set>
 #include <utility>
 
@@ -21,8 +17,6 @@ namespace {
 /// Far above any profile (tens of kilobytes) or tools file; keeps a wrong path from filling memory.
 constexpr std::size_t largest_file = std::size_t{1} << 20;
 
-constexpr std::size_t read_step = 16384;
-
 /// No format of ours nests deeper than six; bounds recursion over the tree.
 constexpr std::size_t deepest_nesting = 32;
 
@@ -32,22 +26,22 @@ constexpr std::size_t most_values = 100'000;
 /// No user mends more in one go; bounds the work on a file that is something else altogether.
 constexpr std::size_t most_findings = 1'000;
 
-/// Places by the number of code points in front, which is how the parser counts; they are asked for
-/// in the order of the text.
-class Places {
+/// Locations by the number of code points in front, which is how the parser counts; they are asked
+/// for in the order of the text.
+class LocationFinder {
  public:
-  Places(std::string_view text, std::size_t file) : text_(text), at_{file, 1, 1} {}
+  LocationFinder(std::string_view text, std::size_t file) : text_(text), at_{file, 1, 1} {}
 
-  /// The place, or the last one asked for when that is behind it.
-  Position find(std::size_t index) {
+  /// The location, or the last one asked for when that is behind it.
+  SourceLocation find(std::size_t index) {
     while (index_ < index && byte_ < text_.size()) step();
     return at_;
   }
-  Position find_byte(std::size_t byte) {
+  SourceLocation find_byte(std::size_t byte) {
     while (byte_ < byte && byte_ < text_.size()) step();
     return at_;
   }
-  /// What stands at the place that was found last; NUL at the end of the text.
+  /// What stands at the location that was found last; NUL at the end of the text.
   [[nodiscard]] char here() const { return byte_ < text_.size() ? text_[byte_] : '\0'; }
   /// Whether only blanks stand in front of it in its line.
   [[nodiscard]] bool begins_line() const {
@@ -71,7 +65,7 @@ class Places {
   std::string_view text_;
   std::size_t index_ = 0;
   std::size_t byte_ = 0;
-  Position at_;
+  SourceLocation at_;
 };
 
 /// The parser of libyaml over one text. It looks at most 1,024 characters ahead, and keeps of
@@ -129,13 +123,14 @@ bool is_null_word(std::string_view text) {
 /// Builds the tree from events; a collection is kept open on a stack until its end.
 class TreeBuilder {
  public:
-  TreeBuilder(Places& places, Diagnostics& findings) : places_(places), findings_(findings) {}
+  TreeBuilder(LocationFinder& locations, Diagnostics& findings)
+      : locations_(locations), findings_(findings) {}
 
   [[nodiscard]] YamlNode take() { return std::move(root_); }
 
   /// False: the text takes more than any file of ours, and is not to be read on.
   [[nodiscard]] bool take(const yaml_event_t& event) {
-    const Position at = places_.find(event.start_mark.index);
+    const SourceLocation at = locations_.find(event.start_mark.index);
     switch (event.type) {
       case YAML_DOCUMENT_START_EVENT:
         root_ = YamlNode{.at = at, .items = {}, .entries = {}};
@@ -173,12 +168,12 @@ class TreeBuilder {
     std::optional<YamlNode> key;  ///< of a map whose value has not come yet
   };
 
-  [[nodiscard]] YamlNode make(YamlNode::Kind kind, const Position& at) {
+  [[nodiscard]] YamlNode make(YamlNode::Kind kind, const SourceLocation& at) {
     ++values_;
     return YamlNode{.kind = kind, .at = at, .items = {}, .entries = {}};
   }
 
-  [[nodiscard]] bool is_within_bounds(const Position& at) {
+  [[nodiscard]] bool is_within_bounds(const SourceLocation& at) {
     if (open_.size() > deepest_nesting) {
       findings_.add(at, fmt::format("nested more than {} levels deep", deepest_nesting));
       return false;
@@ -191,12 +186,13 @@ class TreeBuilder {
     return true;
   }
 
-  void check_properties(const Position& at, const yaml_char_t* anchor, const yaml_char_t* tag) {
+  void check_properties(const SourceLocation& at, const yaml_char_t* anchor,
+                        const yaml_char_t* tag) {
     if (anchor != nullptr) findings_.add(at, "anchors are not supported; write the value out");
     if (tag != nullptr) findings_.add(at, "tags are not supported");
   }
 
-  void add_scalar(const yaml_event_t& event, const Position& at) {
+  void add_scalar(const yaml_event_t& event, const SourceLocation& at) {
     const auto& scalar = event.data.scalar;
     check_properties(at, scalar.anchor, scalar.tag);
     const std::string_view text = to_view(scalar.value, scalar.length);
@@ -245,7 +241,7 @@ class TreeBuilder {
     }
   }
 
-  Places& places_;
+  LocationFinder& locations_;
   Diagnostics& findings_;
   YamlNode root_ = {};
   std::vector<Open> open_;
@@ -272,7 +268,7 @@ std::string_view cause_of(char here) {
 }
 
 /// What the parser complains about, in our words.
-std::string_view cause_of(std::string_view complaint, const Places& places) {
+std::string_view cause_of(std::string_view complaint, const LocationFinder& locations) {
   struct Cause {
     std::string_view complaint;
     std::string_view text;
@@ -307,29 +303,31 @@ std::string_view cause_of(std::string_view complaint, const Places& places) {
     return "";
   };
   if (const std::string_view text = text_of(ours); !text.empty()) return text;
-  if (const std::string_view text = cause_of(places.here()); !text.empty()) return text;
+  if (const std::string_view text = cause_of(locations.here()); !text.empty()) return text;
   if (const std::string_view text = text_of(unless_seen); !text.empty()) return text;
   if (!complaint.starts_with("did not find expected")) return "the structure is broken";
-  return places.begins_line() ? "a line is indented differently from its neighbours"
-                              : "something behind a finished value; quote the whole text";
+  return locations.begins_line() ? "a line is indented differently from its neighbours"
+                                 : "something behind a finished value; quote the whole text";
 }
 
-void add_complaint(const Parser& parser, std::size_t file, Places& places, Diagnostics& findings) {
+void add_complaint(const Parser& parser, std::size_t file, LocationFinder& locations,
+                   Diagnostics& findings) {
   const yaml_parser_t& state = parser.state();
   if (!parser.sound() || state.error == YAML_MEMORY_ERROR || state.problem == nullptr) {
     findings.add({file, 1, 1}, "not valid YAML: the parser gave up");
     return;
   }
-  const Position at = state.error == YAML_READER_ERROR ? places.find_byte(state.problem_offset)
-                                                       : places.find(state.problem_mark.index);
-  findings.add(at, fmt::format("not valid YAML here: {}", cause_of(state.problem, places)));
+  const SourceLocation at = state.error == YAML_READER_ERROR
+                                ? locations.find_byte(state.problem_offset)
+                                : locations.find(state.problem_mark.index);
+  findings.add(at, fmt::format("not valid YAML here: {}", cause_of(state.problem, locations)));
 }
 
 void parse_documents(std::string_view text, std::size_t file, Documents wanted,
                      Diagnostics& findings, std::vector<YamlNode>& documents) {
   Parser parser(text);
-  Places places(text, file);
-  TreeBuilder builder(places, findings);
+  LocationFinder locations(text, file);
+  TreeBuilder builder(locations, findings);
   const yaml_event_t* event = parser.next();
   while (event != nullptr && event->type != YAML_STREAM_END_EVENT) {
     const bool begins = event->type == YAML_DOCUMENT_START_EVENT;
@@ -339,7 +337,7 @@ void parse_documents(std::string_view text, std::size_t file, Documents wanted,
     if (event->type == YAML_DOCUMENT_END_EVENT) documents.push_back(builder.take());
     event = parser.next();
   }
-  if (event == nullptr) add_complaint(parser, file, places, findings);
+  if (event == nullptr) add_complaint(parser, file, locations, findings);
   while (!documents.empty() && documents.back().kind == YamlNode::Kind::nothing) {
     documents.pop_back();
   }
@@ -358,7 +356,7 @@ bool declares_tags(std::string_view text) {
 
 /// Checked before the parser sees the text, so that what is wrong is told in our words.
 bool check_characters(std::string_view text, std::size_t file, Diagnostics& findings) {
-  Position at{file, 1, 1};
+  SourceLocation at{file, 1, 1};
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint character = first_code_point(text.substr(i));
     if (!character.well_formed) {
@@ -369,8 +367,9 @@ bool check_characters(std::string_view text, std::size_t file, Diagnostics& find
       findings.add(at, "a NUL byte; this is not a text file");
       return false;
     }
-    at = text[i] == '\n' ? Position{file, at.line + 1, 1}
-                         : Position{file, at.line, at.column + static_cast<int>(character.length)};
+    at = text[i] == '\n'
+             ? SourceLocation{file, at.line + 1, 1}
+             : SourceLocation{file, at.line, at.column + static_cast<int>(character.length)};
     i += character.length;
   }
   if (declares_tags(text)) {
@@ -378,19 +377,6 @@ bool check_characters(std::string_view text, std::size_t file, Diagnostics& find
     return false;
   }
   return true;
-}
-
-Error unreadable(const std::string& path, std::string message) {
-  return {.code = Errc::bad_file, .message = std::move(message), .name = path};
-}
-
-/// Why the system would not open it, in its own words but for what everybody knows.
-Error not_opened(const std::string& path, int code) {
-  if (code == ENOENT || code == ENOTDIR) return unreadable(path, "no such file");
-  Error error = unreadable(path, fmt::format("the file cannot be opened for reading: {}",
-                                             std::generic_category().message(code)));
-  if (code == EACCES) error.hint = "check who may read it, and who may look into its folder";
-  return error;
 }
 
 }  // namespace
@@ -404,24 +390,24 @@ std::size_t Diagnostics::add_file(std::string path) {
   return files_.size() - 1;
 }
 
-void Diagnostics::add(const Position& at, std::string message) {
+void Diagnostics::add(const SourceLocation& at, std::string message) {
   ++told_;
   if (entries_.size() == most_findings) return;
-  auto place = std::lower_bound(
+  auto location = std::lower_bound(
       entries_.begin(), entries_.end(), at,
-      [](const Entry& entry, const Position& position) { return entry.at < position; });
-  for (; place != entries_.end() && place->at == at; ++place) {
-    if (place->message == message) return;
+      [](const Entry& entry, const SourceLocation& position) { return entry.at < position; });
+  for (; location != entries_.end() && location->at == at; ++location) {
+    if (location->message == message) return;
   }
-  entries_.insert(place, {at, std::move(message)});
+  entries_.insert(location, {at, std::move(message)});
 }
 
-void Diagnostics::add_once(const Position& at, std::string message) {
-  const auto place = std::lower_bound(
+void Diagnostics::add_once(const SourceLocation& at, std::string message) {
+  const auto location = std::lower_bound(
       entries_.begin(), entries_.end(), at,
-      [](const Entry& entry, const Position& position) { return entry.at < position; });
+      [](const Entry& entry, const SourceLocation& position) { return entry.at < position; });
   ++told_;
-  if (place == entries_.end() || place->at != at) add(at, std::move(message));
+  if (location == entries_.end() || location->at != at) add(at, std::move(message));
 }
 
 std::vector<Diagnostic> Diagnostics::list() const {
@@ -449,28 +435,6 @@ const YamlNode* YamlNode::find(std::string_view key) const {
     if (entry.key == key) return &entry.value;
   }
   return nullptr;
-}
-
-Result<std::string> read_text_file(const std::string& path) {
-  std::error_code problem;
-  if (std::filesystem::is_directory(path, problem)) {
-    return tl::unexpected(unreadable(path, "is a folder, not a file"));
-  }
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return tl::unexpected(not_opened(path, errno));
-  std::string text;
-  std::array<char, read_step> step{};
-  while (stream && text.size() <= largest_file) {
-    stream.read(step.data(), step.size());
-    text.append(step.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  if (stream.bad()) return tl::unexpected(unreadable(path, "the file cannot be read"));
-  if (text.size() > largest_file) {
-    return tl::unexpected(unreadable(
-        path, fmt::format("larger than {} bytes; this is no file of spindle's", largest_file)));
-  }
-  return text;
 }
 
 std::vector<YamlNode> parse_yaml(std::string_view text, std::size_t file, Documents documents,

@@ -6,19 +6,9 @@
 #include <vector>
 
 #include "spindle/base/error.hpp"
-#include "spindle/files/profile_store.hpp"
-#include "spindle/files/read_text.hpp"
+#include "spindle/files/finding.hpp"
 
 namespace spindle::files {
-
-/// A place in one of the files that are read together; line and column count from 1, columns in
-/// bytes as compilers do.
-struct Position {
-  std::size_t file = 0;  ///< as given by Diagnostics::add_file()
-  int line = 1;
-  int column = 1;
-  friend auto operator<=>(const Position&, const Position&) = default;
-};
 
 /// Faults of several files, collected instead of stopping at the first. Keeps the first thousand.
 class Diagnostics {
@@ -26,26 +16,26 @@ class Diagnostics {
   /// The number by which positions name this file.
   std::size_t add_file(std::string path);
 
-  /// The same fault at the same place counts once.
-  void add(const Position& at, std::string message);
-  /// Only when nothing is wrong at this place yet: a repeated entry tells its fault once.
-  void add_once(const Position& at, std::string message);
+  /// The same fault at the same location counts once.
+  void add(const SourceLocation& at, std::string message);
+  /// Only when nothing is wrong at this location yet: a repeated entry tells its fault once.
+  void add_once(const SourceLocation& at, std::string message);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   /// How often something was told so far: grows with every fault, also with one told before.
   [[nodiscard]] std::size_t told() const { return told_; }
-  /// Sorted by place.
+  /// Sorted by location.
   [[nodiscard]] std::vector<Diagnostic> list() const;
   /// The first finding as `bad_file`, and how many there are. Requires at least one.
   [[nodiscard]] Error error() const;
 
  private:
   struct Entry {
-    Position at;
+    SourceLocation at;
     std::string message;
   };
   std::vector<std::string> files_;
-  std::vector<Entry> entries_;  ///< sorted by place
+  std::vector<Entry> entries_;  ///< sorted by location
   std::size_t told_ = 0;
 };
 
@@ -55,7 +45,7 @@ struct YamlEntry;
 struct YamlNode {
   enum class Kind : std::uint8_t { nothing, scalar, sequence, map };
   Kind kind = Kind::nothing;
-  Position at = {};
+  SourceLocation at = {};
   std::string text = {};           ///< of a scalar
   std::vector<YamlNode> items;     ///< of a sequence
   std::vector<YamlEntry> entries;  ///< of a map, in the order of the file
@@ -66,7 +56,7 @@ struct YamlNode {
 
 struct YamlEntry {
   std::string key;
-  Position key_at;
+  SourceLocation key_at;
   YamlNode value;
 };
 

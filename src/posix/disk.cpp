@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "posix/descriptor.hpp"
+#include "posix/reading.hpp"
 #include "posix/trusted_file.hpp"
 #include "posix/write_whole.hpp"
 #include "spindle/posix/world.hpp"
@@ -24,9 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Far above any backup (a hundred kilobytes); keeps a wrong path from filling memory.
-constexpr std::size_t largest_file = std::size_t{1} << 20;
-constexpr std::size_t read_step = 16384;
 constexpr mode_t private_folder = 0700;
 constexpr mode_t usual_folder = 0777;
 constexpr mode_t private_file = 0600;
@@ -93,14 +91,10 @@ Result<std::string> read_file(const std::string& path) {
     return tl::unexpected(not_a_file(Errc::bad_file, path));
   }
   std::string text;
-  std::array<char, read_step> step{};
-  while (text.size() <= largest_file) {
-    const ssize_t got = ::read(file.number(), step.data(), step.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return tl::unexpected(unreadable(path, errno));
-    if (got == 0) return text;
-    text.append(step.data(), static_cast<std::size_t>(got));
-  }
+  int code = EINTR;
+  while (code == EINTR) code = read_whole(file.number(), text);
+  if (code == 0) return text;
+  if (code != EFBIG) return tl::unexpected(unreadable(path, code));
   return tl::unexpected(
       Error{.code = Errc::bad_file,
             .message = fmt::format("{}:1:1: larger than {} bytes; this is no file of spindle's",
@@ -261,7 +255,13 @@ bool file_exists(const std::string& path) {
 
 bool file_is_absent(const std::string& path) {
   struct stat about = {};
-  return ::stat(path.c_str(), &about) != 0 && (errno == ENOENT || errno == ENOTDIR);
+  return ::stat(path.c_str(), &about) != 0 &&
+         (errno == ENOENT || errno == ENOTDIR || errno == ENAMETOOLONG);
+}
+
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code unknown;
+  return fs::equivalent(a, b, unknown);
 }
 
 std::string user_name() {
@@ -273,13 +273,12 @@ std::string user_name() {
                                          : std::string(found->pw_name);
 }
 
-}  // namespace
-
-Disk local_disk(std::string_view trusted) {
-  const Trust trust{.self = ::geteuid(), .others = trusted_users(trusted)};
+Disk disk_with(const Trust& trust) {
   return {
       .exists = file_exists,
       .absent = file_is_absent,
+      .same_file = is_same_file,
+      .list = names_in,
       .read = read_file,
       .write = write_file,
       .append_line = append_line,
@@ -289,5 +288,13 @@ Disk local_disk(std::string_view trusted) {
       .process = [] { return static_cast<std::uint64_t>(::getpid()); },
       .read_trusted = [trust](const std::string& path) { return read_trusted_file(path, trust); }};
 }
+
+}  // namespace
+
+Disk local_disk(std::string_view trusted) {
+  return disk_with({.self = ::geteuid(), .others = trusted_users(trusted)});
+}
+
+Disk source_disk() { return disk_with({.self = ::geteuid(), .everyone = true}); }
 
 }  // namespace spindle::posix

@@ -7,25 +7,20 @@
 
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <sstream>
+
+#include "posix/reading.hpp"
 
 namespace spindle::posix {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string first_line(const fs::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  return line;
-}
-
 std::string program(long process) {
   if (process == ::getpid()) return "this program itself";
-  const std::string name = first_line(fmt::format("/proc/{}/comm", process));
+  std::string name = text_of(fmt::format("/proc/{}/comm", process));
+  name = name.substr(0, name.find('\n'));
   return name.empty() ? fmt::format("process {}", process)
                       : fmt::format("{} (process {})", name, process);
 }
@@ -37,7 +32,7 @@ std::optional<long> lock_holder(int descriptor) {
   if (::fstat(descriptor, &status) != 0) return std::nullopt;
   const std::string wanted = fmt::format("{:02x}:{:02x}:{}", ::major(status.st_dev),
                                          ::minor(status.st_dev), status.st_ino);
-  std::ifstream locks("/proc/locks");
+  std::istringstream locks(text_of("/proc/locks"));
   for (std::string line; std::getline(locks, line);) {
     std::istringstream words(line);
     std::string number;
@@ -54,7 +49,7 @@ std::optional<long> lock_holder(int descriptor) {
 
 /// Whether a descriptor of a process is the other end of this pseudo terminal.
 bool is_other_end(const fs::path& process, const fs::path& descriptor, const fs::path& port) {
-  std::ifstream info(process / "fdinfo" / descriptor);
+  std::istringstream info(text_of(process / "fdinfo" / descriptor));
   for (std::string line; std::getline(info, line);) {
     std::istringstream words(line);
     std::string key;
@@ -70,15 +65,14 @@ bool is_other_end(const fs::path& process, const fs::path& descriptor, const fs:
 bool has_open(const fs::path& process, const fs::path& port) {
   const bool pseudo = port.parent_path() == "/dev/pts";
   bool found = false;
-  std::error_code failed;  // other users' processes show nothing
-  for (fs::directory_iterator file(process / "fd", failed), end; !failed && file != end;
-       file.increment(failed)) {
+  // Other users' processes show nothing.
+  for (const std::string& descriptor : names_in(process / "fd")) {
     std::error_code unreadable;
-    const fs::path target = fs::read_symlink(*file, unreadable);
+    const fs::path target = fs::read_symlink(process / "fd" / descriptor, unreadable);
     if (unreadable) continue;
     if (target == port) found = true;
     const bool multiplexer = pseudo && target.filename() == "ptmx";
-    if (multiplexer && is_other_end(process, file->path().filename(), port)) return false;
+    if (multiplexer && is_other_end(process, descriptor, port)) return false;
   }
   return found;
 }
@@ -86,13 +80,13 @@ bool has_open(const fs::path& process, const fs::path& port) {
 std::optional<long> opener(const std::string& path) {
   std::error_code failed;
   const fs::path port = fs::canonical(path, failed);
-  for (fs::directory_iterator entry("/proc", failed), end; !failed && entry != end;
-       entry.increment(failed)) {
-    const std::string name = entry->path().filename();
+  if (failed) return std::nullopt;
+  for (const std::string& name : names_in("/proc")) {
     long process = 0;
     const auto [rest, error] = std::from_chars(name.data(), name.data() + name.size(), process);
     const bool is_process = error == std::errc() && rest == name.data() + name.size();
-    if (is_process && process != ::getpid() && has_open(entry->path(), port)) return process;
+    if (is_process && process != ::getpid() && has_open(fs::path("/proc") / name, port))
+      return process;
   }
   return std::nullopt;
 }

@@ -12,13 +12,11 @@
 #include <system_error>
 
 #include "posix/descriptor.hpp"
+#include "posix/reading.hpp"
 
 namespace spindle::posix {
 namespace {
 
-/// Far above any profile or tools file; keeps a wrong path from filling memory.
-constexpr std::size_t largest_file = std::size_t{1} << 20;
-constexpr std::size_t read_step = 16384;
 /// More than an entry of a usual user or group needs; a larger one counts as unknown.
 constexpr std::size_t entry_size = 16384;
 
@@ -91,16 +89,17 @@ Result<std::string> read_trusted_file(const std::string& path, const Trust& trus
   }
   if (S_ISFIFO(about.st_mode)) static_cast<void>(::fcntl(file.number(), F_SETFL, O_RDONLY));
   std::string text;
-  std::array<char, read_step> step{};
-  while (text.size() <= largest_file) {
-    const ssize_t got = ::read(file.number(), step.data(), step.size());
-    if (got < 0 && errno == EINTR) return tl::unexpected(Error{.code = Errc::interrupted});
-    if (got < 0) return tl::unexpected(unreadable(path, "the file cannot be read"));
-    if (got == 0) return text;
-    text.append(step.data(), static_cast<std::size_t>(got));
+  switch (read_whole(file.number(), text)) {
+    case 0:
+      return text;
+    case EINTR:
+      return tl::unexpected(Error{.code = Errc::interrupted});
+    case EFBIG:
+      return tl::unexpected(unreadable(
+          path, fmt::format("larger than {} bytes; this is no file of spindle's", largest_file)));
+    default:
+      return tl::unexpected(unreadable(path, "the file cannot be read"));
   }
-  return tl::unexpected(unreadable(
-      path, fmt::format("larger than {} bytes; this is no file of spindle's", largest_file)));
 }
 
 }  // namespace spindle::posix

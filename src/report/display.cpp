@@ -113,10 +113,6 @@ std::string printable(std::string_view text, LineBreaks breaks) {
   return out;
 }
 
-std::string shown_text(const Record& record, std::string_view key) {
-  return shown_text(record, key, record.find(key));
-}
-
 std::string shown_text(const Record& record, std::string_view key, const Field* field) {
   if (field != nullptr && !field->shown.empty()) return field->shown;
   return own_text(record, key, field);

@@ -34,10 +34,9 @@ struct Cells {
 /// Text that is harmless, on one line.
 Cells to_cells(std::string text);
 
-/// What people see of a record under a column's key: the field's `shown`, else its cell; "target",
-/// "time" and "type" are the record's own. Empty when the record has no such field.
-std::string shown_text(const Record& record, std::string_view key);
-/// The same where the field of this key is known; null: there is none.
+/// What people see of a record under a column's key: the `shown` of its field of this key, else its
+/// cell; "target", "time" and "type" are the record's own. Empty where the field is null: there is
+/// none.
 std::string shown_text(const Record& record, std::string_view key, const Field* field);
 
 /// The same as programs see it: always the cell, never the field's `shown`.

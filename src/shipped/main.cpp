@@ -6,22 +6,21 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "shipped/table_writer.hpp"
 #include "spindle/files/profile_store.hpp"
-#include "spindle/files/read_text.hpp"
+#include "spindle/posix/disk.hpp"
 
 namespace {
 
 using namespace spindle;
 
-std::vector<std::string> ids_in(const std::string& folder) {
+std::vector<std::string> ids_in(const std::string& folder, const Disk& disk) {
   std::vector<std::string> ids;
-  for (const auto& file : std::filesystem::directory_iterator(folder)) {
-    if (file.path().extension() == ".yaml") ids.push_back(file.path().stem().string());
+  for (const std::filesystem::path file : disk.list(folder)) {
+    if (file.extension() == ".yaml") ids.push_back(file.stem().string());
   }
   std::sort(ids.begin(), ids.end());
   return ids;
@@ -41,9 +40,9 @@ bool is_sound(const files::ProfileStore& store, const std::string& path) {
 
 /// One line of the table of profiles.
 Result<std::string> row_of(const files::ProfileStore& store, const std::string& folder,
-                           const std::string& id, shipped::TableWriter& writer) {
+                           const std::string& id, shipped::TableWriter& writer, const Disk& disk) {
   const std::string path = fmt::format("{}/{}.yaml", folder, id);
-  auto yaml = files::read_text_file(path);
+  auto yaml = disk.read(path);
   if (!yaml) return tl::unexpected(std::move(yaml.error()));
   auto profile = store.load_any(path);
   if (!profile) return tl::unexpected(std::move(profile.error()));
@@ -65,16 +64,17 @@ Result<std::string> row_of(const files::ProfileStore& store, const std::string& 
 }
 
 int write_tables(const std::string& folder, const std::string& output) {
-  const files::ProfileStore store({folder});
+  const Disk disk = posix::source_disk();
+  const files::ProfileStore store({folder}, disk);
   shipped::TableWriter writer;
   std::string rows;
   bool sound = true;
-  for (const std::string& id : ids_in(folder)) {
+  for (const std::string& id : ids_in(folder, disk)) {
     if (!is_sound(store, fmt::format("{}/{}.yaml", folder, id))) {
       sound = false;
       continue;
     }
-    const auto row = row_of(store, folder, id, writer);
+    const auto row = row_of(store, folder, id, writer, disk);
     if (!row) {
       fmt::print(stderr, "{}\n", message_of(row.error()));
       sound = false;
@@ -83,18 +83,18 @@ int write_tables(const std::string& folder, const std::string& output) {
     rows += *row;
   }
   if (!sound) return 1;
-  std::ofstream file(output);
-  file << "// Written by spindle_tables from the profiles.\n"
-          "#include \"spindle/shipped/profiles.hpp\"\n\n"
-          "namespace spindle::shipped {\nnamespace {\n\nusing catalogue::Text;\n\n"
-       << writer.source() << "\nconstexpr files::ShippedProfile table[] = {\n"
-       << rows
-       << "};\n\n}  // namespace\n\n"
-          "files::ShippedProfiles profiles() { return table; }\n\n}  // namespace "
-          "spindle::shipped\n";
-  file.close();
-  if (!file) fmt::print(stderr, "{}: cannot be written\n", output);
-  return file ? 0 : 1;
+  const auto written =
+      disk.write(output,
+                 "// Written by spindle_tables from the profiles.\n"
+                 "#include \"spindle/shipped/profiles.hpp\"\n\n"
+                 "namespace spindle::shipped {\nnamespace {\n\nusing catalogue::Text;\n\n" +
+                     writer.source() + "\nconstexpr files::ShippedProfile table[] = {\n" + rows +
+                     "};\n\n}  // namespace\n\n"
+                     "files::ShippedProfiles profiles() { return table; }\n\n}  // namespace "
+                     "spindle::shipped\n",
+                 Overwrite::allow, Privacy::usual);
+  if (!written) fmt::print(stderr, "{}\n", describe(written.error()));
+  return written ? 0 : 1;
 }
 
 }  // namespace

@@ -3,13 +3,16 @@
 #include "input.hpp"
 #include "spindle/files/backup_file.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/posix/disk.hpp"
 
 using namespace spindle;
 using spindle::fuzz::require;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const catalogue::Profile profile =
-      files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}).load("doga-bm").value();
+      files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk())
+          .load("doga-bm")
+          .value();
   const std::string text = fuzz::Input(data, size).text();
   const auto file = files::read_backup(text, "backup.yaml");
   require(file || file.error().status() == ExitStatus::bad_file);

@@ -6,6 +6,7 @@
 #include "input.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/posix/disk.hpp"
 
 using namespace spindle;
 using spindle::fuzz::require;
@@ -53,7 +54,7 @@ void check_profile(const catalogue::Profile& profile) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
+  static const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk());
   const TextFile file({data, size});
   const auto profile = store.load(file.path());
   if (profile) check_profile(*profile);
@@ -63,7 +64,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(profile || !findings || !findings->empty());
   static_cast<void>(store.load_simulation(file.path()));
   static_cast<void>(store.load_error_codes(file.path()));
-  const auto tools = files::load_tools(file.path());
+  const auto tools = files::load_tools(file.path(), posix::source_disk());
   require(tools || tools.error().status() == ExitStatus::bad_file);
   return 0;
 }

@@ -204,7 +204,7 @@ std::string mdoc_literal(std::span<const std::string> lines) {
   return text + ".Ed\n";
 }
 
-std::vector<Hole> manual_holes(const cli::Description& description) {
+std::vector<Placeholder> manual_placeholders(const cli::Description& description) {
   std::string commands;
   for (const cli::CommandDescription& command : description.commands)
     commands += command_text(command);
@@ -213,24 +213,26 @@ std::vector<Hole> manual_holes(const cli::Description& description) {
           {"EXIT_STATUS", exit_status_list()}};
 }
 
-Result<std::string> fill_holes(std::string_view source, std::span<const Hole> holes) {
+Result<std::string> expand_template(std::string_view source,
+                                    std::span<const Placeholder> placeholders) {
   std::string page;
   if (source.ends_with('\n')) source.remove_suffix(1);
   for (const std::string_view line : split(source, '\n')) {
-    const bool is_hole = line.size() > 2 && line.starts_with('@') && line.ends_with('@');
-    if (!is_hole) {
+    const bool is_placeholder = line.size() > 2 && line.starts_with('@') && line.ends_with('@');
+    if (!is_placeholder) {
       page += std::string(line) + "\n";
       continue;
     }
     const std::string_view name = line.substr(1, line.size() - 2);
-    const auto hole = std::find_if(holes.begin(), holes.end(),
-                                   [&](const Hole& known) { return known.name == name; });
-    if (hole == holes.end()) {
+    const auto placeholder =
+        std::find_if(placeholders.begin(), placeholders.end(),
+                     [&](const Placeholder& known) { return known.name == name; });
+    if (placeholder == placeholders.end()) {
       return tl::unexpected(Error{.code = Errc::bad_file,
-                                  .message = "nothing is known that fills this hole",
+                                  .message = "nothing is known that fills this placeholder",
                                   .name = std::string(name)});
     }
-    page += hole->text;
+    page += placeholder->text;
   }
   return page;
 }

@@ -12,16 +12,17 @@ namespace spindle::test {
 
 /// A place in the source of a manual page, a line "@NAME@", and the mdoc(7) text that belongs
 /// there: whole lines.
-struct Hole {
+struct Placeholder {
   std::string name;
   std::string text;
 };
 
 /// COMMANDS, COMMON_OPTIONS and EXIT_STATUS: what the program itself knows.
-std::vector<Hole> manual_holes(const cli::Description& description);
+std::vector<Placeholder> manual_placeholders(const cli::Description& description);
 
-/// The page. Error `bad_file` for a hole of the source that is none of `holes`.
-Result<std::string> fill_holes(std::string_view source, std::span<const Hole> holes);
+/// The page. Error `bad_file` for a placeholder of the source that is none of `placeholders`.
+Result<std::string> expand_template(std::string_view source,
+                                    std::span<const Placeholder> placeholders);
 
 /// Text as mdoc(7) shows it: nothing in it is an escape or becomes a typographic character.
 std::string mdoc_escaped(std::string_view text);

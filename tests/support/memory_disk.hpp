@@ -5,7 +5,7 @@
 #include <string>
 
 #include "spindle/base/disk.hpp"
-#include "spindle/files/read_text.hpp"
+#include "spindle/posix/disk.hpp"
 
 namespace spindle::test {
 
@@ -15,7 +15,9 @@ class MemoryDisk {
   /// What the program sees of it; the disk must outlive them.
   Disk functions() {
     return {.exists = [this](const std::string& path) { return files_.contains(plain(path)); },
-            .absent = [this](const std::string& path) { return !files_.contains(plain(path)); },
+            .absent = [this](const std::string& path) { return is_absent(path); },
+            .same_file = real_.same_file,
+            .list = real_.list,
             .read = [this](const std::string& path) { return read(path); },
             .write = [this](const std::string& path, std::string_view text, Overwrite overwrite,
                             Privacy) { return write(path, text, overwrite); },
@@ -38,7 +40,7 @@ class MemoryDisk {
             .user = [] { return std::string("anna"); },
             .process = [] { return std::uint64_t{4242}; },
             // Profiles and tools files lie on the real disk, too.
-            .read_trusted = files::read_text_file};
+            .read_trusted = real_.read_trusted};
   }
 
   void put(const std::string& path, std::string text) { files_[plain(path)] = std::move(text); }
@@ -59,6 +61,11 @@ class MemoryDisk {
             .message = "cannot be written: No space left on device",
             .name = path};
   }
+  /// What is installed on this machine is not seen.
+  bool is_absent(const std::string& path) const {
+    const bool is_seen = !path.starts_with("/etc/");
+    return !files_.contains(plain(path)) && !(is_seen && !real_.absent(path));
+  }
   Result<std::string> read(const std::string& path) {
     const auto found = files_.find(plain(path));
     if (found != files_.end()) return found->second;
@@ -74,6 +81,7 @@ class MemoryDisk {
     return {};
   }
 
+  Disk real_ = posix::source_disk();
   std::map<std::string, std::string> files_ = {};
   bool full_ = false;
   std::mutex mutex_ = {};  // several tools are backed up side by side

@@ -9,6 +9,7 @@
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
+#include "spindle/posix/disk.hpp"
 #include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/plain_tool.hpp"
@@ -32,7 +33,8 @@ inline Product small_bm() { return {bm_profile(), bm_start()}; }
 /// A product that is shipped, or one of tests/profiles/good.
 inline Product product(const std::string& name) {
   static const files::ProfileStore store(
-      {SPINDLE_SOURCE_DIR "/profiles", SPINDLE_SOURCE_DIR "/tests/profiles/good"});
+      {SPINDLE_SOURCE_DIR "/profiles", SPINDLE_SOURCE_DIR "/tests/profiles/good"},
+      posix::source_disk());
   return {store.load(name).value(), store.load_simulation(name).value()};
 }
 

@@ -95,8 +95,8 @@ inline std::string forms_text(const ordered_json& definition) {
          ".El\n";
 }
 
-/// The holes COMMON_KEYS and RECORDS.
-inline std::vector<Hole> schema_holes(const ordered_json& schema) {
+/// The placeholders COMMON_KEYS and RECORDS.
+inline std::vector<Placeholder> schema_placeholders(const ordered_json& schema) {
   std::string records;
   for (const auto& type : schema.at("properties").at("type").at("enum")) {
     const ordered_json& definition = schema.at("$defs").at(type.get<std::string>());

@@ -52,6 +52,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/cli/run.hpp"
 #include "spindle/modbus/pdu.hpp"
+#include "spindle/posix/disk.hpp"
 #include "spindle/posix/world.hpp"
 #include "spindle/shipped/profiles.hpp"
 #include "spindle/sim/blv_driver.hpp"
@@ -129,7 +130,7 @@ struct Tool {
 
 class Stage {
  public:
-  Stage() : profiles_({std::string(SPINDLE_SOURCE_DIR) + "/profiles"}) {}
+  Stage() : profiles_({std::string(SPINDLE_SOURCE_DIR) + "/profiles"}, posix::source_disk()) {}
 
   void add_tool(const std::vector<std::string>& words) {
     auto profile = profiles_.load(words.at(1));
@@ -166,7 +167,8 @@ class Stage {
 
   void add_profiles(const std::string& folder) {
     own_profiles_ = std::string(SPINDLE_SOURCE_DIR) + "/" + folder;
-    profiles_ = files::ProfileStore({own_profiles_, std::string(SPINDLE_SOURCE_DIR) + "/profiles"});
+    profiles_ = files::ProfileStore({own_profiles_, std::string(SPINDLE_SOURCE_DIR) + "/profiles"},
+                                    posix::source_disk());
   }
 
   void add_bank(const std::vector<std::string>& words) {

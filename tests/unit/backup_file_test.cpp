@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "spindle/files/profile_store.hpp"
+#include "spindle/posix/disk.hpp"
 #include "support/edit_list.hpp"
 
 using namespace spindle;
@@ -23,7 +24,9 @@ namespace {
 
 const Profile& bm() {
   static const Profile profile =
-      files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}).load("doga-bm").value();
+      files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk())
+          .load("doga-bm")
+          .value();
   return profile;
 }
 

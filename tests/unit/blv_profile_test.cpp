@@ -4,6 +4,7 @@
 
 #include "spindle/catalogue/value.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/posix/disk.hpp"
 
 using namespace spindle;
 using catalogue::Action;
@@ -13,7 +14,9 @@ using catalogue::Profile;
 
 namespace {
 
-files::ProfileStore shipped() { return files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}); }
+files::ProfileStore shipped() {
+  return files::ProfileStore({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk());
+}
 
 Profile blv() {
   auto profile = shipped().load("orientalmotor-blv");

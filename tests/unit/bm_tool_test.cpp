@@ -9,6 +9,7 @@
 #include "hex.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
+#include "spindle/posix/disk.hpp"
 #include "support/edit_list.hpp"
 #include "support/rig.hpp"
 
@@ -527,7 +528,8 @@ TEST_CASE("the frame that would be pushed is a read of the event block") {
 }
 
 TEST_CASE("the shipped profiles make tools that answer for all they name") {
-  const files::ProfileStore store({std::string(SPINDLE_SOURCE_DIR) + "/profiles"});
+  const files::ProfileStore store({std::string(SPINDLE_SOURCE_DIR) + "/profiles"},
+                                  posix::source_disk());
   for (const std::string id : {"doga-bm", "doga-bmt"}) {
     CAPTURE(id);
     const auto profile = store.load(id);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/grammar.hpp"
+#include "spindle/posix/disk.hpp"
 
 using namespace spindle;
 using cli::Completion;
@@ -16,7 +17,7 @@ using Words = std::vector<std::string>;
 namespace {
 
 const files::ProfileStore& shipped() {
-  static const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
+  static const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk());
   return store;
 }
 

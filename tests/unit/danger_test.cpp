@@ -7,6 +7,7 @@
 
 #include "spindle/catalogue/snapshot.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/posix/disk.hpp"
 #include "support/edit_list.hpp"
 
 using namespace spindle;
@@ -164,7 +165,7 @@ TEST_CASE("a motion without an end") {
 }
 
 TEST_CASE("of the shipped profiles, only the word that runs a motor is left out of backups") {
-  const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"});
+  const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk());
   for (const files::ProfileEntry& entry : store.list()) {
     const Profile profile = store.load(entry.id).value();
     for (const Parameter& one : profile.parameters) {

@@ -16,6 +16,7 @@
 #include "spindle/cli/run.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
+#include "spindle/posix/disk.hpp"
 #include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/simulated_tool.hpp"
 #include "support/fake_clock.hpp"
@@ -320,7 +321,8 @@ class Shelf {
   }
   [[nodiscard]] std::string path() const { return folder_.string(); }
   [[nodiscard]] files::ProfileStore store() const {
-    return files::ProfileStore({folder_.string(), SPINDLE_SOURCE_DIR "/profiles"});
+    return files::ProfileStore({folder_.string(), SPINDLE_SOURCE_DIR "/profiles"},
+                               posix::source_disk());
   }
 
  private:

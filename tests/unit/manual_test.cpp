@@ -15,8 +15,11 @@
 #include <vector>
 
 #include "cli/grammar.hpp"
+#include "files/known_keys.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/posix/disk.hpp"
+#include "support/key_manual.hpp"
 #include "support/schema_manual.hpp"
 
 using namespace spindle;
@@ -37,21 +40,24 @@ std::string read(const fs::path& path) {
   return text.str();
 }
 
-test::Hole example(std::string name, const std::string& file) {
+test::Placeholder example(std::string name, const std::string& file) {
   std::vector<std::string> lines;
   std::istringstream text(read(manual / "examples" / file));
   for (std::string line; std::getline(text, line);) lines.push_back(line);
   return {std::move(name), test::mdoc_literal(lines)};
 }
 
-std::vector<test::Hole> all_holes() {
-  std::vector<test::Hole> holes = test::manual_holes(cli::describe_grammar());
+std::vector<test::Placeholder> all_placeholders() {
+  std::vector<test::Placeholder> placeholders = test::manual_placeholders(cli::describe_grammar());
   const auto schema = nlohmann::ordered_json::parse(read(root / "share" / "spindle-1.schema.json"));
-  for (test::Hole& hole : test::schema_holes(schema)) holes.push_back(std::move(hole));
-  holes.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
-  holes.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
-  holes.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
-  return holes;
+  for (test::Placeholder& placeholder : test::schema_placeholders(schema))
+    placeholders.push_back(std::move(placeholder));
+  for (test::Placeholder& placeholder : test::key_placeholders())
+    placeholders.push_back(std::move(placeholder));
+  placeholders.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
+  placeholders.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
+  placeholders.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
+  return placeholders;
 }
 
 /// What the first group of a pattern finds.
@@ -75,12 +81,12 @@ std::string sources(const fs::path& folder, const std::string& prefix) {
   return text;
 }
 
-/// The keys that a reader of files asks its YAML map for.
-std::set<std::string> keys_of_reader(const std::string& prefix) {
-  return found(sources("files", prefix),
-               R"re((?:(?:get|text|flag|decimal|duration|range|allow|number<[^>]*>|\.word))re"
-               R"re(\(|read_(?:section|slice|areas|decimals)\(map, |check_count\(counts, ))re"
-               R"re("([a-z-]+)")re");
+/// The names of all these keys, and of those inside them.
+void add_names(const std::vector<files::Key>& keys, std::set<std::string>& names) {
+  for (const files::Key& key : keys) {
+    names.emplace(key.name);
+    if (key.inner != nullptr) add_names(key.inner(), names);
+  }
 }
 
 /// Whether a page has a word behind one of the macros that mark keys and fixed words.
@@ -95,10 +101,10 @@ bool explains(const std::string& page, const std::string& word) {
 }  // namespace
 
 TEST_CASE("manual: every page is what its source and the program make of it") {
-  const std::vector<test::Hole> holes = all_holes();
+  const std::vector<test::Placeholder> placeholders = all_placeholders();
   for (const std::string& name : pages) {
     CAPTURE(name);
-    const auto page = test::fill_holes(read(manual / (name + ".in")), holes);
+    const auto page = test::expand_template(read(manual / (name + ".in")), placeholders);
     REQUIRE_MESSAGE(page.has_value(), page.error().name);
     if (std::getenv("SPINDLE_UPDATE") != nullptr) {
       std::ofstream file(manual / name);
@@ -110,22 +116,23 @@ TEST_CASE("manual: every page is what its source and the program make of it") {
   }
 }
 
-TEST_CASE("manual: every hole is used, and one that is left empty is told") {
+TEST_CASE("manual: every placeholder is used, and one that is left empty is told") {
   std::string all;
   for (const std::string& name : pages) all += read(manual / (name + ".in"));
-  for (const test::Hole& hole : all_holes()) {
-    CAPTURE(hole.name);
-    CHECK(all.find("\n@" + hole.name + "@\n") != std::string::npos);
+  for (const test::Placeholder& placeholder : all_placeholders()) {
+    CAPTURE(placeholder.name);
+    CHECK(all.find("\n@" + placeholder.name + "@\n") != std::string::npos);
   }
-  const auto page = test::fill_holes("before\n@UNKNOWN@\n", all_holes());
+  const auto page = test::expand_template("before\n@UNKNOWN@\n", all_placeholders());
   REQUIRE_FALSE(page.has_value());
   CHECK(page.error().code == Errc::bad_file);
   CHECK(page.error().name == "UNKNOWN");
 }
 
 TEST_CASE("manual: a page is filled line by line") {
-  const std::vector<test::Hole> holes = {{"A", ".Pp\nmore\n"}, {"EMPTY", ""}};
-  CHECK(test::fill_holes("x\n@A@\ny @A@\n@EMPTY@\n@@\n", holes) == "x\n.Pp\nmore\ny @A@\n@@\n");
+  const std::vector<test::Placeholder> placeholders = {{"A", ".Pp\nmore\n"}, {"EMPTY", ""}};
+  CHECK(test::expand_template("x\n@A@\ny @A@\n@EMPTY@\n@@\n", placeholders) ==
+        "x\n.Pp\nmore\ny @A@\n@@\n");
 }
 
 TEST_CASE("manual: text is neither a request, an escape nor a typographic character") {
@@ -179,7 +186,7 @@ TEST_CASE("manual: an appendix is text and terms, a command below another has it
                               "Words (of it):\n  one[=N]   the first\n  two\n\nAnd more.\n");
                         },
                     .commands = {{.name = "a b", .meaning = "below"}}}}};
-  CHECK(test::manual_holes(description).front().text ==
+  CHECK(test::manual_placeholders(description).front().text ==
         ".Ss a\n.Dl spindle a X\\&\n.Pp\nDoes it.\n.Pp\nWords (of it):\n.Pp\n.Bl -tag -width Ds "
         "-compact\n.It Cm one[=N]\nthe "
         "first\n.It Cm two\n.El\n.Pp\nAnd more.\n.Ss a b\n.Dl spindle a b\\&\n.Pp\nBelow.\n");
@@ -207,19 +214,17 @@ TEST_CASE("manual: every option of a URL is explained") {
 }
 
 TEST_CASE("manual: every key of every kind of file is explained") {
-  struct Row {
-    std::string reader;
-    std::string page;
-    std::size_t at_least;
-  };
-  for (const Row& row :
-       {Row{"profile_", "spindle-profile.5", 80}, Row{"tools_", "spindle-tools.5", 5},
-        Row{"backup_", "spindle-backup.5", 0}}) {
-    const std::string page = read(manual / row.page);
-    const auto keys = keys_of_reader(row.reader);
-    CHECK(keys.size() >= row.at_least);
+  const std::pair<std::vector<files::KeyList>, const char*> kinds[] = {
+      {files::profile_keys(), "spindle-profile.5"},
+      {files::tools_keys(), "spindle-tools.5"},
+      {files::backup_keys(), "spindle-backup.5"}};
+  for (const auto& [lists, name] : kinds) {
+    // Of the list of keys itself there is no more than the keys.
+    const std::string page = read(manual / (std::string(name) + ".in"));
+    std::set<std::string> keys;
+    for (const files::KeyList& list : lists) add_names(list.keys, keys);
     for (const std::string& key : keys) {
-      CAPTURE(row.page);
+      CAPTURE(name);
       CAPTURE(key);
       CHECK(explains(page, key));
     }
@@ -246,14 +251,15 @@ TEST_CASE("manual: the words of a profile are explained") {
 }
 
 TEST_CASE("manual: the examples of files are valid") {
-  const files::ProfileStore store({(root / "profiles").string()});
+  const files::ProfileStore store({(root / "profiles").string()}, posix::source_disk());
   for (const char* name : {"my-driver.yaml", "bm-line1.yaml"}) {
     CAPTURE(name);
     const auto findings = store.check((manual / "examples" / name).string());
     REQUIRE(findings.has_value());
     CHECK(findings->empty());
   }
-  const auto tools = files::load_tools((manual / "examples" / "tools.yaml").string());
+  const auto tools =
+      files::load_tools((manual / "examples" / "tools.yaml").string(), posix::source_disk());
   REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
   CHECK(tools->tools.size() == 2);
 }

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -222,9 +223,36 @@ TEST_CASE("what may not be looked at is not taken for absent") {
   REQUIRE(disk.write(folder / "there", "text", Overwrite::refuse, Privacy::usual));
   CHECK_FALSE(disk.absent(folder / "there"));
   CHECK(disk.absent(folder / "there/below"));
+  CHECK(disk.absent(folder / std::string(300, 'x')));
   // A name that the system refuses to look up; the user who runs the tests may look into every
   // folder.
-  CHECK_FALSE(disk.absent(folder / std::string(300, 'x')));
+  fs::create_symlink("circle", folder / "circle");
+  CHECK_FALSE(disk.absent(folder / "circle"));
+}
+
+TEST_CASE("a folder is listed, and two names of one file are known") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  REQUIRE(disk.write(folder / "one", "text", Overwrite::refuse, Privacy::usual));
+  REQUIRE(disk.write(folder / "two", "text", Overwrite::refuse, Privacy::usual));
+  fs::create_symlink("one", folder / "link");
+  std::vector<std::string> names = disk.list(folder / "");
+  std::sort(names.begin(), names.end());
+  CHECK(names == std::vector<std::string>{"link", "one", "two"});
+  CHECK(disk.list(folder / "none").empty());
+  CHECK(disk.list(folder / "one").empty());
+  CHECK(disk.same_file(folder / "one", folder / "link"));
+  CHECK_FALSE(disk.same_file(folder / "one", folder / "two"));
+  CHECK_FALSE(disk.same_file(folder / "one", folder / "none"));
+}
+
+TEST_CASE("a source tree is read whichever user can change it") {
+  const Folder folder;
+  const Disk disk = posix::source_disk();
+  REQUIRE(disk.write(folder / "open", "text", Overwrite::refuse, Privacy::usual));
+  REQUIRE(::chmod((folder / "open").c_str(), 0666) == 0);
+  CHECK(disk.read_trusted(folder / "open") == std::string("text"));
+  CHECK_FALSE(posix::local_disk().read_trusted(folder / "open").has_value());
 }
 
 TEST_CASE("folders are made with those above them, for whom it may concern") {

@@ -13,6 +13,7 @@
 
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/identity.hpp"
+#include "spindle/posix/disk.hpp"
 #include "support/temporary_folder.hpp"
 
 using namespace spindle;
@@ -29,7 +30,7 @@ namespace {
 const std::string shipped_folder = SPINDLE_SOURCE_DIR "/profiles";
 const std::string bad_folder = SPINDLE_SOURCE_DIR "/tests/profiles/bad";
 
-ProfileStore shipped() { return ProfileStore({shipped_folder}); }
+ProfileStore shipped() { return ProfileStore({shipped_folder}, posix::source_disk()); }
 
 Profile load(std::string_view name) {
   auto profile = shipped().load(name);
@@ -124,7 +125,7 @@ TEST_CASE("a profile of another run model than its base has nothing of the base'
       "run: {model: start-action, start: go}\nactions:\n"
       "  - {name: go, register: 30, value: 1, stop: 0, confirm: status, hazard: moves, evidence: "
       "manual, source: S}\n");
-  const ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"});
+  const ProfileStore store({SPINDLE_SOURCE_DIR "/tests/profiles/good"}, posix::source_disk());
   const auto profile = store.load(path);
   REQUIRE_MESSAGE(profile.has_value(), describe(profile.error()));
   CHECK(profile->run->command_register() == nullptr);
@@ -264,7 +265,7 @@ TEST_CASE("list() names products, not bases, and the first folder wins") {
   const std::string path = folder.write("doga-bm.yaml", "format: 1\n");
   folder.write("notes.txt", "");
   const std::vector<files::ProfileEntry> entries =
-      ProfileStore({folder.path(), shipped_folder, "/no/such/folder"}).list();
+      ProfileStore({folder.path(), shipped_folder, "/no/such/folder"}, posix::source_disk()).list();
   std::vector<std::string> ids;
   for (const auto& entry : entries) ids.push_back(entry.id);
   CHECK(std::is_sorted(ids.begin(), ids.end()));
@@ -378,7 +379,7 @@ TEST_CASE("bases that go round in circles, or on and on, are findings") {
   const Folder folder;
   folder.write("one.yaml", "format: 1\nid: one\ntitle: One\nextends: two\n");
   folder.write("two.yaml", "format: 1\nid: two\ntitle: Two\nextends: one\n");
-  const auto circle = ProfileStore({folder.path()}).load("one");
+  const auto circle = ProfileStore({folder.path()}, posix::source_disk()).load("one");
   REQUIRE_FALSE(circle.has_value());
   CHECK(circle.error().message ==
         folder.path() + "/two.yaml:4:10: 'one' extends itself in the end");
@@ -388,7 +389,7 @@ TEST_CASE("bases that go round in circles, or on and on, are findings") {
     folder.write(id + ".yaml", "format: 1\nid: " + id + "\ntitle: Level\nextends: level" +
                                    std::to_string(i + 1) + "\n");
   }
-  const auto chain = ProfileStore({folder.path()}).load("level0");
+  const auto chain = ProfileStore({folder.path()}, posix::source_disk()).load("level0");
   REQUIRE_FALSE(chain.has_value());
   CHECK(chain.error().message ==
         folder.path() + "/level7.yaml:4:10: more than 8 profiles extend each other");

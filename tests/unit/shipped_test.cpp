@@ -9,6 +9,7 @@
 
 #include "spindle/catalogue/fields.hpp"
 #include "spindle/files/profile_store.hpp"
+#include "spindle/posix/disk.hpp"
 #include "spindle/shipped/profiles.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -96,18 +97,20 @@ Profile without_path(Profile profile) {
 /// Counts how often each file is read.
 struct Reader {
   std::map<std::string, int> reads;
-  files::ReadText read() {
-    return [this](const std::string& path) {
+  Disk disk() {
+    Disk disk = posix::source_disk();
+    disk.read_trusted = [this, read = disk.read](const std::string& path) {
       ++reads[std::filesystem::path(path).filename().string()];
-      return files::read_text_file(path);
+      return read(path);
     };
+    return disk;
   }
 };
 
 }  // namespace
 
 TEST_CASE("the tables of the program say what the YAML files say, entry by entry") {
-  const ProfileStore store({folder});
+  const ProfileStore store({folder}, posix::source_disk());
   const auto shipped = shipped::profiles();
   std::size_t files = 0;
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
@@ -116,7 +119,7 @@ TEST_CASE("the tables of the program say what the YAML files say, entry by entry
     CAPTURE(id);
     const files::ShippedProfile* table = files::find(shipped, id);
     REQUIRE(table != nullptr);
-    CHECK(table->yaml == files::read_text_file(file.path().string()).value());
+    CHECK(table->yaml == posix::source_disk().read(file.path().string()).value());
     const auto loaded = store.load_any(file.path().string()).value();
     CHECK(loaded.is_abstract == table->is_abstract);
     const auto profiles = comparison(without_path(loaded.profile), *table->profile);
@@ -145,7 +148,7 @@ TEST_CASE("a difference anywhere in a profile is found") {
 
 TEST_CASE("a profile of the program is not parsed, and each is made once") {
   Reader reader;
-  const ProfileStore store({folder}, reader.read(), shipped::profiles());
+  const ProfileStore store({folder}, reader.disk(), shipped::profiles());
   const Profile first = store.load("doga-bm").value();
   const Profile second = store.load("doga-bm").value();
   const Profile& table = *files::find(shipped::profiles(), "doga-bm")->profile;
@@ -157,11 +160,11 @@ TEST_CASE("a profile of the program is not parsed, and each is made once") {
 
 TEST_CASE("a file overrides the profile of the program, also where only its base was changed") {
   test::TemporaryFolder own;
-  const std::string base = files::read_text_file(folder + "/doga-common.yaml").value();
-  own.write("doga-bm.yaml", files::read_text_file(folder + "/doga-bm.yaml").value());
+  const std::string base = posix::source_disk().read(folder + "/doga-common.yaml").value();
+  own.write("doga-bm.yaml", posix::source_disk().read(folder + "/doga-bm.yaml").value());
   SUBCASE("the base beside it is the same") {
     own.write("doga-common.yaml", base);
-    const ProfileStore store({own.path()}, files::read_text_file, shipped::profiles());
+    const ProfileStore store({own.path()}, posix::source_disk(), shipped::profiles());
     CHECK(store.load("doga-bm").value().parameters.begin() ==
           files::find(shipped::profiles(), "doga-bm")->profile->parameters.begin());
   }
@@ -171,14 +174,14 @@ TEST_CASE("a file overrides the profile of the program, also where only its base
     REQUIRE(at != std::string::npos);
     other.replace(at, 10, "port: 5001");
     own.write("doga-common.yaml", other);
-    const ProfileStore store({own.path()}, files::read_text_file, shipped::profiles());
+    const ProfileStore store({own.path()}, posix::source_disk(), shipped::profiles());
     CHECK(store.load("doga-bm").value().link.port == 5001);
     CHECK(store.load("doga-bmt").value().link.port == 5000);
   }
 }
 
 TEST_CASE("without any file the program knows its profiles, and their bases are none") {
-  const ProfileStore store({}, files::read_text_file, shipped::profiles());
+  const ProfileStore store({}, posix::source_disk(), shipped::profiles());
   std::vector<std::string> ids;
   for (const auto& entry : store.list()) {
     CHECK(entry.path == files::built_in);
@@ -204,9 +207,9 @@ TEST_CASE("a user's profile extends one of the program as it extends its file") 
     CAPTURE(body);
     test::TemporaryFolder own;
     own.write("mine.yaml", body);
-    const ProfileStore parsed({own.path(), folder});
-    const ProfileStore tabled({own.path(), folder}, files::read_text_file, shipped::profiles());
-    const ProfileStore alone({own.path()}, files::read_text_file, shipped::profiles());
+    const ProfileStore parsed({own.path(), folder}, posix::source_disk());
+    const ProfileStore tabled({own.path(), folder}, posix::source_disk(), shipped::profiles());
+    const ProfileStore alone({own.path()}, posix::source_disk(), shipped::profiles());
     const Profile expected = parsed.load("mine").value();
     CHECK(comparison(expected, tabled.load("mine").value()).differences ==
           std::vector<std::string>());
@@ -227,7 +230,7 @@ TEST_CASE("what does not fit a base of the program is told where it is extended"
             "  - {name: extra, title: Extra, register: 1152, encoding: u16, access: rw, evidence: "
             "manual, "
             "source: me}\n");
-  const ProfileStore store({own.path()}, files::read_text_file, shipped::profiles());
+  const ProfileStore store({own.path()}, posix::source_disk(), shipped::profiles());
   const auto loaded = store.load("mine");
   REQUIRE_FALSE(loaded);
   CHECK(loaded.error().message.find("shares register 1152") != std::string::npos);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "spindle/posix/disk.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/identification.hpp"
 #include "support/rig.hpp"
@@ -60,7 +61,7 @@ struct Bench : test::BmRig {
   work::Uninterruptible without_end{clock, interrupt, lines};
   Disk disk = {};
   std::string state_folder = {};
-  files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}};
+  files::ProfileStore profiles{{SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk()};
   files::Tools tools;
   ShowFrames show_frames = {};
   CommonOptions common = {};

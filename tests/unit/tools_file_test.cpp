@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "spindle/posix/disk.hpp"
+
 using namespace spindle;
 using files::load_tools;
 using files::Tools;
@@ -36,7 +38,7 @@ class ToolsFile {
 /// What is wrong, without the file's name.
 std::string fault(const std::string& text) {
   const ToolsFile file(text);
-  const auto tools = load_tools(file.path());
+  const auto tools = load_tools(file.path(), posix::source_disk());
   if (tools) return "nothing";
   CHECK(tools.error().code == Errc::bad_file);
   REQUIRE(tools.error().message.starts_with(file.path() + ":"));
@@ -53,7 +55,7 @@ TEST_CASE("the example of the contract, section 2.1") {
       "  conveyor1: {url: \"rtu:///dev/ttyUSB0?unit=3&baud=115200\", profile: orientalmotor-blv}\n"
       "groups:\n"
       "  line1: [station3, conveyor1]\n");
-  const auto tools = load_tools(file.path());
+  const auto tools = load_tools(file.path(), posix::source_disk());
   REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
   CHECK(tools->path == file.path());
   REQUIRE(tools->tools.size() == 2);
@@ -73,7 +75,7 @@ TEST_CASE("all torque units of the manual's family are known") {
   for (const char* unit : {"kgf.cm", "kgf.m", "N.m", "cN.m", "lbf.in", "ozf.in", "lbf.ft"}) {
     CAPTURE(unit);
     const ToolsFile file(std::string("tools: {a: {url: u, torque-unit: ") + unit + "}}\n");
-    const auto tools = load_tools(file.path());
+    const auto tools = load_tools(file.path(), posix::source_disk());
     REQUIRE(tools.has_value());
     CHECK(tools->tools[0].torque_unit == unit);
   }
@@ -118,7 +120,7 @@ TEST_CASE("faults are told with their place") {
 }
 
 TEST_CASE("a file that is not there") {
-  const auto tools = load_tools("/no/such/spindle.yaml");
+  const auto tools = load_tools("/no/such/spindle.yaml", posix::source_disk());
   REQUIRE_FALSE(tools.has_value());
   CHECK(describe(tools.error()) == "/no/such/spindle.yaml: no such file");
 }

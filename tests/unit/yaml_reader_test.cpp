@@ -52,11 +52,11 @@ TEST_CASE("order and places are kept; lines and columns count from 1") {
   const YamlNode& map = parsed.documents[0];
   REQUIRE(map.entries.size() == 2);
   CHECK(map.entries[0].key == "z");
-  CHECK(map.entries[0].key_at == Position{0, 2, 1});
-  CHECK(map.entries[0].value.at == Position{0, 2, 4});
+  CHECK(map.entries[0].key_at == SourceLocation{0, 2, 1});
+  CHECK(map.entries[0].value.at == SourceLocation{0, 2, 4});
   const YamlNode& inner = map.entries[1].value.items.at(0);
-  CHECK(inner.at == Position{0, 4, 5});
-  CHECK(inner.find("x")->items.at(1).at == Position{0, 4, 13});
+  CHECK(inner.at == SourceLocation{0, 4, 5});
+  CHECK(inner.find("x")->items.at(1).at == SourceLocation{0, 4, 13});
 }
 
 TEST_CASE("columns count bytes, as compilers do") {
@@ -209,15 +209,4 @@ TEST_CASE("findings: sorted by place, the same fault once") {
   CHECK(texts == Texts{"f:1:9: first", "f:2:1: second", "f:2:1: third", "g:1:1: last"});
   CHECK(findings.error().code == Errc::bad_file);
   CHECK(findings.error().message == "f:1:9: first (and 3 more faults)");
-}
-
-TEST_CASE("read_text_file: what cannot be read is bad_file") {
-  const auto missing = read_text_file("/no/such/file.yaml");
-  REQUIRE_FALSE(missing.has_value());
-  CHECK(missing.error().code == Errc::bad_file);
-  CHECK(describe(missing.error()) == "/no/such/file.yaml: no such file");
-  const auto folder = read_text_file(SPINDLE_SOURCE_DIR);
-  REQUIRE_FALSE(folder.has_value());
-  CHECK(folder.error().message == "is a folder, not a file");
-  CHECK(read_text_file(SPINDLE_SOURCE_DIR "/CMakeLists.txt")->starts_with("cmake_minimum"));
 }

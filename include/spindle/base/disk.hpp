@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spindle/base/error.hpp"
 
@@ -24,6 +25,10 @@ struct Disk {
   /// Whether there is surely nothing of this name. Where one may not look there may be something,
   /// and reading it says why not.
   std::function<bool(const std::string& path)> absent;
+  /// Whether two names are those of one file.
+  std::function<bool(const std::string& a, const std::string& b)> same_file;
+  /// The names of what is in a folder, in no order; none where it cannot be listed.
+  std::function<std::vector<std::string>(const std::string& folder)> list;
   /// A whole text. Refuses folders, and what is larger than any file of ours.
   std::function<Result<std::string>(const std::string& path)> read;
   /// All of the text or nothing: what was there stays whole until the new text is safely stored,

@@ -26,6 +26,7 @@ struct Ownership {
 struct Trust {
   unsigned self = 0;                     ///< the program's user
   std::vector<std::string> others = {};  ///< names or numbers of users, as `SPINDLE_TRUST` has them
+  bool everyone = false;                 ///< nothing is asked, as of the files of a source tree
 };
 
 /// Whether a file may decide what is written to a tool: it belongs to root, to the program's user

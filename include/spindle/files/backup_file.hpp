@@ -26,8 +26,8 @@ struct BackupLine {
   std::optional<Decimal> minimum = std::nullopt;
   std::optional<Decimal> maximum = std::nullopt;
   std::optional<catalogue::Missing> missing = std::nullopt;  ///< why there is no value
-  Place at = {};
-  Place value_at = {};
+  SourceLocation at = {};
+  SourceLocation value_at = {};
 };
 
 /// A backup file whose form is right, before it is asked what its names mean.

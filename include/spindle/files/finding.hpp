@@ -1,13 +1,18 @@
 #pragma once
 
+#include <compare>
+#include <cstddef>
 #include <string>
 
 namespace spindle::files {
 
-/// Line and column of something in a file, from 1; line 0: it is not there.
-struct Place {
+/// Where something stands in one of the files that are read together. Line and column count from 1,
+/// columns in bytes as compilers do; line 0: it is not there.
+struct SourceLocation {
+  std::size_t file = 0;  ///< as given by Diagnostics::add_file()
   int line = 0;
   int column = 0;
+  friend auto operator<=>(const SourceLocation&, const SourceLocation&) = default;
 };
 
 /// One fault in a file.

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/files/finding.hpp"
-#include "spindle/files/read_text.hpp"
 #include "spindle/files/shipped_profile.hpp"
 
 namespace spindle::files {
@@ -41,9 +41,8 @@ bool names_profile_file(std::string_view text);
 /// copies share it. Several threads may ask.
 class ProfileStore {
  public:
-  /// Every file, bases included, is read by `read`. `shipped` must outlive the store.
-  explicit ProfileStore(std::vector<std::string> folders, ReadText read = read_text_file,
-                        ShippedProfiles shipped = {});
+  /// Every file, bases included, has to be trusted. `shipped` must outlive the store.
+  ProfileStore(std::vector<std::string> folders, Disk disk, ShippedProfiles shipped = {});
   ProfileStore(ProfileStore&&) noexcept;
   ProfileStore& operator=(ProfileStore&&) noexcept;
   ~ProfileStore();

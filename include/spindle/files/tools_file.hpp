@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
-#include "spindle/files/read_text.hpp"
 
 namespace spindle::files {
 
@@ -21,9 +21,9 @@ struct Tool {
   std::string profile = {};
   std::string torque_unit = {};            ///< empty: unknown
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
-  Place url_at = {};
-  Place profile_at = {};
-  Place verified_at = {};
+  SourceLocation url_at = {};
+  SourceLocation profile_at = {};
+  SourceLocation verified_at = {};
 };
 
 struct Tools {
@@ -37,13 +37,13 @@ struct Tools {
 /// Whether a word may stand for tools of a tools file: it is a tool's name, or a group's.
 bool may_name_tools(std::string_view word);
 
-/// Strict: unknown and duplicate keys, unknown members of groups and torque units are `bad_file`
-/// with file:line:col.
-Result<Tools> load_tools(const std::string& path, const ReadText& read = read_text_file);
+/// The file has to be trusted. Strict: unknown and duplicate keys, unknown members of groups and
+/// torque units are `bad_file` with file:line:col.
+Result<Tools> load_tools(const std::string& path, const Disk& disk);
 
 /// The same for who must not be sent away to mend the file first: what can be read of it, with
 /// names that are given twice as often as they are there.
-Tools salvage_tools(const std::string& path, const ReadText& read = read_text_file);
+Tools salvage_tools(const std::string& path, const Disk& disk);
 
 /// What could be read of a tools file, and everything that load_tools() would refuse in it.
 struct CheckedTools {
@@ -52,6 +52,6 @@ struct CheckedTools {
 };
 
 /// Error only when the file cannot be read.
-Result<CheckedTools> check_tools(const std::string& path, const ReadText& read = read_text_file);
+Result<CheckedTools> check_tools(const std::string& path, const Disk& disk);
 
 }  // namespace spindle::files

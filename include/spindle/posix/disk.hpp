@@ -11,4 +11,8 @@ namespace spindle::posix {
 /// program's own, whose profiles and tools files are read: "anna,1001".
 Disk local_disk(std::string_view trusted = {});
 
+/// The same for what reads a source tree, and no more: its files are trusted whichever user can
+/// change them.
+Disk source_disk();
+
 }  // namespace spindle::posix

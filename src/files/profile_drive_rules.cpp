@@ -1,28 +1,9 @@
-#include "files/profile_drive.hpp"
-
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <limits>
-#include <map>
-#include <vector>
-
-#include "files/profile_entries.hpp"
-#include "files/yaml_map.hpp"
+#include "files/profile_rules.hpp"
 
 namespace spindle::files {
 namespace {
-
-constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
-
-constexpr auto code_table_words =
-    enum_table<catalogue::CodeTable>({{"error-codes", catalogue::CodeTable::error},
-                                      {"warning-codes", catalogue::CodeTable::warning},
-                                      {"refusals", catalogue::CodeTable::refusal},
-                                      {"none", catalogue::CodeTable::none}});
-
-// ---- rules ----
 
 class DriveRules {
  public:
@@ -47,7 +28,7 @@ class DriveRules {
                                                  : &draft_.profile.parameters[found->second];
   }
 
-  const catalogue::Parameter* require(const std::string& name, const Position& at) {
+  const catalogue::Parameter* require(const std::string& name, const SourceLocation& at) {
     const catalogue::Parameter* parameter = known(name);
     if (draft_.lacks(name)) {
       findings_.add_once(at, fmt::format("'{}' is no parameter of this profile", name));
@@ -175,57 +156,6 @@ class DriveRules {
 };
 
 }  // namespace
-
-void read_refusals(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  YamlMap map(node, findings);
-  auto [refusals, need] = section_of(draft.profile.refusals);
-  assign(refusals.parameter, map.text("parameter", need));
-  if (const YamlNode* codes = map.get("codes", need)) {
-    read_codes(*codes, refusals.codes, findings);
-  }
-  if (const YamlNode* busy = map.get("busy")) {
-    expect(*busy, YamlNode::Kind::sequence, findings);
-    std::vector<std::int64_t> codes;
-    for (const YamlNode& item : busy->items) {
-      const auto code = to_unsigned(item, last_register, findings);
-      if (code) codes.push_back(static_cast<std::int64_t>(*code));
-    }
-    refusals.busy = std::move(codes);
-  }
-  assign(refusals.retry_every, map.duration("retry-every"));
-  assign(refusals.give_up_after, map.duration("give-up-after"));
-  map.finish();
-}
-
-void read_alarm_lists(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  expect(node, YamlNode::Kind::sequence, findings);
-  std::vector<catalogue::AlarmList> lists;
-  for (const YamlNode& item : node.items) {
-    YamlMap map(item, findings);
-    catalogue::AlarmList list;
-    assign(list.name, map.text("list", Need::required));
-    if (auto parameter = map.text("parameters", Need::required)) {
-      list.parameters = {std::move(*parameter)};
-    }
-    assign(list.codes, map.word("codes", "table", code_table_words, Need::required));
-    map.finish();
-    lists.push_back(std::move(list));
-  }
-  draft.profile.alarm_lists = std::move(lists);
-}
-
-void read_alarm_reset(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  assign(draft.profile.alarm_reset, to_text(node, findings));
-}
-
-void read_watched(const YamlNode& node, ProfileDraft& draft, Diagnostics& findings) {
-  expect(node, YamlNode::Kind::sequence, findings);
-  std::vector<catalogue::Text> names;
-  for (const YamlNode& item : node.items) {
-    if (auto name = to_text(item, findings)) names.emplace_back(std::move(*name));
-  }
-  draft.profile.watched = std::move(names);
-}
 
 void check_drive_rules(const ProfileDraft& draft, Diagnostics& findings) {
   DriveRules(draft, findings).check();

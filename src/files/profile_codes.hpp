@@ -1,0 +1,19 @@
+#pragma once
+
+#include "files/fields.hpp"
+#include "spindle/catalogue/profile.hpp"
+
+namespace spindle::files {
+
+/// A map of codes, or a list of such maps with the evidence that each shares; laid over what is
+/// there.
+template <>
+struct ValueReader<catalogue::CodeTexts> {
+  static constexpr std::string_view value = "texts by code";
+  static bool read(const YamlNode& node, catalogue::CodeTexts& target, const Asked& asked);
+};
+
+/// The keys of one map of such a list.
+std::vector<Key> code_list_keys();
+
+}  // namespace spindle::files

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cctype>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "files/known_keys.hpp"
+#include "support/manual.hpp"
+
+/// The keys of a kind of file as mdoc(7) text.
+namespace spindle::test {
+
+/// "one of: tcp, rtu" where the value is a word.
+inline std::string value_of(const files::Key& key) {
+  if (key.words == nullptr) return std::string(key.value);
+  return fmt::format("one of: {}", fmt::join(key.words(), ", "));
+}
+
+inline std::string_view need_of(const files::Key& key) {
+  switch (key.need) {
+    case files::Need::required:
+      return "yes";
+    case files::Need::inherited:
+      return "here or in a base";
+    case files::Need::optional:
+      break;
+  }
+  return {};
+}
+
+/// A row for each key; below one that has a map the keys of that map.
+inline std::string key_rows(const std::vector<files::Key>& keys, std::string_view indent = {}) {
+  constexpr std::string_view step = "\\ \\ ";
+  std::string rows;
+  for (const files::Key& key : keys) {
+    const std::string_view space = indent.empty() ? "" : " Ns ";
+    rows += fmt::format(".It {}{}Ic {} Ta {}{}Ta\n", indent, space, mdoc_argument(key.name),
+                        need_of(key), need_of(key).empty() ? "" : " ");
+    rows += mdoc_prose(value_of(key));
+    if (key.inner != nullptr) rows += key_rows(key.inner(), fmt::format("{}{}", indent, step));
+  }
+  return rows;
+}
+
+/// "KEYS_ALARM_LISTS" for the list "alarm-lists".
+inline std::string name_of_keys(std::string_view map) {
+  std::string name = "KEYS_";
+  for (const char c : map) {
+    name += c == '-' ? '_' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  }
+  return name;
+}
+
+inline std::string key_list(const files::KeyList& list) {
+  return fmt::format(
+      ".Pp\nKeys of\n.Ic {} :\n"
+      ".Bl -column \"controller\\-model\" \"here or in a base\" \"decimal number\"\n"
+      ".It Sy Key Ta Sy Needed Ta Sy Value\n{}.El\n",
+      mdoc_argument(list.map), key_rows(list.keys));
+}
+
+/// What a group of parameters may say for all of them.
+inline std::string group_keys(const std::vector<files::Key>& keys) {
+  std::vector<std::string> names;
+  for (const files::Key& key : keys) {
+    if (key.shared) names.push_back(".Ic " + mdoc_argument(key.name));
+  }
+  return fmt::format("{} .\n", fmt::join(names, " ,\n"));
+}
+
+/// The placeholders for each list of the profile's keys, and GROUP_KEYS.
+inline std::vector<Placeholder> key_placeholders() {
+  std::vector<Placeholder> placeholders;
+  for (const files::KeyList& list : files::profile_keys()) {
+    placeholders.push_back({name_of_keys(list.map), key_list(list)});
+    if (list.map == "parameters") placeholders.push_back({"GROUP_KEYS", group_keys(list.keys)});
+  }
+  return placeholders;
+}
+
+}  // namespace spindle::test
