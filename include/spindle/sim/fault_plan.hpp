@@ -69,7 +69,7 @@ enum class FaultNeed : std::uint8_t {
   network,      ///< the header of Modbus TCP
   serial_line,  ///< RTU
   events,       ///< frames that the tool sends unasked
-  screwdriver,  ///< the tool of BmOptions, which has them
+  screwdriver,  ///< a tool that an operator works with, see Abilities
 };
 FaultNeed need_of(FaultKind kind);
 

@@ -1,11 +1,10 @@
-#include "spindle/sim/plain_tool.hpp"
-
 #include <doctest/doctest.h>
 
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "spindle/sim/simulated_tool.hpp"
 #include "support/rig.hpp"
 
 using namespace spindle;
@@ -16,8 +15,8 @@ using modbus::RegisterTable;
 namespace {
 
 /// A simulated tool of a profile that the program does not ship.
-struct Plain : test::PlainRig {
-  explicit Plain(const std::string& name, const sim::PlainOptions& how = {})
+struct Plain : test::DeviceRig {
+  explicit Plain(const std::string& name, const sim::DeviceOptions& how = {})
       : Rig(test::product(name), how) {}
 
   /// Empty: refused.
