@@ -129,7 +129,7 @@ Pdu BlvUnit::answer(ConnectionId connection, const Pdu& request, TimePoint now) 
 }
 
 /// Why, unless it was said already, follows from the exception.
-void BlvUnit::note(const Refusal& refused) {
+void BlvUnit::on_refusal(const Refusal& refused) {
   const auto exception = static_cast<ExceptionCode>(refused.exception);
   const bool is_unknown = exception == ExceptionCode::illegal_function ||
                           exception == ExceptionCode::illegal_data_address;
@@ -180,11 +180,11 @@ BlvUnit::Outcome BlvUnit::write_value(const Cell& cell, std::uint32_t raw, TimeP
     if (Outcome refused = (this->*command->handler)(now)) return refused;
   }
   bank().set_raw(cell.place, raw);
-  if (command == commands_.end()) obey(cell.place, raw, now);
+  if (command == commands_.end()) on_write(cell.place, raw, now);
   return std::nullopt;
 }
 
-void BlvUnit::obey(const Place& /*place*/, std::uint32_t /*raw*/, TimePoint now) { drive(now); }
+void BlvUnit::on_write(const Place& /*place*/, std::uint32_t /*raw*/, TimePoint now) { drive(now); }
 
 // ---- maintenance commands ----
 
@@ -370,7 +370,7 @@ std::uint32_t BlvUnit::status_word(TimePoint now) const {
 }
 
 // Monitors are looked at only when a client reads.
-void BlvUnit::show(TimePoint now) {
+void BlvUnit::before_read(TimePoint now) {
   const bool alarm = bank().get(run_.monitor.alarm) != 0;
   const std::int64_t speed = motor_.speed(now);
   bank().set(run_.monitor.status, status_word(now));

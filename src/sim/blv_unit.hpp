@@ -46,9 +46,9 @@ class BlvUnit final : public Unit {
 
   Outcome write(ConnectionId connection, std::uint16_t first, RegisterView values,
                 TimePoint now) override;
-  void obey(const Place& place, std::uint32_t raw, TimePoint now) override;
-  void note(const Refusal& refused) override;
-  void show(TimePoint now) override;
+  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void on_refusal(const Refusal& refused) override;
+  void before_read(TimePoint now) override;
   [[nodiscard]] std::optional<TimePoint> next_step() const override;
   void step(TimePoint now) override;
 

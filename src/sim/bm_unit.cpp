@@ -44,7 +44,7 @@ BmUnit::BmUnit(const catalogue::Profile& profile, const catalogue::SimulationSpe
       {"lock", &BmUnit::lock},
       {"start", &BmUnit::start_or_stop},
       {"select-preset", &BmUnit::select_preset},
-      {"direction", &BmUnit::turn_round},
+      {"direction", &BmUnit::select_direction},
   }};
   for (const catalogue::Action& action : profile.actions) {
     const auto* const known = std::find_if(handlers.begin(), handlers.end(), [&](const auto& row) {
@@ -60,7 +60,7 @@ BmUnit::BmUnit(const catalogue::Profile& profile, const catalogue::SimulationSpe
 
 // ---- remote inputs ----
 
-void BmUnit::obey(const Place& place, std::uint32_t raw, TimePoint now) {
+void BmUnit::on_write(const Place& place, std::uint32_t raw, TimePoint now) {
   const auto value = static_cast<std::uint16_t>(raw);
   for (const RemoteInput& input : inputs_) {
     const bool is_meant = input.action.address.value == place.address;
@@ -95,7 +95,8 @@ void BmUnit::select_preset(const catalogue::Action& /*action*/, std::uint16_t va
   emit(EventKind::preset_change, {}, now);
 }
 
-void BmUnit::turn_round(const catalogue::Action& /*action*/, std::uint16_t value, TimePoint now) {
+void BmUnit::select_direction(const catalogue::Action& /*action*/, std::uint16_t value,
+                              TimePoint now) {
   if (run_) return;
   bank().set("status.direction", value);
   emit(EventKind::direction_change, {}, now);
@@ -158,7 +159,7 @@ void BmUnit::finish_run(TimePoint now) {
   bank().set("status.torque-up", reached ? yes : no);
   bank().set("status.fastening-ok", reached ? yes : no);
   if (reached) count_screw();
-  show(now);
+  before_read(now);
   show_ready();
   EventData data{.fastening_time = milliseconds_in(elapsed),
                  .motion = motion_at(run.plan, elapsed),
@@ -177,7 +178,7 @@ void BmUnit::count_screw() {
   bank().set("status.screws-remaining", left == 1 ? screws_ : static_cast<std::uint16_t>(left - 1));
 }
 
-void BmUnit::show(TimePoint now) {
+void BmUnit::before_read(TimePoint now) {
   const Motion motion = run_ ? motion_at(run_->plan, now - run_->begin) : Motion{};
   bank().set("status.speed", motion.speed);
   bank().set("status.torque", motion.torque);
@@ -216,7 +217,7 @@ void BmUnit::raise_alarm(std::int64_t code, TimePoint now) {
   bank().set("status.running", no);
   bank().set("status.alarm", code);
   bank().set("alarm.1", code);
-  show(now);
+  before_read(now);
   show_ready();
   emit(EventKind::error, {.error = static_cast<std::uint16_t>(code)}, now);
 }
@@ -229,7 +230,7 @@ void BmUnit::power_cycle(TimePoint now) {
                            "status.alarm", "alarm.1", "alarm.2"}) {
     bank().set(name, 0);
   }
-  show(now);
+  before_read(now);
   show_ready();
 }
 

@@ -48,8 +48,8 @@ class BmUnit final : public Unit {
     std::uint16_t error = 0;
   };
 
-  void show(TimePoint now) override;
-  void obey(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void before_read(TimePoint now) override;
+  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
   [[nodiscard]] std::optional<TimePoint> next_step() const override;
   void step(TimePoint now) override { finish_run(now); }
 
@@ -57,7 +57,7 @@ class BmUnit final : public Unit {
   void lock(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void start_or_stop(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void select_preset(const catalogue::Action& action, std::uint16_t value, TimePoint now);
-  void turn_round(const catalogue::Action& action, std::uint16_t value, TimePoint now);
+  void select_direction(const catalogue::Action& action, std::uint16_t value, TimePoint now);
 
   [[nodiscard]] bool can_start() const;
   [[nodiscard]] std::uint16_t word(std::string_view name) const {

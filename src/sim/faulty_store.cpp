@@ -19,7 +19,7 @@ void FaultyStore::store(const Place& place, std::uint32_t raw, RegisterBank& ban
 
 const Fault* FaultyStore::struck(FaultKind kind) const {
   const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const Fault& fault) {
-    return fault.kind == kind && fault.strikes(writes_);
+    return fault.kind == kind && fault.applies_to(writes_);
   });
   return found == faults_.end() ? nullptr : &*found;
 }

@@ -58,7 +58,7 @@ const Parameter* ProfileUnit::find(const std::string& name) const {
 
 // ---- commands ----
 
-void ProfileUnit::obey(const Place& place, std::uint32_t raw, TimePoint now) {
+void ProfileUnit::on_write(const Place& place, std::uint32_t raw, TimePoint now) {
   for (const catalogue::Action& action : actions_) {
     if (place.covers(action.address.value)) act(action, raw);
   }
@@ -154,7 +154,7 @@ void ProfileUnit::show_speed(const std::string& name, TimePoint now) {
   bank().set(name, std::llround(is_signed ? speed : std::fabs(speed)));
 }
 
-void ProfileUnit::show(TimePoint now) {
+void ProfileUnit::before_read(TimePoint now) {
   if (!run_) return;
   if (!run_->monitor.status.empty()) bank().set(run_->monitor.status, status(now));
   show_speed(run_->monitor.command_speed, now);

@@ -29,8 +29,8 @@ class ProfileUnit final : public Unit {
   /// What the motor is told to do.
   enum class Motion : std::uint8_t { stop, stop_at_once, forward, reverse };
 
-  void show(TimePoint now) override;
-  void obey(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void before_read(TimePoint now) override;
+  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
   void act(const catalogue::Action& action, std::uint32_t raw);
 
   void drive(TimePoint now);

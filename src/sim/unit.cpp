@@ -22,7 +22,7 @@ Unit::Unit(const catalogue::Profile& profile, const catalogue::SimulationSpec& s
       identity_(make_identity(profile.identity, start, options)),
       limit_exception_(start.limit_exception),
       permanent_alarms_(start.permanent_alarms),
-      told_(start.events),
+      event_values_(start.events),
       rundown_every_(options.rundown_every),
       ng_every_(options.ng_every),
       burst_(options.burst) {}
@@ -37,7 +37,7 @@ bool Unit::is_permanent(std::int64_t alarm) const {
 Pdu Unit::answer(ConnectionId connection, const Pdu& request, TimePoint now) {
   auto response = respond(connection, request, now);
   if (response) return std::move(*response);
-  note(response.error());
+  on_refusal(response.error());
   return modbus::exception_response(request.function, response.error().exception);
 }
 
@@ -72,7 +72,7 @@ Unit::Answer Unit::read(const modbus::ReadRequest& wanted, TimePoint now) {
   if (wanted.count > link_.max_read) {
     return tl::unexpected(refusal(ExceptionCode::illegal_data_value));
   }
-  show(now);
+  before_read(now);
   const auto registers = bank_.read(wanted.table, wanted.first.value, wanted.count);
   if (!registers) return tl::unexpected(refusal(ExceptionCode::illegal_data_address));
   events_.note_read(wanted);
@@ -100,7 +100,7 @@ Unit::Outcome Unit::write(ConnectionId connection, std::uint16_t first, Register
   for (const auto& [place, raw] : changes) {
     store_.store(place, raw, bank_);
     if (events_.is_arming(place.address)) events_.arm(connection, raw, now);
-    obey(place, raw, now);
+    on_write(place, raw, now);
   }
   return std::nullopt;
 }
@@ -118,11 +118,11 @@ void Unit::advance(TimePoint now) {
   if (has_operator && !next_rundown_) next_rundown_ = now + *rundown_every_;
   for (auto due = next_change(); due && *due <= now; due = next_change()) {
     if (const auto own = next_step(); own && *own <= *due) step(*due);
-    if (next_rundown_ && *next_rundown_ <= *due) work(*due);
+    if (next_rundown_ && *next_rundown_ <= *due) run_down(*due);
   }
 }
 
-void Unit::work(TimePoint now) {
+void Unit::run_down(TimePoint now) {
   next_rundown_ = now + *rundown_every_;
   const bool fails = ng_every_ != 0 && (rundowns_ + 1) % ng_every_ == 0;
   if (operate(fails ? Rundown::ng : Rundown::ok, burst_, now)) ++rundowns_;
@@ -140,11 +140,12 @@ bool Unit::operate(Rundown outcome, unsigned results, TimePoint now) {
 void Unit::happen(EventKind kind, TimePoint now) {
   if (!events_.knows(kind)) return;
   const auto says = [kind](const auto& event) { return event.kind == kind; };
-  const auto choices = static_cast<std::size_t>(std::count_if(told_.begin(), told_.end(), says));
+  const auto choices =
+      static_cast<std::size_t>(std::count_if(event_values_.begin(), event_values_.end(), says));
   EventBlock::Values values;
   if (choices > 0) {
     std::size_t turn = turns_[kind]++ % choices;
-    const auto chosen = std::find_if(told_.begin(), told_.end(),
+    const auto chosen = std::find_if(event_values_.begin(), event_values_.end(),
                                      [&](const auto& event) { return says(event) && turn-- == 0; });
     for (const auto& value : chosen->values) values.emplace_back(value.pattern, value.raw);
   }

@@ -68,15 +68,15 @@ class Unit {
   // Hooks.
 
   /// Clients are about to read: what the device shows of itself becomes that of now.
-  virtual void show(TimePoint now) { static_cast<void>(now); }
+  virtual void before_read(TimePoint now) { static_cast<void>(now); }
   /// Some values are written, as many as the device takes. All of them or none, each one whole: a
   /// register alone changes one half of its value.
   virtual Outcome write(ConnectionId connection, std::uint16_t first, RegisterView values,
                         TimePoint now);
   /// A value was written and stored.
-  virtual void obey(const Place& place, std::uint32_t raw, TimePoint now) = 0;
+  virtual void on_write(const Place& place, std::uint32_t raw, TimePoint now) = 0;
   /// A request is about to be refused.
-  virtual void note(const Refusal& refused) { static_cast<void>(refused); }
+  virtual void on_refusal(const Refusal& refused) { static_cast<void>(refused); }
   /// When something will happen by itself, beside what the operator does; and its moment has come.
   [[nodiscard]] virtual std::optional<TimePoint> next_step() const { return std::nullopt; }
   virtual void step(TimePoint now) { static_cast<void>(now); }
@@ -92,7 +92,7 @@ class Unit {
   Answer respond(ConnectionId connection, const modbus::Pdu& request, TimePoint now);
   Answer read(const modbus::ReadRequest& wanted, TimePoint now);
   Outcome check_write(std::uint16_t first, std::size_t count) const;
-  void work(TimePoint now);
+  void run_down(TimePoint now);
 
   std::uint8_t address_;
   catalogue::LinkSpec link_;
@@ -102,7 +102,7 @@ class Unit {
   Bytes identity_;
   std::uint8_t limit_exception_;
   catalogue::List<std::int64_t> permanent_alarms_;
-  catalogue::List<catalogue::SimulationSpec::Event> told_;  ///< what events say
+  catalogue::List<catalogue::SimulationSpec::Event> event_values_;  ///< what events say
   std::map<catalogue::EventKind, std::size_t> turns_ = {};
 
   std::optional<Duration> rundown_every_;
