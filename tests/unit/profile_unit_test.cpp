@@ -15,8 +15,8 @@ using modbus::RegisterTable;
 namespace {
 
 /// A simulated tool of a profile that the program does not ship.
-struct Plain : test::DeviceRig {
-  explicit Plain(const std::string& name, const sim::DeviceOptions& how = {})
+struct Simulated : test::DeviceRig {
+  explicit Simulated(const std::string& name, const sim::DeviceOptions& how = {})
       : Rig(test::product(name), how) {}
 
   /// Empty: refused.
@@ -33,75 +33,137 @@ struct Plain : test::DeviceRig {
 }  // namespace
 
 TEST_CASE("a flag is cleared by whatever reads it, and set by the next result") {
-  Plain plain("kducer");
-  CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
-  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
-  CHECK(plain.read(RegisterTable::input, 295, 67).has_value());
-  CHECK(plain.read(RegisterTable::input, 294) == Registers{1});
-  CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
-  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
-  CHECK(plain.read(RegisterTable::input, 290, 10) == std::nullopt);
-  CHECK(plain.read(RegisterTable::input, 294, 4)->front() == 1);
-  CHECK(plain.read(RegisterTable::input, 294) == Registers{0});
+  Simulated device("kducer");
+  CHECK(device.read(RegisterTable::input, 294) == Registers{0});
+  device.tool->happen(EventKind::fastening_ok, device.clock.now());
+  CHECK(device.read(RegisterTable::input, 295, 67).has_value());
+  CHECK(device.read(RegisterTable::input, 294) == Registers{1});
+  CHECK(device.read(RegisterTable::input, 294) == Registers{0});
+  device.tool->happen(EventKind::fastening_ok, device.clock.now());
+  CHECK(device.read(RegisterTable::input, 290, 10) == std::nullopt);
+  CHECK(device.read(RegisterTable::input, 294, 4)->front() == 1);
+  CHECK(device.read(RegisterTable::input, 294) == Registers{0});
 }
 
 TEST_CASE("what events say is given in turn, by kind") {
-  Plain plain("kducer");
+  Simulated device("kducer");
   std::vector<std::uint16_t> torques;
   for (const EventKind kind : {EventKind::fastening_ok, EventKind::fastening_ok,
                                EventKind::fastening_ng, EventKind::fastening_ok}) {
-    plain.tool->happen(kind, plain.clock.now());
-    torques.push_back(plain.read(RegisterTable::input, 318)->front());
+    device.tool->happen(kind, device.clock.now());
+    torques.push_back(device.read(RegisterTable::input, 318)->front());
   }
   CHECK(torques == std::vector<std::uint16_t>{152, 149, 88, 152});
-  CHECK(plain.read(RegisterTable::input, 303) == Registers{1});
+  CHECK(device.read(RegisterTable::input, 303) == Registers{1});
 }
 
 TEST_CASE("results come by themselves, and every so many are NG") {
-  Plain plain("countermatic", {.rundown_every = 2s, .ng_every = 2});
-  plain.tool->advance(plain.clock.now());
-  plain.clock.advance(6s);
-  CHECK(plain.read(RegisterTable::holding, 1000, 2) == Registers{3, 1});
-  CHECK(plain.tool->take_pushes().empty());
-  plain.clock.advance(2s);
-  CHECK(plain.read(RegisterTable::holding, 1000, 5) == Registers{4, 2, 0xFFFE, 0xEE8F, 7});
+  Simulated device("countermatic", {.rundown_every = 2s, .ng_every = 2});
+  device.tool->advance(device.clock.now());
+  device.clock.advance(6s);
+  CHECK(device.read(RegisterTable::holding, 1000, 2) == Registers{3, 1});
+  CHECK(device.tool->take_pushes().empty());
+  device.clock.advance(2s);
+  CHECK(device.read(RegisterTable::holding, 1000, 5) == Registers{4, 2, 0xFFFE, 0xEE8F, 7});
 }
 
 TEST_CASE("parameters are stored, and what does not exist or is too long is refused") {
-  Plain plain("countermatic");
-  CHECK(plain.read(RegisterTable::holding, 10) == Registers{500});
-  CHECK(plain.write(10, 450) == std::nullopt);
-  CHECK(plain.read(RegisterTable::holding, 10) == Registers{450});
-  CHECK(plain.write(11, 1) == 2);
-  CHECK(plain.write(1000, 1) == 2);
-  CHECK(plain.read(RegisterTable::holding, 1000, 21) == std::nullopt);
-  CHECK(plain.read(RegisterTable::input, 1000) == std::nullopt);
-  CHECK(modbus::exception_of(plain.ask(modbus::report_server_id_request()).value()) == 1);
+  Simulated device("countermatic");
+  CHECK(device.read(RegisterTable::holding, 10) == Registers{500});
+  CHECK(device.write(10, 450) == std::nullopt);
+  CHECK(device.read(RegisterTable::holding, 10) == Registers{450});
+  CHECK(device.write(11, 1) == 2);
+  CHECK(device.write(1000, 1) == 2);
+  CHECK(device.read(RegisterTable::holding, 1000, 21) == std::nullopt);
+  CHECK(device.read(RegisterTable::input, 1000) == std::nullopt);
+  CHECK(modbus::exception_of(device.ask(modbus::report_server_id_request()).value()) == 1);
 }
 
 TEST_CASE("an alarm shows, and the action that resets it shows, too") {
-  Plain plain("countermatic", {.alarms = {{.code = 7, .after = 1s}}});
-  plain.tool->advance(plain.clock.now());
-  plain.clock.advance(1s);
-  CHECK(plain.read(RegisterTable::holding, 20) == Registers{7});
-  CHECK(plain.read(RegisterTable::holding, 1001) == Registers{3});
-  CHECK(plain.write(30, 1) == std::nullopt);
-  CHECK(plain.read(RegisterTable::holding, 20) == Registers{0});
+  Simulated device("countermatic", {.alarms = {{.code = 7, .after = 1s}}});
+  device.tool->advance(device.clock.now());
+  device.clock.advance(1s);
+  CHECK(device.read(RegisterTable::holding, 20) == Registers{7});
+  CHECK(device.read(RegisterTable::holding, 1001) == Registers{3});
+  CHECK(device.write(30, 1) == std::nullopt);
+  CHECK(device.read(RegisterTable::holding, 20) == Registers{0});
 }
 
 TEST_CASE("faults of a tool are felt") {
-  Plain plain("countermatic", {.faults = {sim::parse_fault("ignore-write@1").value()}});
-  CHECK(plain.write(10, 450) == std::nullopt);
-  CHECK(plain.read(RegisterTable::holding, 10) == Registers{500});
-  CHECK(plain.write(10, 450) == std::nullopt);
-  CHECK(plain.read(RegisterTable::holding, 10) == Registers{450});
+  Simulated device("countermatic", {.faults = {sim::parse_fault("ignore-write@1").value()}});
+  CHECK(device.write(10, 450) == std::nullopt);
+  CHECK(device.read(RegisterTable::holding, 10) == Registers{500});
+  CHECK(device.write(10, 450) == std::nullopt);
+  CHECK(device.read(RegisterTable::holding, 10) == Registers{450});
 }
 
 TEST_CASE("a reboot counts from 0, and keeps what is stored") {
-  Plain plain("countermatic");
-  plain.tool->happen(EventKind::fastening_ok, plain.clock.now());
-  plain.write(10, 450);
-  plain.tool->reboot(plain.clock.now());
-  CHECK(plain.read(RegisterTable::holding, 1000) == Registers{0});
-  CHECK(plain.read(RegisterTable::holding, 10) == Registers{450});
+  Simulated device("countermatic");
+  device.tool->happen(EventKind::fastening_ok, device.clock.now());
+  device.write(10, 450);
+  device.tool->reboot(device.clock.now());
+  CHECK(device.read(RegisterTable::holding, 1000) == Registers{0});
+  CHECK(device.read(RegisterTable::holding, 10) == Registers{450});
+}
+
+TEST_CASE("registers, events and a motor on a serial line need a profile only") {
+  Simulated press("servo-press",
+                  {.units = {3}, .rundown_every = 2s, .alarms = {{.code = 7, .after = 5s}}});
+  press.tool->advance(press.clock.now());
+  const auto ask = [&](const modbus::Pdu& request) { return press.ask(request, 3).value(); };
+  const auto read = [&](std::uint16_t first) {
+    return modbus::registers_of(ask(modbus::read_request(RegisterTable::holding, {first}, 1)))[0];
+  };
+  const auto write = [&](std::uint16_t first, const Registers& words) {
+    return modbus::exception_of(ask(modbus::write_request({first}, RegisterView(words))));
+  };
+  CHECK_FALSE(press.ask(modbus::report_server_id_request(), 4).has_value());
+  CHECK(modbus::server_id_of(ask(modbus::report_server_id_request())).size() == 3);
+  CHECK(ask(modbus::loopback_request(7)) == modbus::loopback_request(7));
+  CHECK(press.tool->required_gap() == 4ms);
+
+  CHECK(write(0, {1, 900}) == std::nullopt);
+  press.clock.advance(4s);
+  CHECK(read(10) == 1);
+  CHECK(read(11) == 900);
+  CHECK(read(100) == 2);
+  CHECK(read(102) == 42);
+
+  press.clock.advance(1s);
+  CHECK(read(12) == 7);
+  CHECK(read(101) == 3);
+  press.clock.advance(1s);
+  CHECK(read(10) == 0);
+  CHECK(write(0, {0}) == std::nullopt);
+  CHECK(write(20, {1}) == std::nullopt);
+  CHECK(read(12) == 0);
+}
+
+TEST_CASE("several registers are written all or none, and none behind the last address") {
+  Simulated press("servo-press", {.units = {1}});
+  CHECK(static_cast<test::DeviceRig&>(press).write(1, Registers{900, 0, 60'000}) == 3);
+  CHECK(press.read(RegisterTable::holding, 1) == Registers{600});
+  CHECK(static_cast<test::DeviceRig&>(press).write(1, Registers{900, 0, 50'000}) == 0);
+  CHECK(press.read(RegisterTable::holding, 1, 3) == Registers{900, 0, 50'000});
+  CHECK(static_cast<test::DeviceRig&>(press).write(65535, Registers{1, 1}) == 2);
+}
+
+TEST_CASE("an action shows until the value that ends it") {
+  Simulated press("servo-press", {.units = {1}});
+  CHECK(press.write(21, 1) == std::nullopt);
+  CHECK(press.read(RegisterTable::holding, 13) == Registers{1});
+  CHECK(press.write(21, 0) == std::nullopt);
+  CHECK(press.read(RegisterTable::holding, 13) == Registers{0});
+}
+
+TEST_CASE("some alarms end only with the power, which keeps parameters and no command") {
+  Simulated press("servo-press", {.units = {1}});
+  press.write(0, 1);
+  press.write(1, 900);
+  press.tool->raise_alarm(1, 9, press.clock.now());
+  press.write(20, 1);
+  CHECK(press.read(RegisterTable::holding, 12) == Registers{9});
+  press.tool->power_cycle(1, press.clock.now());
+  CHECK(press.read(RegisterTable::holding, 12) == Registers{0});
+  CHECK(press.read(RegisterTable::holding, 0, 2) == Registers{0, 900});
 }
