@@ -92,8 +92,8 @@ std::unique_ptr<device::Stopper> WordSetup::stopper(catalogue::StopMode mode) co
 Duration WordSetup::interval(Duration usual) const {
   const auto& watchdog = plan_->watchdog ? plan_->watchdog : found_.watchdog;
   if (!watchdog || watchdog->number == Decimal(0)) return usual;
-  const Duration bites = std::chrono::milliseconds(watchdog->number.mantissa());
-  return std::min(usual, bites / looks_per_watchdog);
+  const Duration watchdog_period = std::chrono::milliseconds(watchdog->number.mantissa());
+  return std::min(usual, watchdog_period / looks_per_watchdog);
 }
 
 std::string WordSetup::hint_not_started() const {
