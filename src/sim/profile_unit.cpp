@@ -7,7 +7,6 @@
 namespace spindle::sim {
 namespace {
 
-using catalogue::CommandRegisterSpec;
 using catalogue::Parameter;
 
 /// Between standstill and any speed.

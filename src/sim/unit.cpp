@@ -1,6 +1,8 @@
 #include "unit.hpp"
 
 #include <algorithm>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "identity.hpp"
@@ -35,48 +37,58 @@ bool Unit::is_permanent(std::int64_t alarm) const {
 // ---- requests ----
 
 Pdu Unit::answer(ConnectionId connection, const Pdu& request, TimePoint now) {
-  auto response = respond(connection, request, now);
+  auto response = respond({connection, request, now});
   if (response) return std::move(*response);
   on_refusal(response.error());
   return modbus::exception_response(request.function, response.error().exception);
 }
 
-Unit::Answer Unit::respond(ConnectionId connection, const Pdu& request, TimePoint now) {
-  const auto parsed = modbus::parse_request(request);
+Unit::Answer Unit::respond(const Query& query) {
+  const auto parsed = modbus::parse_request(query.pdu);
   if (!parsed) return tl::unexpected(refusal(parsed.error()));
-  if (const auto* wanted = std::get_if<modbus::ReadRequest>(&*parsed)) {
-    if (bank_.has(wanted->table)) return read(*wanted, now);
-  }
-  if (const auto* wanted = std::get_if<modbus::WriteSingleRequest>(&*parsed)) {
-    const std::uint16_t address = wanted->address.value;
-    Outcome refused = check_write(address, 1);
-    if (!refused) refused = write(connection, address, Registers{wanted->value}, now);
-    return refused ? Answer(tl::unexpected(*refused)) : Answer(request);
-  }
-  const auto* several = std::get_if<modbus::WriteMultipleRequest>(&*parsed);
-  if (several != nullptr && link_.max_write > 1) {
-    const std::size_t count = several->values.size();
-    Outcome refused = check_write(several->first.value, count);
-    if (!refused) refused = write(connection, several->first.value, several->values, now);
-    if (refused) return tl::unexpected(*refused);
-    return modbus::write_multiple_response(several->first, static_cast<std::uint16_t>(count));
-  }
-  if (link_.loopback && std::holds_alternative<modbus::LoopbackRequest>(*parsed)) return request;
-  if (!identity_.empty() && std::holds_alternative<modbus::ReportServerIdRequest>(*parsed)) {
-    return modbus::report_server_id_response(identity_);
-  }
-  return tl::unexpected(refusal(ExceptionCode::illegal_function));
+  return std::visit([&](const auto& request) { return serve(request, query); }, *parsed);
 }
 
-Unit::Answer Unit::read(const modbus::ReadRequest& wanted, TimePoint now) {
-  if (wanted.count > link_.max_read) {
+Unit::Answer Unit::serve(const modbus::ReadRequest& request, const Query& query) {
+  if (!bank_.has(request.table)) return tl::unexpected(refusal(ExceptionCode::illegal_function));
+  if (request.count > link_.max_read) {
     return tl::unexpected(refusal(ExceptionCode::illegal_data_value));
   }
-  before_read(now);
-  const auto registers = bank_.read(wanted.table, wanted.first.value, wanted.count);
+  before_read(query.now);
+  const auto registers = bank_.read(request.table, request.first.value, request.count);
   if (!registers) return tl::unexpected(refusal(ExceptionCode::illegal_data_address));
-  events_.note_read(wanted);
-  return modbus::read_response(wanted.table, *registers);
+  events_.note_read(request);
+  return modbus::read_response(request.table, *registers);
+}
+
+Unit::Answer Unit::serve(const modbus::WriteSingleRequest& request, const Query& query) {
+  return serve_write(request.address.value, Registers{request.value}, query.pdu, query);
+}
+
+Unit::Answer Unit::serve(const modbus::WriteMultipleRequest& request, const Query& query) {
+  if (link_.max_write <= 1) return tl::unexpected(refusal(ExceptionCode::illegal_function));
+  const auto count = static_cast<std::uint16_t>(request.values.size());
+  return serve_write(request.first.value, request.values,
+                     modbus::write_multiple_response(request.first, count), query);
+}
+
+Unit::Answer Unit::serve(const modbus::LoopbackRequest& /*request*/, const Query& query) const {
+  if (!link_.loopback) return tl::unexpected(refusal(ExceptionCode::illegal_function));
+  return query.pdu;
+}
+
+Unit::Answer Unit::serve(const modbus::ReportServerIdRequest& /*request*/,
+                         const Query& /*query*/) const {
+  if (identity_.empty()) return tl::unexpected(refusal(ExceptionCode::illegal_function));
+  return modbus::report_server_id_response(identity_);
+}
+
+Unit::Answer Unit::serve_write(std::uint16_t first, RegisterView values, Pdu response,
+                               const Query& query) {
+  Outcome refused = check_write(first, values.size());
+  if (!refused) refused = write(query.connection, first, values, query.now);
+  if (refused) return tl::unexpected(*refused);
+  return response;
 }
 
 Unit::Outcome Unit::check_write(std::uint16_t first, std::size_t count) const {

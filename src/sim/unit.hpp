@@ -89,9 +89,22 @@ class Unit {
  private:
   using Answer = tl::expected<modbus::Pdu, Refusal>;
 
-  Answer respond(ConnectionId connection, const modbus::Pdu& request, TimePoint now);
-  Answer read(const modbus::ReadRequest& wanted, TimePoint now);
-  Outcome check_write(std::uint16_t first, std::size_t count) const;
+  struct Query {
+    ConnectionId connection;
+    const modbus::Pdu& pdu;
+    TimePoint now;
+  };
+
+  Answer respond(const Query& query);
+  Answer serve(const modbus::ReadRequest& request, const Query& query);
+  Answer serve(const modbus::WriteSingleRequest& request, const Query& query);
+  Answer serve(const modbus::WriteMultipleRequest& request, const Query& query);
+  [[nodiscard]] Answer serve(const modbus::LoopbackRequest& request, const Query& query) const;
+  [[nodiscard]] Answer serve(const modbus::ReportServerIdRequest& request,
+                             const Query& query) const;
+  Answer serve_write(std::uint16_t first, RegisterView values, modbus::Pdu response,
+                     const Query& query);
+  [[nodiscard]] Outcome check_write(std::uint16_t first, std::size_t count) const;
   void run_down(TimePoint now);
 
   std::uint8_t address_;
