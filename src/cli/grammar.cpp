@@ -588,7 +588,7 @@ void bind_simulated_line(Binder& bind, commands::SimulateOptions& options) {
 }
 
 /// Of its identity and its operator.
-void bind_simulated_work(Binder& bind, sim::BmOptions& bm) {
+void bind_simulated_work(Binder& bind, sim::DeviceOptions& bm) {
   bind.option("--identity-bytes", "N", bm.identity_bytes, NumberFrom{0, 255},
               "length of the identity: 12, 13 or 17")
       ->group(of_identity);

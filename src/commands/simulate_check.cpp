@@ -45,7 +45,7 @@ std::string_view why_not_felt(sim::FaultKind kind, const catalogue::Profile& pro
 
 std::optional<Error> useless_option(const SimulateOptions& options,
                                     const catalogue::Profile& profile) {
-  const sim::BmOptions& bm = options.tool.bm;
+  const sim::DeviceOptions& bm = options.tool.bm;
   const sim::Abilities able = sim::abilities_of(profile);
   struct Row {
     std::string_view option;

@@ -281,12 +281,12 @@ constexpr auto code_table_words =
                                       {"refusals", catalogue::CodeTable::refusal},
                                       {"none", catalogue::CodeTable::none}});
 
-constexpr Field<catalogue::RefusalSpec> refusal_fields[] = {
-    field<&catalogue::RefusalSpec::parameter>("parameter", Need::inherited),
-    field<&catalogue::RefusalSpec::codes>("codes", Need::inherited),
-    numbers<std::uint16_t, &catalogue::RefusalSpec::busy>("busy"),
-    field<&catalogue::RefusalSpec::retry_every>("retry-every"),
-    field<&catalogue::RefusalSpec::give_up_after>("give-up-after"),
+constexpr Field<catalogue::ExtendedErrorSpec> refusal_fields[] = {
+    field<&catalogue::ExtendedErrorSpec::parameter>("parameter", Need::inherited),
+    field<&catalogue::ExtendedErrorSpec::codes>("codes", Need::inherited),
+    numbers<std::uint16_t, &catalogue::ExtendedErrorSpec::busy>("busy"),
+    field<&catalogue::ExtendedErrorSpec::retry_every>("retry-every"),
+    field<&catalogue::ExtendedErrorSpec::give_up_after>("give-up-after"),
 };
 
 void read_alarm_parameters(const YamlNode& node, catalogue::AlarmList& list, const Asked& asked) {

@@ -173,7 +173,7 @@ bool needs_argument(Argument argument) {
 
 }  // namespace
 
-bool Fault::strikes(std::uint32_t answer_number) const {
+bool Fault::applies_to(std::uint32_t answer_number) const {
   if (at == 0 && every == 0) return true;
   return (at != 0 && answer_number == at) || (every != 0 && answer_number % every == 0);
 }

@@ -9,18 +9,17 @@ bool FaultyStore::accept() {
   return struck(FaultKind::ignore_write) == nullptr;
 }
 
-void FaultyStore::store(std::uint16_t address, std::uint16_t value, RegisterBank& bank) const {
+void FaultyStore::store(const Place& place, std::uint32_t raw, RegisterBank& bank) const {
   const Fault* other = struck(FaultKind::store_other);
-  const unsigned offset = other == nullptr ? 0U : number_of(*other);
-  bank.store(address, static_cast<std::uint16_t>(value + offset));
+  bank.set_raw(place, raw + (other == nullptr ? 0U : number_of(*other)));
   if (const Fault* reset = struck(FaultKind::reset_neighbour)) {
-    bank.store(static_cast<std::uint16_t>(address + number_of(*reset)), 0);
+    bank.put(place.table, static_cast<std::uint16_t>(place.address + number_of(*reset)), 0);
   }
 }
 
 const Fault* FaultyStore::struck(FaultKind kind) const {
   const auto found = std::find_if(faults_.begin(), faults_.end(), [&](const Fault& fault) {
-    return fault.kind == kind && fault.strikes(writes_);
+    return fault.kind == kind && fault.applies_to(writes_);
   });
   return found == faults_.end() ? nullptr : &*found;
 }

@@ -7,16 +7,16 @@
 
 namespace spindle::sim {
 
-/// Stores what is written as the faults say that concern a tool: ignore_write, store_other,
+/// Stores what is written as the faults say that concern a device: ignore_write, store_other,
 /// reset_neighbour. They count accepted writes from 1.
 class FaultyStore {
  public:
   explicit FaultyStore(FaultPlan faults) : faults_(std::move(faults)) {}
 
-  /// A write was accepted. Whether the tool does what it says.
+  /// A write was accepted. Whether the device does what it says.
   [[nodiscard]] bool accept();
   /// Stores the value of the last accepted write.
-  void store(std::uint16_t address, std::uint16_t value, RegisterBank& bank) const;
+  void store(const Place& place, std::uint32_t raw, RegisterBank& bank) const;
 
  private:
   [[nodiscard]] const Fault* struck(FaultKind kind) const;

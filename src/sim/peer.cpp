@@ -31,7 +31,7 @@ class ActiveFaults {
  public:
   ActiveFaults(const FaultPlan& plan, std::uint32_t answer_number) {
     for (const Fault& fault : plan) {
-      if (fault.strikes(answer_number)) faults_.push_back(&fault);
+      if (fault.applies_to(answer_number)) faults_.push_back(&fault);
     }
   }
 
@@ -88,31 +88,31 @@ void lengthen(modbus::Pdu& pdu, std::uint16_t registers) {
   pdu.data.insert(pdu.data.end(), extra, 0);
 }
 
-void spoil_pdu(modbus::Pdu& pdu, const ActiveFaults& strikes) {
-  if (strikes.has(FaultKind::wrong_echo) && is_echo(pdu.function)) {
+void spoil_pdu(modbus::Pdu& pdu, const ActiveFaults& active) {
+  if (active.has(FaultKind::wrong_echo) && is_echo(pdu.function)) {
     const std::size_t value_at = pdu.data.size() - 2;
     set_u16(pdu.data, value_at, static_cast<std::uint16_t>(get_u16(pdu.data, value_at) + 1));
   }
-  if (const Fault* fault = strikes.find(FaultKind::wrong_length)) lengthen(pdu, number_of(*fault));
-  if (const Fault* fault = strikes.find(FaultKind::wrong_function)) {
+  if (const Fault* fault = active.find(FaultKind::wrong_length)) lengthen(pdu, number_of(*fault));
+  if (const Fault* fault = active.find(FaultKind::wrong_function)) {
     pdu.function = static_cast<std::uint8_t>(number_of(*fault));
   }
 }
 
-void spoil_addressing(modbus::Adu& adu, const ActiveFaults& strikes) {
-  if (const Fault* fault = strikes.find(FaultKind::wrong_unit)) {
+void spoil_addressing(modbus::Adu& adu, const ActiveFaults& active) {
+  if (const Fault* fault = active.find(FaultKind::wrong_unit)) {
     adu.unit.value = static_cast<std::uint8_t>(number_of(*fault));
   }
-  if (const Fault* fault = strikes.find(FaultKind::wrong_transaction)) {
+  if (const Fault* fault = active.find(FaultKind::wrong_transaction)) {
     adu.transaction.value = static_cast<std::uint16_t>(adu.transaction.value + number_of(*fault));
   }
 }
 
-void spoil_header(Bytes& bytes, const ActiveFaults& strikes) {
-  if (const Fault* fault = strikes.find(FaultKind::wrong_protocol)) {
+void spoil_header(Bytes& bytes, const ActiveFaults& active) {
+  if (const Fault* fault = active.find(FaultKind::wrong_protocol)) {
     set_u16(bytes, mbap_protocol_at, number_of(*fault));
   }
-  if (const Fault* fault = strikes.find(FaultKind::wrong_header_length)) {
+  if (const Fault* fault = active.find(FaultKind::wrong_header_length)) {
     const std::uint16_t extra = number_of(*fault);
     const std::uint16_t length = get_u16(bytes, mbap_length_at);
     set_u16(bytes, mbap_length_at, static_cast<std::uint16_t>(length + extra));
@@ -121,36 +121,36 @@ void spoil_header(Bytes& bytes, const ActiveFaults& strikes) {
 }
 
 // Everything that replaces, cuts or repeats the finished frame.
-Bytes spoil_frame(Bytes bytes, const ActiveFaults& strikes) {
-  if (strikes.has(FaultKind::lost) || strikes.has(FaultKind::close)) return {};
-  if (const Fault* fault = strikes.find(FaultKind::garbage)) {
+Bytes spoil_frame(Bytes bytes, const ActiveFaults& active) {
+  if (active.has(FaultKind::lost) || active.has(FaultKind::close)) return {};
+  if (const Fault* fault = active.find(FaultKind::garbage)) {
     bytes.assign(number_of(*fault), noise_byte);
   }
-  if (strikes.has(FaultKind::half) || strikes.has(FaultKind::close_inside)) {
+  if (active.has(FaultKind::half) || active.has(FaultKind::close_inside)) {
     bytes.resize(bytes.size() / 2);
   }
-  if (strikes.has(FaultKind::repeated)) {
+  if (active.has(FaultKind::repeated)) {
     const Bytes once = bytes;
     bytes.insert(bytes.end(), once.begin(), once.end());
   }
-  if (const Fault* fault = strikes.find(FaultKind::noise)) {
+  if (const Fault* fault = active.find(FaultKind::noise)) {
     bytes.insert(bytes.begin(), number_of(*fault), noise_byte);
   }
   return bytes;
 }
 
-Bytes spoiled(Framing framing, modbus::Adu adu, const ActiveFaults& strikes) {
-  spoil_pdu(adu.pdu, strikes);
-  spoil_addressing(adu, strikes);
+Bytes spoiled(Framing framing, modbus::Adu adu, const ActiveFaults& active) {
+  spoil_pdu(adu.pdu, active);
+  spoil_addressing(adu, active);
   Bytes bytes = modbus::frame(framing, adu);
-  if (framing == Framing::tcp) spoil_header(bytes, strikes);
-  if (framing == Framing::rtu && strikes.has(FaultKind::bad_crc)) bytes.back() ^= 1U;
-  return spoil_frame(std::move(bytes), strikes);
+  if (framing == Framing::tcp) spoil_header(bytes, active);
+  if (framing == Framing::rtu && active.has(FaultKind::bad_crc)) bytes.back() ^= 1U;
+  return spoil_frame(std::move(bytes), active);
 }
 
-bool closes(const ActiveFaults& strikes) {
-  return strikes.has(FaultKind::close) || strikes.has(FaultKind::close_inside) ||
-         strikes.has(FaultKind::close_after);
+bool closes(const ActiveFaults& active) {
+  return active.has(FaultKind::close) || active.has(FaultKind::close_inside) ||
+         active.has(FaultKind::close_after);
 }
 
 // An answer of the same shape from another unit of the bus, with other data.
@@ -242,11 +242,11 @@ void Peer::forget() {
 Peer::~Peer() { server_->disconnected(connection_); }
 
 void Peer::receive(ByteView bytes, TimePoint now) {
-  if (deaf_) return;
+  if (closing_) return;
   if (framing_ == Framing::rtu) echo(bytes, now);
   if (line_) {
     take_burst(now);  // which ended before these bytes, when no client could look in time
-    if (!deaf_) line_->hear(bytes, now);
+    if (!closing_) line_->hear(bytes, now);
     return;
   }
   if (framing_ == Framing::rtu && !inbox_.empty() && now > last_byte_ + longest_pause) {
@@ -254,13 +254,13 @@ void Peer::receive(ByteView bytes, TimePoint now) {
   }
   last_byte_ = now;
   inbox_.insert(inbox_.end(), bytes.begin(), bytes.end());
-  while (!deaf_ && take_request(now)) {
+  while (!closing_ && take_request(now)) {
   }
 }
 
 void Peer::echo(ByteView bytes, TimePoint now) {
-  const ActiveFaults strikes(*faults_, counter_->value + 1);
-  if (!strikes.has(FaultKind::echo)) return;
+  const ActiveFaults active(*faults_, counter_->value + 1);
+  if (!active.has(FaultKind::echo)) return;
   enqueue(
       {.due = now + time_on_the_wire(bytes.size()), .pieces = {Bytes(bytes.begin(), bytes.end())}});
 }
@@ -272,7 +272,7 @@ Duration Peer::time_on_the_wire(std::size_t bytes) const {
 // The silence has ended a frame, so its bounds are known whatever is in it.
 void Peer::take_burst(TimePoint now) {
   const auto burst = line_->take(now);
-  if (!burst || deaf_) return;
+  if (!burst || closing_) return;
   if (burst->timing == Burst::Timing::too_early) {
     ignore(burst->bytes, too_early(burst->silence, server_->required_gap()));
     return;
@@ -321,9 +321,9 @@ std::optional<modbus::Pdu> Peer::respond(const modbus::Adu& request, const Fault
 }
 
 void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
-  const ActiveFaults strikes(*faults_, counter_->value + 1);
+  const ActiveFaults active(*faults_, counter_->value + 1);
   unit_ = request.unit;
-  const auto response = respond(request, strikes.find(FaultKind::exception), now);
+  const auto response = respond(request, active.find(FaultKind::exception), now);
   const bool broadcast = framing_ == Framing::rtu && request.unit == modbus::UnitId{};
   if (!response && !broadcast) {
     ignore(modbus::frame(framing_, request),
@@ -334,30 +334,30 @@ void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
 
   const modbus::Adu right{request.transaction, request.unit, *response};
   Bytes bytes;
-  if (framing_ == Framing::rtu) bytes = foreign_bytes(right, strikes.find(FaultKind::foreign));
-  append(bytes, event_bytes(strikes.find(FaultKind::push_before), request.transaction));
-  const Bytes inside = event_bytes(strikes.find(FaultKind::push_inside), request.transaction);
+  if (framing_ == Framing::rtu) bytes = foreign_bytes(right, active.find(FaultKind::foreign));
+  append(bytes, event_bytes(active.find(FaultKind::push_before), request.transaction));
+  const Bytes inside = event_bytes(active.find(FaultKind::push_inside), request.transaction);
   const std::size_t cut = inside.empty() ? 0 : bytes.size() + inside.size() / 2;
   append(bytes, inside);
-  append(bytes, spoiled(framing_, right, strikes));
-  append(bytes, event_bytes(strikes.find(FaultKind::push_after), request.transaction));
+  append(bytes, spoiled(framing_, right, active));
+  append(bytes, event_bytes(active.find(FaultKind::push_after), request.transaction));
 
-  const Fault* split = strikes.find(FaultKind::split);
+  const Fault* split = active.find(FaultKind::split);
   const TimePoint ready =
       heard + server_->answer_delay(request.unit) + time_on_the_wire(bytes.size());
   Message message{
-      .due = ready + strikes.longest(FaultKind::latency),
+      .due = ready + active.longest(FaultKind::latency),
       .pieces = split != nullptr ? pieces_of(bytes, number_of(*split)) : cut_at(bytes, cut)};
-  if (strikes.has(FaultKind::late)) {
-    message.due = std::max(message.due, ready + strikes.longest(FaultKind::late));
+  if (active.has(FaultKind::late)) {
+    message.due = std::max(message.due, ready + active.longest(FaultKind::late));
   } else {
     message.due = std::max(message.due, in_order_from_);
     in_order_from_ = message.due + time_of(message.pieces.size());
   }
-  if (closes(strikes)) {
+  if (closes(active)) {
     message.ending = Ending::close;
-    deaf_ = true;
-  } else if (strikes.has(FaultKind::glued) && !message.pieces.empty()) {
+    closing_ = true;
+  } else if (active.has(FaultKind::glued) && !message.pieces.empty()) {
     message.holding = Holding::until_next;
     message.due += longest_hold;
   }
@@ -374,12 +374,12 @@ Bytes Peer::event_bytes(const Fault* fault, modbus::TransactionId pending) {
 }
 
 void Peer::push(const modbus::Pdu& pdu, TimePoint now) {
-  if (deaf_) return;
+  if (closing_) return;
   enqueue({.due = now, .pieces = {modbus::frame(framing_, {{push_transaction_++}, unit_, pdu})}});
 }
 
 void Peer::disconnect(TimePoint now) {
-  deaf_ = true;
+  closing_ = true;
   inbox_.clear();
   enqueue({.due = std::max(now, in_order_from_), .ending = Ending::close});
 }

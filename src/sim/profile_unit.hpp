@@ -2,66 +2,55 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "blv_motor.hpp"
-#include "blv_registers.hpp"
-#include "bus_unit.hpp"
+#include "motor.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/catalogue/run_facts.hpp"
+#include "unit.hpp"
 
 namespace spindle::sim {
 
-/// A simulated device of any profile: its registers with their limits, exceptions and start values
-/// (those of the profile's simulation, else the default, the least value or 0). With the run model
-/// command-register also a motor: a ramp of one second, status and monitors in their own scales.
-class ProfileUnit final : public BusUnit {
+/// A simulated device of any profile. Its actions show in the parameters that confirm them, and its
+/// events say what the start state has for them. With the run model command-register also a motor:
+/// a ramp of one second, status and monitors in their own scales.
+class ProfileUnit final : public Unit {
  public:
-  /// `identity`: the bytes of its answer to FC 11h; empty: it has none.
   ProfileUnit(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
-              std::uint8_t address, Bytes identity);
+              std::uint8_t address, const DeviceOptions& options);
 
-  [[nodiscard]] std::uint8_t address() const override { return address_; }
-  void advance(TimePoint /*now*/) override {}
-  [[nodiscard]] std::optional<TimePoint> next_change() const override { return std::nullopt; }
-  modbus::Pdu answer(const modbus::Pdu& request, TimePoint now) override;
   void raise_alarm(std::int64_t code, TimePoint now) override;
   void raise_warning(std::int64_t code, TimePoint now) override;
+  /// Parameters keep what was written; all else begins anew.
   void power_cycle(TimePoint now) override;
 
  private:
-  using Refusal = std::optional<std::uint8_t>;  ///< exception code; empty: it is done
   /// What the motor is told to do.
-  enum class Wish : std::uint8_t { stop, stop_at_once, forward, reverse };
+  enum class Motion : std::uint8_t { stop, stop_at_once, forward, reverse };
 
-  modbus::Pdu respond(const modbus::Pdu& request, TimePoint now);
-  modbus::Pdu read(const modbus::Pdu& request, const modbus::ReadRequest& wanted, TimePoint now);
-  Refusal write(std::uint16_t first, RegisterView values, TimePoint now);
-  void act_on(const BlvRegisters::Cell& cell, std::uint32_t raw, TimePoint now);
+  void before_read(TimePoint now) override;
+  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void act(const catalogue::Action& action, std::uint32_t raw);
 
-  void begin_stopped();
+  void drive(TimePoint now);
   [[nodiscard]] bool is_enabled() const;
-  [[nodiscard]] Wish wish() const;
+  [[nodiscard]] Motion commanded() const;
   [[nodiscard]] std::int64_t wanted_speed() const;
-  void obey(TimePoint now);
-  void show(TimePoint now);
   void show_speed(const std::string& name, TimePoint now);
   [[nodiscard]] std::int64_t status(TimePoint now) const;
   [[nodiscard]] const catalogue::Parameter* find(const std::string& name) const;
-  [[nodiscard]] std::uint32_t number(const std::string& name) const;
+  [[nodiscard]] std::uint32_t number(const std::string& name) const {
+    return static_cast<std::uint32_t>(bank().get(name));
+  }
 
-  std::uint8_t address_;
-  std::vector<catalogue::Parameter> parameters_;  ///< those that `run` names
+  catalogue::List<catalogue::Action> actions_;
+  catalogue::Text alarm_reset_;
+  catalogue::Text alarm_ = {};  ///< parameter that shows the present alarm; empty: none does
   std::optional<catalogue::CommandRegisterSpec> run_ = std::nullopt;
-  std::optional<catalogue::Action> alarm_reset_ = std::nullopt;
-  catalogue::List<std::int64_t> permanent_alarms_;
-  std::uint8_t limit_exception_;
-  std::uint16_t max_read_;
-  std::uint16_t max_write_;
-  bool loopback_;
-  Bytes identity_;
-  BlvRegisters registers_;
-  BlvMotor motor_ = {};
+  std::vector<catalogue::Parameter> parameters_ = {};  ///< those that `run` names
+  Tables start_ = {};
+  Motor motor_ = {};
   bool reverse_ = false;  ///< the way that it turned last
   bool stopped_ = false;  ///< by another register, until the next command
 };

@@ -1,107 +1,167 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <optional>
-#include <string>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
+#include "spindle/base/clock.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::sim {
 
-/// What a simulated tool makes of a write.
-enum class WriteVerdict : std::uint8_t { allowed, no_such_register, outside_limits };
-
-/// The registers of a simulated tool, laid out by its profile: named and numbered parameters, the
-/// mirrors with their limits, the event block; start values, limits and holes from its start state.
-/// A hole has no mirrors either. Keeps no reference to the profile.
-class RegisterBank {
+/// The registers of one table. As quick to fill as memory.
+class Words {
  public:
-  RegisterBank(const catalogue::Profile& profile, const catalogue::SimulationSpec& start);
-
-  /// Empty when one of the registers does not exist.
-  [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
-                                              std::uint16_t count) const;
-
-  [[nodiscard]] WriteVerdict check_write(std::uint16_t address, std::uint16_t value) const;
-  /// Stores without asking; nothing happens when there is no such holding register.
-  void store(std::uint16_t address, std::uint16_t value);
-
-  /// A 16-bit parameter by name; 0 when the profile does not name it or it is a hole.
-  [[nodiscard]] std::uint16_t get(std::string_view name) const;
-  /// Nothing happens when the profile does not name it or it is a hole.
-  void set(std::string_view name, std::uint16_t value);
-  /// All registers of a parameter by name, the highest first. Nothing happens when the profile does
-  /// not name it.
-  void set_raw(std::string_view name, std::int64_t raw);
-
-  /// Table and first address of a parameter by name; empty when the profile does not name it.
-  [[nodiscard]] std::optional<std::pair<modbus::RegisterTable, std::uint16_t>> place_of(
-      std::string_view name) const;
+  [[nodiscard]] bool has(std::uint16_t address) const {
+    return address < there_.size() && there_[address];
+  }
+  [[nodiscard]] bool empty() const { return there_.empty(); }
+  /// 0 where there is no such register.
+  [[nodiscard]] std::uint16_t at(std::uint16_t address) const {
+    return has(address) ? words_[address] : std::uint16_t{0};
+  }
+  /// Adds a register that holds 0; one that is there stays as it is.
+  void add(std::uint16_t address);
+  /// Nothing happens when there is no such register.
+  void put(std::uint16_t address, std::uint16_t word) {
+    if (has(address)) words_[address] = word;
+  }
+  void erase(std::uint16_t address) {
+    if (has(address)) there_[address] = false;
+  }
 
  private:
-  struct Place {
-    modbus::RegisterTable table = modbus::RegisterTable::holding;
-    std::uint16_t address = 0;
-    catalogue::Kind kind = catalogue::Kind::u16;
-  };
-  struct Limits {
-    std::int64_t minimum = 0;
-    std::int64_t maximum = 0;
-    catalogue::Kind kind = catalogue::Kind::u16;
-  };
-  /// Words by their address: as quick to fill as memory.
-  class Words {
-   public:
-    [[nodiscard]] bool has(std::uint16_t address) const {
-      return address < there_.size() && there_[address];
-    }
-    /// Requires that it is there.
-    [[nodiscard]] std::uint16_t at(std::uint16_t address) const { return words_[address]; }
-    void put(std::uint16_t address, std::uint16_t word);
-    void put_if_absent(std::uint16_t address, std::uint16_t word) {
-      if (!has(address)) put(address, word);
-    }
-    void put_if_there(std::uint16_t address, std::uint16_t word) {
-      if (has(address)) words_[address] = word;
-    }
-    void erase(std::uint16_t address) {
-      if (has(address)) there_[address] = false;
-    }
+  std::vector<std::uint16_t> words_ = {};
+  std::vector<bool> there_ = {};
+};
 
-   private:
-    std::vector<std::uint16_t> words_ = {};
-    std::vector<bool> there_ = {};
-  };
+/// By modbus::RegisterTable.
+struct Tables {
+  std::array<Words, 2> all = {};
+  [[nodiscard]] const Words& of(modbus::RegisterTable table) const {
+    return all.at(static_cast<std::size_t>(table));
+  }
+  [[nodiscard]] Words& of(modbus::RegisterTable table) {
+    return all.at(static_cast<std::size_t>(table));
+  }
+};
+
+/// Where a value stands, and how.
+struct Place {
+  modbus::RegisterTable table = modbus::RegisterTable::holding;
+  std::uint16_t address = 0;  ///< of its first register
+  catalogue::Kind kind = catalogue::Kind::u16;
+  Decimal scale = Decimal(1);
+
+  /// Whether this register of its table is one of the value's.
+  [[nodiscard]] bool covers(std::uint16_t register_address) const {
+    return register_address >= address && register_address < end();
+  }
+  /// Behind its last register.
+  [[nodiscard]] unsigned end() const { return unsigned{address} + catalogue::register_count(kind); }
+};
+
+/// A value that clients may write, of one register or two.
+struct Cell {
+  Place place = {};
+  bool writable = false;
+  bool is_parameter = false;  ///< a value that stays, as opposed to a command
+  std::optional<std::int64_t> minimum = std::nullopt;
+  std::optional<std::int64_t> maximum = std::nullopt;
+  std::optional<std::pair<std::int64_t, std::int64_t>> except = std::nullopt;
+
+  /// Whether the value may be this number.
+  [[nodiscard]] bool takes(std::uint32_t raw) const;
+};
+
+/// The registers of a simulated device, laid out by its profile: named and numbered parameters,
+/// commands, the device's own limits, the event block. Values begin at those of the start state,
+/// else at their default, their least value or 0; limits and holes are those of the start state,
+/// too. Keeps no reference to the profile.
+class RegisterBank {
+ public:
+  /// Whether a register that only an action names can be read.
+  enum class Commands : std::uint8_t { readable, write_only };
+  RegisterBank(const catalogue::Profile& profile, const catalogue::SimulationSpec& start,
+               Commands commands = Commands::readable);
+
+  /// Adds those of these registers that are not there. They hold 0, and cannot be written.
+  void fill(const catalogue::Area& area);
+
+  /// Whether there is any register in this table.
+  [[nodiscard]] bool has(modbus::RegisterTable table) const { return !tables_.of(table).empty(); }
+  [[nodiscard]] bool has(modbus::RegisterTable table, std::uint16_t first, std::size_t count) const;
+  /// Empty when one of the registers does not exist.
+  [[nodiscard]] std::optional<Registers> read(modbus::RegisterTable table, std::uint16_t first,
+                                              std::size_t count) const;
+  /// One register, whatever it belongs to.
+  void put(modbus::RegisterTable table, std::uint16_t address, std::uint16_t word) {
+    tables_.of(table).put(address, word);
+  }
+
+  /// The value that can be written and that this register belongs to; null when there is none.
+  [[nodiscard]] const Cell* cell_at(modbus::RegisterTable table, std::uint16_t address) const;
+  /// The value with those of its registers that are written from `first` on, beginning with
+  /// values[next]; `next` is then that of the next value.
+  [[nodiscard]] std::uint32_t with_words(const Cell& cell, std::uint16_t first, RegisterView values,
+                                         std::size_t& next) const;
+  [[nodiscard]] std::uint32_t raw(const Place& place) const;
+  void set_raw(const Place& place, std::uint32_t raw);
+
+  /// Empty when the profile does not name it.
+  [[nodiscard]] std::optional<Place> find(std::string_view name) const;
+  /// 0 when the profile does not name it or it is a hole.
+  [[nodiscard]] std::int64_t get(std::string_view name) const;
+  /// Nothing happens when the profile does not name it or it is a hole.
+  void set(std::string_view name, std::int64_t value);
+  /// A value in units of time, at most a day; `unit` is what 1 stands for.
+  [[nodiscard]] Duration time(std::string_view name, Duration unit) const;
+
+  /// All that the registers hold.
+  [[nodiscard]] const Tables& tables() const { return tables_; }
+  void set_tables(const Tables& tables) { tables_ = tables; }
+  /// Copies parameters that can be written, but for those with these names.
+  void copy_parameters(const Tables& from, Tables& into,
+                       std::span<const std::string_view> but = {}) const;
+  void take_parameters(const Tables& from, std::span<const std::string_view> but = {}) {
+    copy_parameters(from, tables_, but);
+  }
+
+ private:
   struct Named {
     catalogue::Text name;
     Place place;
   };
 
-  [[nodiscard]] const Words& words(modbus::RegisterTable table) const;
-  [[nodiscard]] Words& words(modbus::RegisterTable table);
-  void add_parameter(const catalogue::Parameter& parameter);
+  using Key = std::pair<modbus::RegisterTable, std::uint16_t>;
+
+  [[nodiscard]] const Cell* known_at(const Place& place) const {
+    return known_at(place.table, place.address);
+  }
+  [[nodiscard]] const Cell* known_at(modbus::RegisterTable table, std::uint16_t address) const;
+  void add(const Cell& cell) { cells_[{cell.place.table, cell.place.address}] = cell; }
+  void add_registers(const Place& place);
+  void add_parameter(const catalogue::Parameter& parameter, bool is_command);
   void add_numbered(const catalogue::NumberedSpec& facts);
-  void add_event_block(const catalogue::EventSpec& facts);
-  [[nodiscard]] std::optional<Place> find(std::string_view name) const;
+  void add_command(const catalogue::Action& action, bool even_pairs, Commands commands);
+  void add_events(const catalogue::EventSpec& facts);
   [[nodiscard]] std::vector<Place> matching(std::string_view pattern) const;
   void add_numbered_matching(std::string_view pattern, std::vector<Place>& found) const;
-  void start_value(const Place& place, std::int64_t raw);
-  void start_limits(const Place& place, std::int64_t minimum, std::int64_t maximum);
+  void limit(const Place& place, std::int64_t minimum, std::int64_t maximum);
   void add_mirrors(const catalogue::LimitSpec& facts);
   void remove(const catalogue::Area& area, const std::optional<catalogue::LimitSpec>& limits);
 
   std::vector<Named> named_ = {};  ///< by name
   std::optional<catalogue::NumberedSpec> numbered_ = std::nullopt;
-  Words holding_ = {};
-  Words input_ = {};
-  std::map<std::uint16_t, Limits> writable_ = {};
+  Tables tables_ = {};
+  std::map<Key, Cell> cells_ = {};  ///< by their first register
 };
 
 }  // namespace spindle::sim

@@ -16,14 +16,16 @@ FaultPlan with_base_latency(FaultPlan plan) {
 class SimTransport final : public link::Transport {
  public:
   SimTransport(Server& server, ConnectionId connection, modbus::Framing framing, FaultPlan faults,
-               AnswerCounter& counter, Clock& clock, const Interrupt& interrupt,
-               const LineModel& line)
-      : server_(&server),
+               AnswerCounter* counter, Clock& clock, const Interrupt& interrupt,
+               const LineModel& line, std::unique_ptr<Server> own = nullptr)
+      : own_server_(std::move(own)),
+        server_(&server),
         connection_(connection),
         faults_(with_base_latency(std::move(faults))),
         clock_(&clock),
         interrupt_(&interrupt),
-        peer_(server, connection, framing, faults_, counter, line) {}
+        peer_(server, connection, framing, faults_, counter == nullptr ? own_counter_ : *counter,
+              line) {}
 
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
@@ -41,6 +43,8 @@ class SimTransport final : public link::Transport {
 
   enum class Shielding : std::uint8_t { off, on };
 
+  std::unique_ptr<Server> own_server_;
+  AnswerCounter own_counter_ = {};
   Server* server_;
   ConnectionId connection_;
   FaultPlan faults_;
@@ -103,38 +107,15 @@ std::size_t SimTransport::hand_over(std::span<std::uint8_t> into) {
   return count;
 }
 
-// The transport with a tool of its own.
-class OwningSimTransport final : public link::Transport {
- public:
-  OwningSimTransport(std::unique_ptr<Server> server, modbus::Framing framing, FaultPlan faults,
-                     Clock& clock, const Interrupt& interrupt, const LineModel& line)
-      : server_(std::move(server)),
-        transport_(*server_, ConnectionId{1}, framing, std::move(faults), counter_, clock,
-                   interrupt, line) {}
-
-  Result<void> send(ByteView bytes, TimePoint deadline) override {
-    return transport_.send(bytes, deadline);
-  }
-  Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override {
-    return transport_.receive(into, deadline);
-  }
-  [[nodiscard]] bool is_private() const override { return true; }
-  void set_uninterruptible() override { transport_.set_uninterruptible(); }
-
- private:
-  std::unique_ptr<Server> server_;
-  AnswerCounter counter_ = {};
-  SimTransport transport_;
-};
-
 }  // namespace
 
 std::unique_ptr<link::Transport> make_sim_transport(std::unique_ptr<Server> server,
                                                     modbus::Framing framing, FaultPlan faults,
                                                     Clock& clock, const Interrupt& interrupt,
                                                     const LineModel& line) {
-  return std::make_unique<OwningSimTransport>(std::move(server), framing, std::move(faults), clock,
-                                              interrupt, line);
+  Server& tool = *server;
+  return std::make_unique<SimTransport>(tool, ConnectionId{1}, framing, std::move(faults), nullptr,
+                                        clock, interrupt, line, std::move(server));
 }
 
 std::unique_ptr<link::Transport> make_sim_transport(Server& server, ConnectionId connection,
@@ -142,7 +123,7 @@ std::unique_ptr<link::Transport> make_sim_transport(Server& server, ConnectionId
                                                     AnswerCounter& counter, Clock& clock,
                                                     const Interrupt& interrupt,
                                                     const LineModel& line) {
-  return std::make_unique<SimTransport>(server, connection, framing, std::move(faults), counter,
+  return std::make_unique<SimTransport>(server, connection, framing, std::move(faults), &counter,
                                         clock, interrupt, line);
 }
 

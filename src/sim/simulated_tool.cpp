@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
-#include "bm_identity.hpp"
-#include "spindle/sim/plain_tool.hpp"
+#include "blv_unit.hpp"
+#include "bm_unit.hpp"
+#include "bus.hpp"
+#include "profile_unit.hpp"
 
 namespace spindle::sim {
 namespace {
@@ -21,9 +23,10 @@ bool has_command_word(const Profile& profile) {
   return profile.run && profile.run->word() != nullptr;
 }
 
-/// Of a motor events are not simulated.
-bool is_operated(const Profile& profile) {
-  return profile.events && monitor_of(profile) == nullptr;
+/// It has a motor that is started by the action that a screwdriver has, and sends its results
+/// unasked.
+bool is_screwdriver(const Profile& profile) {
+  return catalogue::sends_unasked(profile) && profile.find_action("start").has_value();
 }
 
 bool shows_alarm(const Profile& profile) {
@@ -31,39 +34,29 @@ bool shows_alarm(const Profile& profile) {
                      [](const catalogue::AlarmList& list) { return list.name == "present"; });
 }
 
-PlainOptions plain_options(const BmOptions& tool) {
-  return {.faults = tool.faults,
-          .rundown_every = tool.rundown_every,
-          .ng_every = tool.ng_every,
-          .burst = tool.burst,
-          .alarms = tool.alarms};
-}
-
 }  // namespace
 
 Abilities abilities_of(const Profile& profile) {
   const catalogue::MonitorSpec* monitor = monitor_of(profile);
-  const bool operated = is_operated(profile);
-  const bool pushes = operated && catalogue::sends_unasked(profile);
-  // The identity of a tool that waits to be asked for its results is that of its start state.
-  return {
-      .identity = profile.identity && !has_command_word(profile) && operated == pushes,
-      .operated = operated,
-      .pushes = pushes,
-      .configuration = has_command_word(profile),
-      .alarms = operated ? shows_alarm(profile) : (monitor != nullptr && !monitor->alarm.empty()),
-      .warnings = monitor != nullptr && !monitor->warning.empty()};
+  return {.identity = profile.identity.has_value(),
+          .operated = profile.events.has_value(),
+          .pushes = catalogue::sends_unasked(profile),
+          .configuration = has_command_word(profile),
+          .alarms =
+              monitor == nullptr ? profile.events && shows_alarm(profile) : !monitor->alarm.empty(),
+          .warnings = monitor != nullptr && !monitor->warning.empty()};
 }
 
-std::unique_ptr<Server> make_simulated_server(const Profile& profile,
-                                              const catalogue::SimulationSpec& start,
-                                              const BmOptions& tool, const BlvOptions& bus) {
-  if (has_command_word(profile)) return make_blv_bus(profile, start, bus);
-  if (is_operated(profile)) {
-    if (catalogue::sends_unasked(profile)) return make_bm_tool(profile, start, tool);
-    return make_plain_tool(profile, start, plain_options(tool));
-  }
-  return make_profile_bus(profile, start, bus, make_identity(profile.identity, start, tool));
+std::unique_ptr<SimulatedBus> make_simulated_bus(const Profile& profile,
+                                                 const catalogue::SimulationSpec& start,
+                                                 const DeviceOptions& options) {
+  return make_bus(profile, options, [&](std::uint8_t address) -> std::unique_ptr<Unit> {
+    if (has_command_word(profile)) {
+      return std::make_unique<BlvUnit>(profile, start, address, options);
+    }
+    if (is_screwdriver(profile)) return std::make_unique<BmUnit>(profile, start, address, options);
+    return std::make_unique<ProfileUnit>(profile, start, address, options);
+  });
 }
 
 }  // namespace spindle::sim

@@ -21,15 +21,16 @@ std::vector<modbus::UnitId> units_for(const link::Endpoint& endpoint,
   return unit.value == 0 ? simulated_bus : std::vector<modbus::UnitId>{unit};
 }
 
-sim::BlvOptions bus_options(const SimulatedToolOptions& options) {
-  sim::BlvOptions bus{.baud = options.baud.value_or(0)};
-  if (options.busy) bus.configuring = *options.busy;
-  bus.alarms = options.alarms;
-  bus.warnings = options.warnings;
-  if (options.units.empty()) return bus;
-  bus.units.clear();
-  for (const modbus::UnitId unit : options.units) bus.units.push_back(unit.value);
-  return bus;
+sim::DeviceOptions device_options(const SimulatedToolOptions& options) {
+  sim::DeviceOptions device = options.bm;
+  device.baud = options.baud.value_or(0);
+  if (options.busy) device.configuring = *options.busy;
+  device.alarms = options.alarms;
+  device.warnings = options.warnings;
+  if (options.units.empty()) return device;
+  device.units.clear();
+  for (const modbus::UnitId unit : options.units) device.units.push_back(unit.value);
+  return device;
 }
 
 /// The identity has one of the lengths at which the profile says that something more begins.
@@ -54,9 +55,7 @@ Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profi
   if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
     return tl::unexpected(std::move(known.error()));
   }
-  sim::BmOptions bm = options.bm;
-  bm.alarms = options.alarms;
-  return sim::make_simulated_server(profile, start, bm, bus_options(options));
+  return sim::make_simulated_bus(profile, start, device_options(options));
 }
 
 }  // namespace

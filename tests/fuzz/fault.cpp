@@ -15,8 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   require(text.starts_with(sim::to_text(fault->kind)));
   require(fault->at == 0 || fault->every == 0);
-  require(fault->at == 0 || (fault->strikes(fault->at) && !fault->strikes(fault->at + 1)));
-  require(fault->every == 0 || fault->strikes(fault->every));
+  require(fault->at == 0 || (fault->applies_to(fault->at) && !fault->applies_to(fault->at + 1)));
+  require(fault->every == 0 || fault->applies_to(fault->every));
   require(!fault->number || sim::number_of(*fault) == *fault->number);
   return 0;
 }

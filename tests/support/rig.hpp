@@ -3,17 +3,14 @@
 #include <algorithm>
 #include <memory>
 #include <string>
-#include <type_traits>
 #include <utility>
 
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/disk.hpp"
-#include "spindle/sim/blv_driver.hpp"
-#include "spindle/sim/bm_tool.hpp"
-#include "spindle/sim/plain_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "support/bm_profile.hpp"
 #include "support/fake_clock.hpp"
 #include "support/fault_plan.hpp"
@@ -38,17 +35,9 @@ inline Product product(const std::string& name) {
   return {store.load(name).value(), store.load_simulation(name).value()};
 }
 
-inline std::unique_ptr<sim::BmTool> simulated(const Product& of, const sim::BmOptions& options) {
-  return sim::make_bm_tool(of.profile, of.start, options);
-}
-inline std::unique_ptr<sim::PlainTool> simulated(const Product& of,
-                                                 const sim::PlainOptions& options) {
-  return sim::make_plain_tool(of.profile, of.start, options);
-}
-inline std::unique_ptr<sim::BlvBus> simulated(const Product& of, const sim::BlvOptions& options) {
-  const bool has_word = of.profile.run && of.profile.run->word() != nullptr;
-  return has_word ? sim::make_blv_bus(of.profile, of.start, options)
-                  : sim::make_profile_bus(of.profile, of.start, options, {});
+inline std::unique_ptr<sim::SimulatedBus> simulated(const Product& of,
+                                                    const sim::DeviceOptions& options) {
+  return sim::make_simulated_bus(of.profile, of.start, options);
 }
 
 /// One simulated device on a clock that is moved by hand, the wire to it, and connections. What a
@@ -63,10 +52,7 @@ class Rig {
     const bool serial = profile.link.framing == modbus::Framing::rtu;
     endpoint = link::parse_endpoint(serial ? "rtu:///dev/line?unit=1" : "tcp://tool:5000").value();
   }
-  template <typename Options>
-  requires(!std::is_convertible_v<Options, std::unique_ptr<Server>>)
-      Rig(Product product, const Options& how)
-      : Rig(product, simulated(product, how)) {}
+  Rig(Product product, const sim::DeviceOptions& how) : Rig(product, simulated(product, how)) {}
 
   /// A connection past Device. It outlives neither the rig nor the clock and interrupt.
   std::unique_ptr<link::Transport> transport(Clock& on, const Interrupt& heeding) {
@@ -133,15 +119,15 @@ class Rig {
   device::LinkOptions options = {};
 };
 
-using PlainRig = Rig<sim::PlainTool>;
+using DeviceRig = Rig<sim::SimulatedBus>;
 
 /// A screwdriver whose runs are begun and ended by one register.
-struct BmRig : Rig<sim::BmTool> {
+struct BmRig : DeviceRig {
   static constexpr std::uint16_t arm_register = 4002;
   static constexpr std::uint16_t start_register = 4003;
 
   using Rig::Rig;
-  explicit BmRig(const sim::BmOptions& how = {}) : Rig(small_bm(), how) {}
+  explicit BmRig(const sim::DeviceOptions& how = {}) : Rig(small_bm(), how) {}
 
   [[nodiscard]] bool runs() { return read_input(3307) != 0; }
   [[nodiscard]] std::size_t writes_of(std::uint16_t address, std::uint16_t word) const {
@@ -157,9 +143,10 @@ struct BmRig : Rig<sim::BmTool> {
 };
 
 /// Motor drivers on one line that follow a command word, or those of another profile.
-struct BlvRig : Rig<sim::BlvBus> {
+struct BlvRig : DeviceRig {
   using Rig::Rig;
-  explicit BlvRig(const sim::BlvOptions& how = {}) : Rig(test::product("orientalmotor-blv"), how) {}
+  explicit BlvRig(const sim::DeviceOptions& how = {})
+      : Rig(test::product("orientalmotor-blv"), how) {}
 
   [[nodiscard]] bool moves(std::uint8_t unit = 1) { return (read(0x007F, unit) & 0x2000U) != 0; }
   /// Sets a parameter that acts behind Configuration only.

@@ -55,11 +55,9 @@
 #include "spindle/posix/disk.hpp"
 #include "spindle/posix/world.hpp"
 #include "spindle/shipped/profiles.hpp"
-#include "spindle/sim/blv_driver.hpp"
-#include "spindle/sim/bm_tool.hpp"
 #include "spindle/sim/peer.hpp"
-#include "spindle/sim/plain_tool.hpp"
 #include "spindle/sim/sim_transport.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "spindle/work/connect.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
@@ -123,7 +121,7 @@ struct Tool {
   catalogue::Profile profile;
   sim::FaultPlan faults;
   std::unique_ptr<sim::Server> server;
-  sim::BlvBus* bus = nullptr;  ///< the server, where it is one
+  sim::SimulatedBus* bus = nullptr;  ///< the server, where it is one
   sim::AnswerCounter answers;
   std::uint32_t connections = 0;
 };
@@ -137,7 +135,7 @@ class Stage {
     auto start = profiles_.load_simulation(words.at(1));
     if (!profile || !start) throw std::runtime_error("no such profile: " + words.at(1));
     auto tool = std::make_unique<Tool>();
-    sim::BmOptions options;
+    sim::DeviceOptions options;
     for (std::size_t index = 2; index < words.size(); ++index) {
       const auto equals = words[index].find('=');
       const std::string key = words[index].substr(0, equals);
@@ -151,14 +149,7 @@ class Stage {
       if (key == "FAULT") tool->faults.push_back(sim::parse_fault(value).value());
     }
     options.faults = tool->faults;
-    if (catalogue::sends_unasked(*profile)) {
-      tool->server = sim::make_bm_tool(*profile, *start, options);
-    } else {
-      tool->server = sim::make_plain_tool(*profile, *start,
-                                          {.faults = options.faults,
-                                           .rundown_every = options.rundown_every,
-                                           .ng_every = options.ng_every});
-    }
+    tool->server = sim::make_simulated_bus(*profile, *start, options);
     tool->profile = std::move(*profile);
     const auto endpoint = link::parse_endpoint(words.at(0)).value();
     tools_[address(endpoint.host, endpoint.port.value_or(tool->profile.link.port))] =
@@ -195,7 +186,7 @@ class Stage {
   void add_bus(const std::vector<std::string>& words) {
     auto tool = std::make_unique<Tool>();
     tool->profile = profiles_.load(words.at(1)).value();
-    sim::BlvOptions options;
+    sim::DeviceOptions options;
     for (std::size_t index = 2; index < words.size(); ++index) {
       const auto equals = words[index].find('=');
       const std::string value = words[index].substr(equals + 1);
@@ -218,7 +209,7 @@ class Stage {
   void happen(const std::string& what, const std::vector<std::string>& words) {
     if (what == "wait") return clock_.advance(parse_duration(words.at(0)).value());
     if (what == "later") return write_later(words);
-    sim::BlvBus& bus =
+    sim::SimulatedBus& bus =
         *tools_.at(commands::shared_line(link::parse_endpoint(words.at(0)).value()))->bus;
     const auto unit = static_cast<std::uint8_t>(std::stoul(words.at(1)));
     if (what == "power") return bus.power_cycle(unit, clock_.now());
@@ -237,7 +228,7 @@ class Stage {
       });
       return;
     }
-    sim::BlvBus* bus =
+    sim::SimulatedBus* bus =
         tools_.at(commands::shared_line(link::parse_endpoint(words.at(1)).value()))->bus;
     const modbus::UnitId unit{static_cast<std::uint8_t>(std::stoul(words.at(2)))};
     const auto write = modbus::write_request({static_cast<std::uint16_t>(std::stoul(words.at(3)))},

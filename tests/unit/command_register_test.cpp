@@ -29,7 +29,7 @@ Registers words(std::uint32_t command) {
 }  // namespace
 
 TEST_CASE("a motor that is not held acknowledges its command and does not turn") {
-  BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+  BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
   auto device = rig.open();
   const auto model = CommandRegister::of(rig.profile).value();
   REQUIRE(model.command(device, forward));
@@ -47,7 +47,7 @@ TEST_CASE("a motor that is not held acknowledges its command and does not turn")
 TEST_CASE("a stop keeps what enables a motor that another program started, by every register") {
   for (const StopMode mode : {StopMode::decelerate, StopMode::instant}) {
     CAPTURE(static_cast<int>(mode));
-    BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+    BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
     rig.write(command_at, words(forward | held));
     rig.clock.advance(2s);
     auto device = rig.open();
@@ -61,7 +61,7 @@ TEST_CASE("a stop keeps what enables a motor that another program started, by ev
 }
 
 TEST_CASE("a stop of which nothing is known never enables a motor") {
-  BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+  BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
   rig.write(command_at, words(forward));
   auto device = rig.open();
   const auto model = CommandRegister::of(rig.profile).value();
@@ -71,7 +71,7 @@ TEST_CASE("a stop of which nothing is known never enables a motor") {
 }
 
 TEST_CASE("a stop by who enabled a motor keeps it enabled, also where that cannot be read") {
-  BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+  BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
   rig.write(command_at, words(forward | held));
   rig.clock.advance(2s);
   rig.faults = {{.kind = sim::FaultKind::lost, .at = 1}};
@@ -86,7 +86,7 @@ TEST_CASE("a stop by who enabled a motor keeps it enabled, also where that canno
 }
 
 TEST_CASE("what is read of a motor counts more than what its program was about to do") {
-  BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+  BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
   rig.write(command_at, words(forward));
   auto device = rig.open();
   const auto model = CommandRegister::of(rig.profile).value();
@@ -98,7 +98,7 @@ TEST_CASE("what is read of a motor counts more than what its program was about t
 }
 
 TEST_CASE("a motor that goes on turning is not called stopped, and is stopped harder") {
-  BlvRig rig(test::product("held-drive"), sim::BlvOptions{});
+  BlvRig rig(test::product("held-drive"), sim::DeviceOptions{});
   rig.write(command_at, words(forward | held));
   rig.clock.advance(2s);
   auto device = rig.open();
@@ -117,7 +117,7 @@ TEST_CASE("a motor that goes on turning is not called stopped, and is stopped ha
 }
 
 TEST_CASE("a status that says neither runs nor stands still proves no standstill") {
-  BlvRig rig(test::product("fc01-vfd"), sim::BlvOptions{});
+  BlvRig rig(test::product("fc01-vfd"), sim::DeviceOptions{});
   auto device = rig.open();
   auto model = CommandRegister::of(rig.profile).value();
   CHECK(model.monitor()->stands_still(device) == Shown::yes);
@@ -130,7 +130,7 @@ TEST_CASE("a status that says neither runs nor stands still proves no standstill
 }
 
 TEST_CASE("without a status and a speed a stop is sent, and not confirmed") {
-  BlvRig rig(test::product("fc01-vfd"), sim::BlvOptions{});
+  BlvRig rig(test::product("fc01-vfd"), sim::DeviceOptions{});
   auto blind = rig.profile;
   auto facts = *blind.run->command_register();
   facts.monitor = {};

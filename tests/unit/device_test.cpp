@@ -31,7 +31,7 @@ const Profile& bm() { return bm_product().profile; }
 
 struct Setup {
   std::vector<std::string> faults = {};
-  sim::BmOptions tool = {};
+  sim::DeviceOptions tool = {};
   unsigned lost_writes = 0;  ///< the first so many never come to the tool
   std::string shown = {};
 };
@@ -51,8 +51,8 @@ struct Bench : test::BmRig {
     REQUIRE(opened.has_value());
   }
 
-  static sim::BmOptions with_faults(const Setup& setup) {
-    sim::BmOptions how = setup.tool;
+  static sim::DeviceOptions with_faults(const Setup& setup) {
+    sim::DeviceOptions how = setup.tool;
     how.faults = test::plan_of(setup.faults);
     return how;
   }

@@ -26,9 +26,9 @@ constexpr std::uint16_t block_register = 295;
 std::uint16_t first_of(const modbus::Pdu& request) { return get_u16(request.data, 0); }
 
 /// A tool by a profile of its own, and what its source of events tells.
-struct Bench : test::PlainRig {
+struct Bench : test::DeviceRig {
   explicit Bench(const std::string& name, void (*change)(catalogue::EventSpec&) = nullptr)
-      : Rig(changed(name, change), sim::PlainOptions{}) {
+      : Rig(changed(name, change), sim::DeviceOptions{}) {
     source = EventSource::make(profile, EventMode::declared, clock, [this](const auto& news) {
       if (const auto* event = std::get_if<ToolEvent>(&news)) events.push_back(*event);
       if (const auto* gap = std::get_if<EventGap>(&news)) gaps.push_back(*gap);

@@ -150,7 +150,7 @@ TEST_CASE("a fault strikes the answers that it names") {
     const Fault fault = *parse_fault(row.text);
     std::vector<std::uint32_t> struck;
     for (std::uint32_t answer = 1; answer <= 6; ++answer) {
-      if (fault.strikes(answer)) struck.push_back(answer);
+      if (fault.applies_to(answer)) struck.push_back(answer);
     }
     CHECK(struck == row.struck);
   }

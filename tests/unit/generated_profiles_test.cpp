@@ -17,7 +17,6 @@
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/disk.hpp"
-#include "spindle/sim/blv_driver.hpp"
 #include "spindle/sim/simulated_tool.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
@@ -442,13 +441,15 @@ TEST_CASE("generated profiles: what passes the checks can be simulated and asked
     REQUIRE(profile);
     REQUIRE(start);
     ++valid;
-    sim::BmOptions tool{.rundown_every = 3s, .ng_every = 2, .burst = 2};
-    tool.alarms = {{.code = 110, .after = 5s}};
-    tool.faults = {{.kind = sim::FaultKind::reset_neighbour, .number = 5000, .every = 2},
-                   {.kind = sim::FaultKind::store_other, .every = 3}};
-    const sim::BlvOptions bus{.alarms = {{.code = 0x30, .after = 1s}},
-                              .warnings = {{.code = 0x21}}};
-    besiege(*sim::make_simulated_server(*profile, *start, tool, bus), seed);
+    const sim::DeviceOptions options{
+        .faults = {{.kind = sim::FaultKind::reset_neighbour, .number = 5000, .every = 2},
+                   {.kind = sim::FaultKind::store_other, .every = 3}},
+        .rundown_every = 3s,
+        .ng_every = 2,
+        .burst = 2,
+        .alarms = {{.code = 110, .after = 5s}, {.code = 0x30, .after = 1s}},
+        .warnings = {{.code = 0x21}}};
+    besiege(*sim::make_simulated_bus(*profile, *start, options), seed);
   }
   // Else the author has forgotten how to write. Some of what it writes is unguarded by accident.
   CHECK(valid * 5 >= trials().size() * 3);
@@ -530,7 +531,7 @@ values: {"far.*": 1234567890}
   const auto start = shelf.store().load_simulation("beyond");
   REQUIRE(profile);
   REQUIRE(start);
-  const auto bus = sim::make_blv_bus(*profile, *start, {});
+  const auto bus = sim::make_simulated_bus(*profile, *start, {});
   const auto read = [&](std::uint16_t first, std::uint16_t count) {
     return bus->answer({1}, {1},
                        modbus::read_request(modbus::RegisterTable::holding, {first}, count),

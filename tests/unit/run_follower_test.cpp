@@ -151,7 +151,7 @@ TEST_CASE("an alarm ends a run as its result") {
   BmRig rig;
   Bench bench(rig);
   bench.start();
-  bench.after(600ms, [&] { rig.tool->raise_alarm(118, rig.clock.now()); });
+  bench.after(600ms, [&] { rig.tool->raise_alarm(1, 118, rig.clock.now()); });
   const auto run = bench.follow();
   REQUIRE(run);
   REQUIRE(run->event);

@@ -17,7 +17,7 @@ namespace {
 
 /// A world with one tools file and, at 192.168.10.23:5000, one simulated tool.
 struct Bench : test::BmRig {
-  explicit Bench(const sim::BmOptions& how = {}) : BmRig(test::product("doga-bm"), how) {
+  explicit Bench(const sim::DeviceOptions& how = {}) : BmRig(test::product("doga-bm"), how) {
     tools.path = "spindle.yaml";
     tools.tools = {{.name = "station3",
                     .url = "tcp://192.168.10.23",
@@ -179,7 +179,7 @@ TEST_CASE("a profile that was not named is found by asking the tool") {
 TEST_CASE("a tool that fits no profile gives only raw registers, with or without --profile") {
   struct Case {
     std::string what;
-    sim::BmOptions tool;
+    sim::DeviceOptions tool;
     Errc unnamed;
   };
   const std::vector<Case> cases = {

@@ -44,10 +44,10 @@ test::Product product_with_keep_alive() {
 
 /// A simulated tool, the wire to it, and everything that is told of it.
 struct Workshop : test::BmRig {
-  explicit Workshop(const sim::BmOptions& how = {}) : BmRig(product_with_keep_alive(), how) {}
+  explicit Workshop(const sim::DeviceOptions& how = {}) : BmRig(product_with_keep_alive(), how) {}
 
   /// Another tool on the same address; the old one lives on as long as the lines to it.
-  void replace_tool(const sim::BmOptions& how) {
+  void replace_tool(const sim::DeviceOptions& how) {
     wire.cut();
     gone = std::exchange(tool, test::simulated(product_with_keep_alive(), how));
   }
@@ -83,7 +83,7 @@ struct Workshop : test::BmRig {
     return all;
   }
   /// An event at once; error 116 may happen as often as a test wants.
-  void happen() { tool->raise_alarm(116, clock.now()); }
+  void happen() { tool->raise_alarm(1, 116, clock.now()); }
   /// Not by the watcher, but on its connection.
   void switch_output(std::uint16_t value) {
     tool->answer({wire.connections}, {}, modbus::write_request({arm_register}, value), clock.now());
@@ -95,7 +95,7 @@ struct Workshop : test::BmRig {
   std::vector<TimePoint> event_heard = {};
   std::optional<Error> unreached = std::nullopt;
   std::size_t wanted = 1'000'000;  ///< news, then stop
-  std::unique_ptr<sim::BmTool> gone = nullptr;
+  std::unique_ptr<sim::SimulatedBus> gone = nullptr;
 
  private:
   Result<Watcher::Link> link() {
@@ -127,7 +127,9 @@ bool reads_full_block(const test::Wire::Request& asked) {
 }
 
 /// An operator who works every two seconds; a run-down takes less.
-sim::BmOptions busy(unsigned ng_every = 0) { return {.rundown_every = 2s, .ng_every = ng_every}; }
+sim::DeviceOptions busy(unsigned ng_every = 0) {
+  return {.rundown_every = 2s, .ng_every = ng_every};
+}
 
 }  // namespace
 
@@ -378,7 +380,7 @@ TEST_CASE("a counter that comes to the last number, or just past it, hides no ev
   Workshop shop;
   shop.tool->reboot(shop.clock.now());
   const auto happen = [&](std::uint16_t code, int times) {
-    for (int time = 0; time < times; ++time) shop.tool->raise_alarm(code, shop.clock.now());
+    for (int time = 0; time < times; ++time) shop.tool->raise_alarm(1, code, shop.clock.now());
   };
   happen(115, 20);
   int since = 0;
@@ -434,7 +436,7 @@ TEST_CASE("an event that was missed for a moment is a result, and no doubt about
 
 TEST_CASE("another tool or firmware behind the address is said, and its old event is no result") {
   Workshop shop;
-  sim::BmOptions other;
+  sim::DeviceOptions other;
   SUBCASE("serial") { other.serial = 1021100099; }
   SUBCASE("firmware") { other.firmware = 2200; }
   shop.clock.at(shop.clock.now() + 3s, [&] { shop.replace_tool(other); });

@@ -55,7 +55,7 @@ struct Fault {
   std::uint32_t at = 0;              ///< only the answer with this number
   std::uint32_t every = 0;           ///< every answer whose number is divisible by this
 
-  [[nodiscard]] bool strikes(std::uint32_t answer_number) const;
+  [[nodiscard]] bool applies_to(std::uint32_t answer_number) const;
 };
 
 using FaultPlan = std::vector<Fault>;
@@ -69,7 +69,7 @@ enum class FaultNeed : std::uint8_t {
   network,      ///< the header of Modbus TCP
   serial_line,  ///< RTU
   events,       ///< frames that the tool sends unasked
-  screwdriver,  ///< the tool of BmOptions, which has them
+  screwdriver,  ///< a tool that an operator works with, see Abilities
 };
 FaultNeed need_of(FaultKind kind);
 

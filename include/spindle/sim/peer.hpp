@@ -95,7 +95,7 @@ class Peer {
   std::uint16_t push_transaction_ = 1;
   modbus::UnitId unit_ = {};
   Ignored ignored_ = {};
-  bool deaf_ = false;
+  bool closing_ = false;  ///< nothing more is read
 };
 
 }  // namespace spindle::sim

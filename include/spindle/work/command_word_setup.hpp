@@ -35,7 +35,7 @@ class WordSetup final : public MotorSetup {
   }
   [[nodiscard]] std::unique_ptr<device::Stopper> stopper(catalogue::StopMode mode) const override;
   [[nodiscard]] Duration stopping() const override { return found_.stopping; }
-  /// A watchdog that is on is fed more often than it bites.
+  /// A watchdog that is on gets several queries within its period.
   [[nodiscard]] Duration interval(Duration usual) const override;
   [[nodiscard]] std::string advice() const override;
   [[nodiscard]] std::string hint_not_started() const override;

@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "spindle/work/environment.hpp"
 
 namespace spindle::work {
 
 /// What may be chosen of a simulated tool.
 struct SimulatedToolOptions {
-  sim::BmOptions bm = {};
+  sim::DeviceOptions bm = {};
   std::vector<modbus::UnitId> units = {};       ///< of a serial tool; none: as many as usual
   std::optional<Duration> busy = std::nullopt;  ///< how long Configuration takes; empty: as usual
   std::vector<sim::Raised> alarms = {};

@@ -1,5 +1,3 @@
-#include "spindle/sim/blv_driver.hpp"
-
 #include <doctest/doctest.h>
 
 #include <chrono>
@@ -7,6 +5,7 @@
 
 #include "spindle/catalogue/value.hpp"
 #include "spindle/modbus/adu.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "support/rig.hpp"
 #include "unit/hex.hpp"
 
@@ -477,7 +476,6 @@ TEST_CASE("blv bus: it wants silence before a query, and takes its time to answe
   CHECK(bus.tool->answer_delay({1}) == 10ms);
   CHECK(Bus({.baud = 19200}).tool->required_gap() == 5500us);
   CHECK(Bus({.baud = 115200}).tool->required_gap() == 3500us);
-  CHECK(Bus({.gaps = sim::Gaps::ignored}).tool->required_gap() == 0ms);
   bus.write(0x140B, 5);
   bus.pulse(0x018D);
   CHECK(bus.tool->answer_delay({1}) == 10ms);

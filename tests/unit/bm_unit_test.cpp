@@ -1,5 +1,3 @@
-#include "spindle/sim/bm_tool.hpp"
-
 #include <doctest/doctest.h>
 
 #include <string>
@@ -10,6 +8,7 @@
 #include "spindle/files/profile_store.hpp"
 #include "spindle/modbus/pdu.hpp"
 #include "spindle/posix/disk.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 #include "support/edit_list.hpp"
 #include "support/rig.hpp"
 
@@ -52,7 +51,7 @@ struct Status {
 
 // A tool, a client and the time.
 struct Bench : test::BmRig {
-  explicit Bench(const BmOptions& how = {},
+  explicit Bench(const DeviceOptions& how = {},
                  const catalogue::SimulationSpec& facts = test::bm_start())
       : BmRig({test::bm_profile(), facts}, how) {
     tool->connected(client);
@@ -174,7 +173,7 @@ TEST_CASE("exceptions") {
 TEST_CASE("the identity in its forms") {
   struct Row {
     std::string name;
-    BmOptions options;
+    DeviceOptions options;
     std::string expected;
   };
   const std::vector<Row> rows = {
@@ -203,7 +202,7 @@ TEST_CASE("an identity whose usual form is short grows into the long one") {
   catalogue::SimulationSpec facts = test::bm_start();
   facts.identity = hex("0001 0001 0003 0837 3CDCC00A 00 000004D2");
   facts.identity_bytes = 12;
-  const auto identity = [&facts](const BmOptions& options) {
+  const auto identity = [&facts](const DeviceOptions& options) {
     Bench bench(options, facts);
     const Pdu response = bench.ask(modbus::report_server_id_request());
     return to_hex(modbus::server_id_of(response));
@@ -313,7 +312,7 @@ TEST_CASE("a start is echoed and ignored while running, locked or in alarm") {
   CHECK(bench.status().running == 0);
   bench.write(lock, 0);
 
-  bench.tool->raise_alarm(110, bench.clock.now());
+  bench.tool->raise_alarm(1, 110, bench.clock.now());
   bench.write(start, 1);
   CHECK(bench.status().running == 0);
   bench.write(alarm_reset, 1);
@@ -325,7 +324,7 @@ TEST_CASE("an alarm ends a run, is an event, and is reset by one") {
   Bench bench;
   bench.write(start, 1);
   bench.wait(100ms);
-  bench.tool->raise_alarm(110, bench.clock.now());
+  bench.tool->raise_alarm(1, 110, bench.clock.now());
   CHECK(bench.status().running == 0);
   CHECK(bench.status().alarm == 110);
   CHECK(bench.read(RegisterTable::input, 3100, 2) == Registers{110, 0});
@@ -419,7 +418,7 @@ TEST_CASE("auto output expires unless it is armed again, for each client alone")
     bench.wait(row.rearmed_after);
     bench.write(auto_output, 1);
     bench.wait(row.event_after - row.rearmed_after);
-    bench.tool->raise_alarm(7, bench.clock.now());
+    bench.tool->raise_alarm(1, 7, bench.clock.now());
     CHECK(bench.pushed(other_client).empty());
     CHECK(bench.pushed().size() == row.pushed);
   }
@@ -490,7 +489,7 @@ TEST_CASE("a reboot forgets motion, alarm, lock and output, and keeps parameters
   bench.write(2, 300);
   bench.write(auto_output, 1);
   bench.write(lock, 1);
-  bench.tool->raise_alarm(110, bench.clock.now());
+  bench.tool->raise_alarm(1, 110, bench.clock.now());
   bench.tool->reboot(bench.clock.now());
   CHECK(bench.event().number == 0);
   CHECK(bench.status().alarm == 0);
@@ -536,7 +535,7 @@ TEST_CASE("the shipped profiles make tools that answer for all they name") {
     const auto facts = store.load_simulation(id);
     REQUIRE(profile.has_value());
     REQUIRE(facts.has_value());
-    const auto tool = make_bm_tool(*profile, *facts, {});
+    const auto tool = make_simulated_bus(*profile, *facts, {});
     const auto ask = [&tool](const Pdu& request, TimePoint now) {
       return tool->answer(client, {0}, request, now).value();
     };

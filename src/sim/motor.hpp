@@ -10,7 +10,7 @@ namespace spindle::sim {
 
 /// The speed of a simulated motor over time, in r/min, + forward. A ramp between standstill and a
 /// speed takes the whole acceleration or deceleration time. Pure.
-class BlvMotor {
+class Motor {
  public:
   /// Goes to a speed, through standstill when it turns the other way round.
   void go_to(std::int64_t speed, Duration acceleration, Duration deceleration, TimePoint now);

@@ -1,4 +1,4 @@
-#include "blv_motor.hpp"
+#include "motor.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -18,7 +18,7 @@ std::int64_t share(std::int64_t value, std::int64_t part, std::int64_t whole) {
 
 }  // namespace
 
-void BlvMotor::add(std::int64_t from, std::int64_t to, Duration whole, TimePoint begin) {
+void Motor::add(std::int64_t from, std::int64_t to, Duration whole, TimePoint begin) {
   const std::int64_t larger = std::max(std::abs(from), std::abs(to));
   const std::int64_t step = std::abs(to - from);
   const Duration time =
@@ -26,8 +26,7 @@ void BlvMotor::add(std::int64_t from, std::int64_t to, Duration whole, TimePoint
   ramps_.push_back({from, to, begin, begin + time});
 }
 
-void BlvMotor::go_to(std::int64_t speed, Duration acceleration, Duration deceleration,
-                     TimePoint now) {
+void Motor::go_to(std::int64_t speed, Duration acceleration, Duration deceleration, TimePoint now) {
   if (speed == target_ && !ramps_.empty() && speed != 0) return;  // it is on its way there
   const std::int64_t from = this->speed(now);
   ramps_.clear();
@@ -42,19 +41,19 @@ void BlvMotor::go_to(std::int64_t speed, Duration acceleration, Duration deceler
   }
 }
 
-void BlvMotor::brake(TimePoint now) {
+void Motor::brake(TimePoint now) {
   ramps_ = {{0, 0, now, now}};
   target_ = 0;
 }
 
-void BlvMotor::coast(TimePoint now) {
+void Motor::coast(TimePoint now) {
   const std::int64_t from = speed(now);
   ramps_.clear();
   target_ = 0;
   add(from, 0, coasting, now);
 }
 
-std::int64_t BlvMotor::speed(TimePoint now) const {
+std::int64_t Motor::speed(TimePoint now) const {
   for (const Ramp& ramp : ramps_) {
     if (now >= ramp.end) continue;
     const auto passed = std::max(now - ramp.begin, Duration::zero()).count();
@@ -64,6 +63,6 @@ std::int64_t BlvMotor::speed(TimePoint now) const {
   return target_;
 }
 
-TimePoint BlvMotor::end() const { return ramps_.empty() ? TimePoint::min() : ramps_.back().end; }
+TimePoint Motor::end() const { return ramps_.empty() ? TimePoint::min() : ramps_.back().end; }
 
 }  // namespace spindle::sim

@@ -1,4 +1,4 @@
-#include "bm_identity.hpp"
+#include "identity.hpp"
 
 #include <algorithm>
 
@@ -69,7 +69,7 @@ void put_serial(const IdentitySpec& facts, Bytes& bytes, std::uint64_t serial) {
 }  // namespace
 
 Bytes make_identity(const std::optional<IdentitySpec>& facts,
-                    const catalogue::SimulationSpec& start, const BmOptions& options) {
+                    const catalogue::SimulationSpec& start, const DeviceOptions& options) {
   const std::size_t usual = start.identity_bytes > 0 ? start.identity_bytes : start.identity.size();
   Bytes identity(start.identity.begin(), start.identity.end());
   constexpr std::size_t most = modbus::max_pdu_size - 2;

@@ -2,7 +2,7 @@
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/catalogue/profile.hpp"
-#include "spindle/sim/bm_tool.hpp"
+#include "spindle/sim/simulated_tool.hpp"
 
 namespace spindle::sim {
 
@@ -11,6 +11,6 @@ namespace spindle::sim {
 /// names. The start state has its serial number in the form of its usual length; another length
 /// gets the same serial in its own form.
 Bytes make_identity(const std::optional<catalogue::IdentitySpec>& facts,
-                    const catalogue::SimulationSpec& start, const BmOptions& options);
+                    const catalogue::SimulationSpec& start, const DeviceOptions& options);
 
 }  // namespace spindle::sim

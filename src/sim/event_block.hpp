@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,37 +14,36 @@
 
 namespace spindle::sim {
 
-/// The events of a simulated tool, by its profile: the block, its counter, the flag that reading
+/// The events of a simulated device, by its profile: the block, its counter, the flag that reading
 /// clears, and the clients that get frames unasked. Keeps no reference to the profile.
-class EventUnit {
+class EventBlock {
  public:
-  /// Without events nothing ever happens.
-  explicit EventUnit(const catalogue::Profile& profile) : facts_(profile.events) {}
-
-  [[nodiscard]] const std::optional<catalogue::EventSpec>& facts() const { return facts_; }
+  /// Without events nothing ever happens. `bank` must outlive it.
+  EventBlock(const catalogue::Profile& profile, RegisterBank& bank)
+      : facts_(profile.events), bank_(&bank) {}
 
   /// Whether the product has a word for it.
   [[nodiscard]] bool knows(catalogue::EventKind kind) const;
 
-  /// How often something has happened, as far as the tool counts.
-  [[nodiscard]] std::uint16_t number(const RegisterBank& bank) const;
+  /// How often something has happened, as far as the device counts.
+  [[nodiscard]] std::int64_t number() const { return facts_ ? bank_->get(facts_->number) : 0; }
 
-  using Values = std::vector<std::pair<std::string, std::uint16_t>>;
+  using Values = std::vector<std::pair<std::string, std::int64_t>>;
   /// Something happens: it is counted, stands in the block, and is sent to those who are armed.
-  void emit(catalogue::EventKind kind, const Values& values, RegisterBank& bank, TimePoint now);
+  void emit(catalogue::EventKind kind, const Values& values, TimePoint now);
 
   /// These registers were read: a flag among them is cleared.
-  void note_read(const modbus::ReadRequest& wanted, RegisterBank& bank) const;
+  void note_read(const modbus::ReadRequest& wanted);
 
   /// Whether this holding register arms the output.
   [[nodiscard]] bool is_arming(std::uint16_t address) const {
     return facts_ && facts_->arm && facts_->arm->address == address;
   }
   /// Requires a register that arms. Other values than those for on and off do nothing.
-  void arm(ConnectionId connection, std::uint16_t value, TimePoint now);
+  void arm(ConnectionId connection, std::uint32_t value, TimePoint now);
 
   /// The last event as a frame; empty when the product sends none.
-  [[nodiscard]] std::optional<modbus::Pdu> frame(const RegisterBank& bank) const;
+  [[nodiscard]] std::optional<modbus::Pdu> frame() const;
 
   std::vector<Push> take_pushes() { return std::exchange(pushes_, {}); }
   std::vector<Push> take_pushes(ConnectionId connection);
@@ -51,10 +51,11 @@ class EventUnit {
   void connected(ConnectionId connection);
   void disconnected(ConnectionId connection);
   /// Nothing is armed any more, and events count from 0 again.
-  void reboot(RegisterBank& bank);
+  void restart();
 
  private:
   std::optional<catalogue::EventSpec> facts_;
+  RegisterBank* bank_;
   std::map<ConnectionId, TimePoint> armed_until_ = {};
   std::vector<Push> pushes_ = {};
 };
