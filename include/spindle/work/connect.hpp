@@ -29,8 +29,8 @@ Result<catalogue::Profile> load_profile(const Target& target, const Environment&
 /// Whether an operator works with a tool of sim:, so that there is something to watch.
 enum class SimulatedOperator : std::uint8_t { absent, working };
 
-/// Connects with a profile that outlives the device, and asks nothing. `late_answers` says whether an
-/// earlier connection to this tool had trouble.
+/// Connects with a profile that outlives the device, and asks nothing. `late_answers` says whether
+/// an earlier connection to this tool had trouble.
 Result<device::Device> connect_device(
     const Target& target, const catalogue::Profile& profile, const Environment& environment,
     SimulatedOperator simulated_operator = SimulatedOperator::absent,
