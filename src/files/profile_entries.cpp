@@ -64,8 +64,6 @@ namespace {
 
 using catalogue::Action;
 using catalogue::Evidence;
-using catalogue::Hazard;
-using catalogue::Kind;
 using catalogue::Label;
 using catalogue::Parameter;
 
