@@ -102,31 +102,39 @@ struct Path<first, rest...> {
   }
 };
 
+template <const auto& fields>
+using TargetOf = typename std::remove_cvref_t<decltype(fields[0])>::Target;
 template <auto... path>
 using OuterOf = typename Path<path...>::Outer;
 template <auto... path>
 using MemberOf =
     std::remove_reference_t<decltype(Path<path...>::in(std::declval<OuterOf<path...>&>()))>;
 
-/// A value of another type than the member's, which can be made of it.
-template <typename As, auto... path>
-constexpr auto field_as(std::string_view name, Need need = Need::optional) {
+/// A row whose value is read into a member.
+template <auto... path, typename Read>
+constexpr auto row(const Key& key, Read) {
   using T = OuterOf<path...>;
-  return Field<T>{{.name = name, .need = need, .value = ValueReader<As>::value},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    auto& member = Path<path...>::in(target);
-                    if constexpr (std::is_same_v<As, MemberOf<path...>>) {
-                      ValueReader<As>::read(value, member, asked);
-                    } else {
-                      read_as<As>(value, member, asked);
-                    }
+  return Field<T>{key, [](const YamlNode& node, T& target, const Asked& asked) {
+                    Read{}(node, Path<path...>::in(target), asked);
                   }};
 }
 
 /// A value of the member's own type.
 template <auto... path>
 constexpr auto field(std::string_view name, Need need = Need::optional) {
-  return field_as<MemberOf<path...>, path...>(name, need);
+  return row<path...>({name, need, value_name<MemberOf<path...>>},
+                      [](const YamlNode& node, auto& member, const Asked& asked) {
+                        read_value(node, member, asked);
+                      });
+}
+
+/// A value of another type, which the member can be made of.
+template <typename As, auto... path>
+constexpr auto field_as(std::string_view name, Need need = Need::optional) {
+  return row<path...>({name, need, value_name<As>},
+                      [](const YamlNode& node, auto& member, const Asked& asked) {
+                        read_as<As>(node, member, asked);
+                      });
 }
 
 /// A range whose ends are two members.
@@ -134,10 +142,10 @@ template <auto first, auto last>
 constexpr auto range(std::string_view name, Need need = Need::optional) {
   using T = OuterOf<first>;
   using Ends = std::pair<MemberOf<first>, MemberOf<last>>;
-  return Field<T>{{.name = name, .need = need, .value = ValueReader<Ends>::value},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
+  return Field<T>{{name, need, value_name<Ends>},
+                  [](const YamlNode& node, T& target, const Asked& asked) {
                     Ends ends{target.*first, target.*last};
-                    ValueReader<Ends>::read(value, ends, asked);
+                    read_value(node, ends, asked);
                     std::tie(target.*first, target.*last) = ends;
                   }};
 }
@@ -158,58 +166,54 @@ void read_word(const EnumTable<E, count>& words, const YamlNode& node, auto& tar
 /// A word of the table; `what` it is, for the finding about another one.
 template <const auto& words, auto... path>
 constexpr auto word(std::string_view name, Need need = Need::optional, std::string_view what = {}) {
-  using T = OuterOf<path...>;
-  return Field<T>{{.name = name, .need = need, .words = [] { return words.words(); }, .what = what},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    read_word(words, value, Path<path...>::in(target), asked);
-                  }};
+  return row<path...>(
+      {.name = name, .need = need, .words = [] { return words.words(); }, .what = what},
+      [](const YamlNode& node, auto& member, const Asked& asked) {
+        read_word(words, node, member, asked);
+      });
 }
 
 /// A list of numbers of this type.
 template <typename Number, auto... path>
 constexpr auto numbers(std::string_view name, Need need = Need::optional) {
-  using T = OuterOf<path...>;
-  return Field<T>{{.name = name, .need = need, .value = "list of numbers"},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    Path<path...>::in(target) = to_numbers<Number>(value, asked.findings);
-                  }};
-}
-
-/// A map with keys of its own that is read into the same target.
-template <const auto& fields>
-constexpr auto map_here(std::string_view name, Need need = Need::optional) {
-  using T = typename std::remove_cvref_t<decltype(fields[0])>::Target;
-  return Field<T>{{.name = name, .need = need, .value = "map", .inner = keys_of<fields>},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    read_map(fields, value, target, asked.findings, asked.inherited);
-                  }};
+  return row<path...>({name, need, "list of numbers"},
+                      [](const YamlNode& node, auto& member, const Asked& asked) {
+                        member = to_numbers<Number>(node, asked.findings);
+                      });
 }
 
 /// A map with keys of its own.
 template <const auto& fields, auto... path>
 constexpr auto map_of(std::string_view name, Need need = Need::optional) {
-  using T = OuterOf<path...>;
+  return row<path...>({.name = name, .need = need, .value = "map", .inner = keys_of<fields>},
+                      [](const YamlNode& node, auto& member, const Asked& asked) {
+                        read_map(fields, node, member, asked.findings, asked.inherited);
+                      });
+}
+
+/// The same, read into the target itself.
+template <const auto& fields>
+constexpr auto map_here(std::string_view name, Need need = Need::optional) {
+  using T = TargetOf<fields>;
   return Field<T>{{.name = name, .need = need, .value = "map", .inner = keys_of<fields>},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    read_map(fields, value, Path<path...>::in(target), asked.findings,
-                             asked.inherited);
+                  [](const YamlNode& node, T& target, const Asked& asked) {
+                    read_map(fields, node, target, asked.findings, asked.inherited);
                   }};
 }
 
 /// A list of such maps.
 template <const auto& fields, auto... path>
 constexpr auto list_of(std::string_view name, Need need = Need::optional) {
-  using T = OuterOf<path...>;
-  using Item = typename std::remove_cvref_t<decltype(fields[0])>::Target;
-  return Field<T>{{.name = name, .need = need, .value = "list of maps", .inner = keys_of<fields>},
-                  [](const YamlNode& value, T& target, const Asked& asked) {
-                    expect(value, YamlNode::Kind::sequence, asked.findings);
-                    std::vector<Item> items;
-                    for (const YamlNode& item : value.items) {
-                      read_map(fields, item, items.emplace_back(), asked.findings);
-                    }
-                    Path<path...>::in(target) = std::move(items);
-                  }};
+  return row<path...>(
+      {.name = name, .need = need, .value = "list of maps", .inner = keys_of<fields>},
+      [](const YamlNode& node, auto& member, const Asked& asked) {
+        expect(node, YamlNode::Kind::sequence, asked.findings);
+        std::vector<TargetOf<fields>> items;
+        for (const YamlNode& item : node.items) {
+          read_map(fields, item, items.emplace_back(), asked.findings);
+        }
+        member = std::move(items);
+      });
 }
 
 /// What no other row can say.

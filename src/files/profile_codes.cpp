@@ -76,8 +76,7 @@ void read_code_map(const YamlNode& node, const CodeText& common, Codes& codes,
 
 }  // namespace
 
-bool ValueReader<catalogue::CodeTexts>::read(const YamlNode& node, catalogue::CodeTexts& target,
-                                             const Asked& asked) {
+bool read_value(const YamlNode& node, catalogue::CodeTexts& target, const Asked& asked) {
   Codes codes = target.to_map();
   if (node.kind == YamlNode::Kind::sequence) {
     for (const YamlNode& item : node.items) {

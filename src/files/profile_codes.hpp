@@ -7,11 +7,9 @@ namespace spindle::files {
 
 /// A map of codes, or a list of such maps with the evidence that each shares; laid over what is
 /// there.
+bool read_value(const YamlNode& node, catalogue::CodeTexts& target, const Asked& asked);
 template <>
-struct ValueReader<catalogue::CodeTexts> {
-  static constexpr std::string_view value = "texts by code";
-  static bool read(const YamlNode& node, catalogue::CodeTexts& target, const Asked& asked);
-};
+inline constexpr std::string_view value_name<catalogue::CodeTexts> = "texts by code";
 
 /// The keys of one map of such a list.
 std::vector<Key> code_list_keys();

@@ -26,46 +26,42 @@ std::optional<catalogue::Range> parse_limits(std::string_view text) {
 }  // namespace
 
 template <>
-struct ValueReader<catalogue::Range> {
-  static constexpr std::string_view value = "range of decimal numbers";
-  static bool read(const YamlNode& node, catalogue::Range& target, const Asked& asked) {
-    if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
-    const auto range = parse_limits(node.text);
-    if (range) {
-      target = *range;
-    } else {
-      asked.findings.add(node.at, fmt::format("'{}' is not a range such as 0..6.00", node.text));
-    }
-    return range.has_value();
+constexpr std::string_view value_name<catalogue::Range> = "range of decimal numbers";
+
+bool read_value(const YamlNode& node, catalogue::Range& target, const Asked& asked) {
+  if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
+  const auto range = parse_limits(node.text);
+  if (range) {
+    target = *range;
+  } else {
+    asked.findings.add(node.at, fmt::format("'{}' is not a range such as 0..6.00", node.text));
   }
-};
+  return range.has_value();
+}
 
 template <>
-struct ValueReader<catalogue::List<catalogue::Label>> {
-  static constexpr std::string_view value = "text by number";
-  static bool read(const YamlNode& node, catalogue::List<catalogue::Label>& target,
-                   const Asked& asked) {
-    std::vector<catalogue::Label> labels;
-    expect(node, YamlNode::Kind::map, asked.findings);
-    for (const YamlEntry& entry : node.entries) {
-      const auto number = parse_integer(entry.key);
-      if (!number) {
-        asked.findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
-      }
-      auto text = to_text(entry.value, asked.findings);
-      if (number && text) labels.push_back({*number, std::move(*text)});
+constexpr std::string_view value_name<catalogue::List<catalogue::Label>> = "text by number";
+
+bool read_value(const YamlNode& node, catalogue::List<catalogue::Label>& target,
+                const Asked& asked) {
+  std::vector<catalogue::Label> labels;
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto number = parse_integer(entry.key);
+    if (!number) {
+      asked.findings.add(entry.key_at, fmt::format("'{}' is not a whole number", entry.key));
     }
-    target = std::move(labels);
-    return true;
+    auto text = to_text(entry.value, asked.findings);
+    if (number && text) labels.push_back({*number, std::move(*text)});
   }
-};
+  target = std::move(labels);
+  return true;
+}
 
 namespace {
 
 using catalogue::Action;
 using catalogue::Evidence;
-using catalogue::Hazard;
-using catalogue::Kind;
 using catalogue::Label;
 using catalogue::Parameter;
 
@@ -113,7 +109,7 @@ void read_name(const YamlNode& node, Parameter& parameter, const Asked& asked) {
 
 void read_except(const YamlNode& node, Parameter& parameter, const Asked& asked) {
   catalogue::Range except;
-  if (!ValueReader<catalogue::Range>::read(node, except, asked)) return;
+  if (!read_value(node, except, asked)) return;
   if (except.minimum && except.maximum) {
     parameter.except = except;
   } else {
@@ -166,7 +162,7 @@ constexpr Field<Parameter> bits_by_fields[] = {
 
 void read_scale(const YamlNode& node, Parameter& parameter, const Asked& asked) {
   Decimal scale;
-  if (!ValueReader<Decimal>::read(node, scale, asked)) return;
+  if (!read_value(node, scale, asked)) return;
   if (scale > Decimal(0)) {
     parameter.encoding.scale = scale;
   } else {
@@ -190,7 +186,7 @@ void read_unit(const YamlNode& node, Parameter& parameter, const Asked& asked) {
 
 void read_secret(const YamlNode& node, Parameter& parameter, const Asked& asked) {
   bool secret = false;
-  ValueReader<bool>::read(node, secret, asked);
+  read_value(node, secret, asked);
   if (secret) parameter.secrecy = catalogue::Secrecy::secret;
 }
 
@@ -358,7 +354,7 @@ void read_group(const YamlNode& node, const YamlNode& fields, ProfileDraft& draf
 
 void read_action_range(const YamlNode& node, Action& action, const Asked& asked) {
   std::pair<std::uint16_t, std::uint16_t> range;
-  action.has_range = ValueReader<decltype(range)>::read(node, range, asked);
+  action.has_range = read_value(node, range, asked);
   if (action.has_range) std::tie(action.minimum, action.maximum) = range;
 }
 

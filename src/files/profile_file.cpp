@@ -19,48 +19,48 @@
 namespace spindle::files {
 
 template <>
-struct ValueReader<catalogue::UnitRange> : ValueReader<std::pair<std::uint8_t, std::uint8_t>> {
-  static bool read(const YamlNode& node, catalogue::UnitRange& target, const Asked& asked) {
-    std::pair<std::uint8_t, std::uint8_t> units;
-    if (!ValueReader<decltype(units)>::read(node, units, asked)) return false;
-    target = {units.first, units.second};
-    return true;
-  }
-};
+constexpr std::string_view value_name<catalogue::UnitRange> = "range 0..255";
+
+bool read_value(const YamlNode& node, catalogue::UnitRange& target, const Asked& asked) {
+  std::pair<std::uint8_t, std::uint8_t> units;
+  if (!read_value(node, units, asked)) return false;
+  target = {units.first, units.second};
+  return true;
+}
 
 /// From the first byte to the last.
 template <>
-struct ValueReader<catalogue::Slice> : ValueReader<std::pair<std::uint8_t, std::uint8_t>> {
-  static bool read(const YamlNode& node, catalogue::Slice& target, const Asked& asked) {
-    std::pair<std::uint8_t, std::uint8_t> bytes;
-    if (!ValueReader<decltype(bytes)>::read(node, bytes, asked)) return false;
-    target = {bytes.first, static_cast<std::uint8_t>(bytes.second - bytes.first + 1)};
-    return true;
-  }
-};
+constexpr std::string_view value_name<catalogue::Slice> = "range 0..255";
+
+bool read_value(const YamlNode& node, catalogue::Slice& target, const Asked& asked) {
+  std::pair<std::uint8_t, std::uint8_t> bytes;
+  if (!read_value(node, bytes, asked)) return false;
+  target = {bytes.first, static_cast<std::uint8_t>(bytes.second - bytes.first + 1)};
+  return true;
+}
 
 /// Laid over what is there.
 template <std::integral Number>
-struct ValueReader<catalogue::Table<Number, catalogue::Text>> {
-  static constexpr std::string_view value = "text by number";
-  static bool read(const YamlNode& node, catalogue::Table<Number, catalogue::Text>& target,
-                   const Asked& asked) {
-    constexpr std::uint64_t last = std::numeric_limits<std::uint16_t>::max();
-    std::map<Number, catalogue::Text> names = target.to_map();
-    expect(node, YamlNode::Kind::map, asked.findings);
-    for (const YamlEntry& entry : node.entries) {
-      const auto number = parse_unsigned(entry.key, last);
-      if (!number) {
-        asked.findings.add(entry.key_at,
-                           fmt::format("'{}' is not a number up to {}", entry.key, last));
-      }
-      auto text = to_text(entry.value, asked.findings);
-      if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
+constexpr std::string_view value_name<catalogue::Table<Number, catalogue::Text>> = "text by number";
+
+template <std::integral Number>
+bool read_value(const YamlNode& node, catalogue::Table<Number, catalogue::Text>& target,
+                const Asked& asked) {
+  constexpr std::uint64_t last = std::numeric_limits<std::uint16_t>::max();
+  std::map<Number, catalogue::Text> names = target.to_map();
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto number = parse_unsigned(entry.key, last);
+    if (!number) {
+      asked.findings.add(entry.key_at,
+                         fmt::format("'{}' is not a number up to {}", entry.key, last));
     }
-    target = std::move(names);
-    return true;
+    auto text = to_text(entry.value, asked.findings);
+    if (number && text) names.insert_or_assign(static_cast<Number>(*number), std::move(*text));
   }
-};
+  target = std::move(names);
+  return true;
+}
 
 namespace {
 
@@ -104,16 +104,12 @@ constexpr Field<std::vector<Area>> areas_fields[] = {
 
 }  // namespace
 
-template <>
-struct ValueReader<catalogue::List<Area>> {
-  static constexpr std::string_view value = "map";
-  static bool read(const YamlNode& node, catalogue::List<Area>& target, const Asked& asked) {
-    std::vector<Area> areas;
-    read_map(areas_fields, node, areas, asked.findings);
-    target = std::move(areas);
-    return true;
-  }
-};
+bool read_value(const YamlNode& node, catalogue::List<Area>& target, const Asked& asked) {
+  std::vector<Area> areas;
+  read_map(areas_fields, node, areas, asked.findings);
+  target = std::move(areas);
+  return true;
+}
 
 namespace {
 
@@ -232,7 +228,7 @@ std::optional<catalogue::EventKind> to_kind(const std::string& name, const Sourc
 
 void read_kinds(const YamlNode& node, EventSpec& events, const Asked& asked) {
   catalogue::Table<std::int64_t, catalogue::Text> names;
-  ValueReader<decltype(names)>::read(node, names, asked);
+  read_value(node, names, asked);
   std::map<std::int64_t, catalogue::EventKind> kinds = events.kinds.to_map();
   for (const auto& [number, name] : names) {
     const auto kind = to_kind(name, node.at, asked.findings);
@@ -291,7 +287,7 @@ constexpr Field<catalogue::ExtendedErrorSpec> refusal_fields[] = {
 
 void read_alarm_parameters(const YamlNode& node, catalogue::AlarmList& list, const Asked& asked) {
   catalogue::Text pattern;
-  if (ValueReader<catalogue::Text>::read(node, pattern, asked)) list.parameters = {pattern};
+  if (read_value(node, pattern, asked)) list.parameters = {pattern};
 }
 
 constexpr Field<catalogue::AlarmList> alarm_list_fields[] = {
@@ -309,7 +305,7 @@ void read_format(const YamlNode& node, ProfileHead&, const Asked& asked) {
 }
 
 void read_extends(const YamlNode& node, ProfileHead& head, const Asked& asked) {
-  ValueReader<std::string>::read(node, head.extends, asked);
+  read_value(node, head.extends, asked);
   head.extends_at = node.at;
 }
 

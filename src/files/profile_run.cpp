@@ -75,7 +75,7 @@ void read_running(const YamlNode& node, MonitorSpec& monitor, const Asked& asked
   if (node.kind == YamlNode::Kind::sequence) {
     monitor.running_values = to_numbers<std::uint32_t>(node, asked.findings);
   } else {
-    ValueReader<std::optional<std::uint8_t>>::read(node, monitor.running, asked);
+    read_value(node, monitor.running, asked);
   }
 }
 
@@ -121,7 +121,7 @@ using Selections = std::vector<catalogue::StartOption>;
 
 void read_selection(const YamlNode& node, Selections& selections, const Asked& asked) {
   catalogue::StartOption option{.option = asked.key.name};
-  if (ValueReader<catalogue::Text>::read(node, option.action, asked)) {
+  if (read_value(node, option.action, asked)) {
     selections.push_back(std::move(option));
   }
 }

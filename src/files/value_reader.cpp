@@ -6,7 +6,7 @@
 
 namespace spindle::files {
 
-bool ValueReader<bool>::read(const YamlNode& node, bool& target, const Asked& asked) {
+bool read_value(const YamlNode& node, bool& target, const Asked& asked) {
   if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
   const bool is_true = node.text == "true";
   if (!is_true && node.text != "false") {
@@ -17,7 +17,7 @@ bool ValueReader<bool>::read(const YamlNode& node, bool& target, const Asked& as
   return true;
 }
 
-bool ValueReader<Decimal>::read(const YamlNode& node, Decimal& target, const Asked& asked) {
+bool read_value(const YamlNode& node, Decimal& target, const Asked& asked) {
   if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
   const auto number = Decimal::parse(node.text);
   if (!number) {
@@ -28,7 +28,7 @@ bool ValueReader<Decimal>::read(const YamlNode& node, Decimal& target, const Ask
   return true;
 }
 
-bool ValueReader<Duration>::read(const YamlNode& node, Duration& target, const Asked& asked) {
+bool read_value(const YamlNode& node, Duration& target, const Asked& asked) {
   if (!expect(node, YamlNode::Kind::scalar, asked.findings)) return false;
   const auto read = parse_duration(node.text);
   if (!read) {
@@ -40,7 +40,7 @@ bool ValueReader<Duration>::read(const YamlNode& node, Duration& target, const A
   return true;
 }
 
-bool ValueReader<std::string>::read(const YamlNode& node, std::string& target, const Asked& asked) {
+bool read_value(const YamlNode& node, std::string& target, const Asked& asked) {
   auto text = to_text(node, asked.findings);
   if (!text) return false;
   if (asked.required && text->empty()) {
@@ -50,15 +50,27 @@ bool ValueReader<std::string>::read(const YamlNode& node, std::string& target, c
   return true;
 }
 
-bool ValueReader<catalogue::List<catalogue::Text>>::read(const YamlNode& node,
-                                                         catalogue::List<catalogue::Text>& target,
-                                                         const Asked& asked) {
+bool read_value(const YamlNode& node, catalogue::List<catalogue::Text>& target,
+                const Asked& asked) {
   expect(node, YamlNode::Kind::sequence, asked.findings);
   std::vector<catalogue::Text> texts;
   for (const YamlNode& item : node.items) {
     if (auto text = to_text(item, asked.findings)) texts.emplace_back(std::move(*text));
   }
   target = std::move(texts);
+  return true;
+}
+
+bool read_value(const YamlNode& node, catalogue::Text& target, const Asked& asked) {
+  return read_as<std::string>(node, target, asked);
+}
+
+bool read_value(const YamlNode& node, modbus::RegisterAddress& target, const Asked& asked) {
+  return read_value(node, target.value, asked);
+}
+
+bool read_value(const YamlNode& node, const YamlNode*& target, const Asked&) {
+  target = &node;
   return true;
 }
 

@@ -44,105 +44,74 @@ struct Asked {
   Diagnostics& findings;
 };
 
-/// How values are read into one type: `value` names them for people; read() says whether the target
-/// has got one, and leaves it as it was beside a finding.
+// ---- values: what they are for people, and an overload of read_value() for each type, which says
+// whether the target has got it; beside a finding the target stays as it was ----
+
 template <typename T>
-struct ValueReader;
+inline constexpr std::string_view value_name = "map";
+template <std::unsigned_integral T>
+inline constexpr std::string_view value_name<T> = sizeof(T) == 1   ? "number 0..255"
+                                                  : sizeof(T) == 2 ? "number 0..65535"
+                                                                   : "number 0..4294967295";
+template <std::unsigned_integral T>
+inline constexpr std::string_view value_name<std::pair<T, T>> = sizeof(T) == 1 ? "range 0..255"
+                                                                               : "range 0..65535";
+template <typename T>
+inline constexpr std::string_view value_name<std::optional<T>> = value_name<T>;
+template <>
+inline constexpr std::string_view value_name<bool> = "true | false";
+template <>
+inline constexpr std::string_view value_name<Decimal> = "decimal number";
+template <>
+inline constexpr std::string_view value_name<Duration> = "duration";
+template <>
+inline constexpr std::string_view value_name<std::string> = "text";
+template <>
+inline constexpr std::string_view value_name<catalogue::Text> = "text";
+template <>
+inline constexpr std::string_view value_name<catalogue::List<catalogue::Text>> = "list of text";
+template <>
+inline constexpr std::string_view value_name<modbus::RegisterAddress> = "number 0..65535";
+
+bool read_value(const YamlNode& node, bool& target, const Asked& asked);
+bool read_value(const YamlNode& node, Decimal& target, const Asked& asked);
+bool read_value(const YamlNode& node, Duration& target, const Asked& asked);
+/// One that is required is not empty.
+bool read_value(const YamlNode& node, std::string& target, const Asked& asked);
+bool read_value(const YamlNode& node, catalogue::Text& target, const Asked& asked);
+bool read_value(const YamlNode& node, catalogue::List<catalogue::Text>& target, const Asked& asked);
+bool read_value(const YamlNode& node, modbus::RegisterAddress& target, const Asked& asked);
+/// What is read later.
+bool read_value(const YamlNode& node, const YamlNode*& target, const Asked& asked);
 
 template <std::unsigned_integral T>
-struct ValueReader<T> {
-  static constexpr std::string_view value = sizeof(T) == 1   ? "number 0..255"
-                                            : sizeof(T) == 2 ? "number 0..65535"
-                                                             : "number 0..4294967295";
-  static bool read(const YamlNode& node, T& target, const Asked& asked) {
-    const auto number = to_unsigned(node, std::numeric_limits<T>::max(), asked.findings);
-    if (number) target = static_cast<T>(*number);
-    return number.has_value();
-  }
-};
+bool read_value(const YamlNode& node, T& target, const Asked& asked) {
+  const auto number = to_unsigned(node, std::numeric_limits<T>::max(), asked.findings);
+  if (number) target = static_cast<T>(*number);
+  return number.has_value();
+}
 
-template <>
-struct ValueReader<bool> {
-  static constexpr std::string_view value = "true | false";
-  static bool read(const YamlNode& node, bool& target, const Asked& asked);
-};
+/// A range.
+template <std::unsigned_integral T>
+bool read_value(const YamlNode& node, std::pair<T, T>& target, const Asked& asked) {
+  const auto range = to_range(node, std::numeric_limits<T>::max(), asked.findings);
+  if (range) target = {static_cast<T>(range->from), static_cast<T>(range->to)};
+  return range.has_value();
+}
 
-template <>
-struct ValueReader<Decimal> {
-  static constexpr std::string_view value = "decimal number";
-  static bool read(const YamlNode& node, Decimal& target, const Asked& asked);
-};
-
-template <>
-struct ValueReader<Duration> {
-  static constexpr std::string_view value = "duration";
-  static bool read(const YamlNode& node, Duration& target, const Asked& asked);
-};
-
-/// One that is required is not empty.
-template <>
-struct ValueReader<std::string> {
-  static constexpr std::string_view value = "text";
-  static bool read(const YamlNode& node, std::string& target, const Asked& asked);
-};
-
-/// Read by another type of value.
+/// Read as a value of another type.
 template <typename As, typename T>
 bool read_as(const YamlNode& node, T& target, const Asked& asked) {
   As read = {};
-  const bool is_read = ValueReader<As>::read(node, read, asked);
+  const bool is_read = read_value(node, read, asked);
   if (is_read) target = T(std::move(read));
   return is_read;
 }
 
-template <>
-struct ValueReader<catalogue::Text> : ValueReader<std::string> {
-  static bool read(const YamlNode& node, catalogue::Text& target, const Asked& asked) {
-    return read_as<std::string>(node, target, asked);
-  }
-};
-
-template <>
-struct ValueReader<modbus::RegisterAddress> : ValueReader<std::uint16_t> {
-  static bool read(const YamlNode& node, modbus::RegisterAddress& target, const Asked& asked) {
-    return ValueReader<std::uint16_t>::read(node, target.value, asked);
-  }
-};
-
-/// Both ends are numbers of the type.
-template <std::unsigned_integral T>
-struct ValueReader<std::pair<T, T>> {
-  static constexpr std::string_view value = sizeof(T) == 1 ? "range 0..255" : "range 0..65535";
-  static bool read(const YamlNode& node, std::pair<T, T>& target, const Asked& asked) {
-    const auto range = to_range(node, std::numeric_limits<T>::max(), asked.findings);
-    if (range) target = {static_cast<T>(range->from), static_cast<T>(range->to)};
-    return range.has_value();
-  }
-};
-
 template <typename T>
-struct ValueReader<std::optional<T>> : ValueReader<T> {
-  static bool read(const YamlNode& node, std::optional<T>& target, const Asked& asked) {
-    return read_as<T>(node, target, asked);
-  }
-};
-
-template <>
-struct ValueReader<catalogue::List<catalogue::Text>> {
-  static constexpr std::string_view value = "list of text";
-  static bool read(const YamlNode& node, catalogue::List<catalogue::Text>& target,
-                   const Asked& asked);
-};
-
-/// A node that is read later.
-template <>
-struct ValueReader<const YamlNode*> {
-  static constexpr std::string_view value = "map";
-  static bool read(const YamlNode& node, const YamlNode*& target, const Asked&) {
-    target = &node;
-    return true;
-  }
-};
+bool read_value(const YamlNode& node, std::optional<T>& target, const Asked& asked) {
+  return read_as<T>(node, target, asked);
+}
 
 /// The items of a list that are numbers of this type.
 template <std::unsigned_integral T>
