@@ -37,13 +37,13 @@ struct CodePoints {{
 """
 
 
-def no_cell(code, category):
+def zero_width(code, category):
     joins = code in JAMO or code in (0x200C, 0x200D)
     return category in ("Mn", "Me") or joins
 
 
 def two_cells(code, category):
-    return unicodedata.east_asian_width(chr(code)) in "WF" and not no_cell(code, category)
+    return unicodedata.east_asian_width(chr(code)) in "WF" and not zero_width(code, category)
 
 
 def unseen(code, category):
@@ -51,7 +51,7 @@ def unseen(code, category):
 
 
 TABLES = (
-    ("no_cell", "General categories Mn and Me, the joiners, and Hangul Jamo that join.", no_cell),
+    ("zero_width", "General categories Mn and Me, the joiners, and Hangul Jamo that join.", zero_width),
     ("two_cells", "East_Asian_Width (Unicode Standard Annex 11) W and F.", two_cells),
     ("unseen", "General categories Cf, Zl and Zp, without those that are seen or join.", unseen),
 )
