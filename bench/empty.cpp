@@ -1,2 +1,3 @@
-/// What the smallest program costs: to be linked as spindle is, and compared with its start and end.
+/// What the smallest program costs: to be linked as spindle is, and compared with its start and
+/// end.
 int main() {}

@@ -1,27 +1,17 @@
 #include "spindle/base/decimal.hpp"
 
-#include <limits>
 #include <numeric>
 
 namespace spindle {
 namespace {
 
-constexpr int max_digits = 18;  // every number of so many digits fits 64 bits
+// The smallest number of 64-bit floating point has as many.
+constexpr std::size_t most_decimals = 330;
+
+// Every number of so many digits fits 64 bits.
+constexpr std::size_t usual_digits = 19;
 
 constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-// The most negative mantissa has no positive counterpart, so magnitudes are unsigned.
-constexpr std::uint64_t magnitude(std::int64_t value) {
-  const auto bits = static_cast<std::uint64_t>(value);
-  return value < 0 ? 0U - bits : bits;
-}
-
-// `sign` as of sign_of().
-std::optional<std::int64_t> with_sign(std::uint64_t value, int sign) {
-  constexpr auto largest = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  if (value > largest + (sign < 0 ? 1U : 0U)) return std::nullopt;
-  return static_cast<std::int64_t>(sign < 0 ? 0U - value : value);
-}
 
 int count_digits(std::uint64_t value) {
   int digits = 0;
@@ -29,19 +19,31 @@ int count_digits(std::uint64_t value) {
   return digits;
 }
 
-int sign_of(std::int64_t value) { return (value > 0 ? 1 : 0) - (value < 0 ? 1 : 0); }
+int sign_of(const Decimal& number) {
+  if (number.magnitude() == 0) return 0;
+  return number.sign() == Sign::plus ? 1 : -1;
+}
+
+// value × 10^tens; empty when it does not fit.
+std::optional<std::uint64_t> times_ten(std::uint64_t value, std::int64_t tens) {
+  for (; tens > 0 && value != 0; --tens) {
+    if (__builtin_mul_overflow(value, std::uint64_t{10}, &value)) return std::nullopt;
+  }
+  return value;
+}
 
 // Both are non-zero. When their first digits stand at the same place, the exponents differ by no
-// more than the digit counts do, so lining them up stays below 10^19 and thus within 64 bits.
+// more than the digit counts do, so lining them up needs no more than 20 digits; where that does
+// not fit 64 bits, the other one, which does, is less.
 std::strong_ordering compare_magnitudes(const Decimal& a, const Decimal& b) {
-  std::uint64_t left = magnitude(a.mantissa());
-  std::uint64_t right = magnitude(b.mantissa());
-  const std::int64_t left_place = std::int64_t{a.exponent()} + count_digits(left);
-  const std::int64_t right_place = std::int64_t{b.exponent()} + count_digits(right);
+  const std::int64_t left_place = std::int64_t{a.exponent()} + count_digits(a.magnitude());
+  const std::int64_t right_place = std::int64_t{b.exponent()} + count_digits(b.magnitude());
   if (left_place != right_place) return left_place <=> right_place;
-  for (int exponent = a.exponent(); exponent > b.exponent(); --exponent) left *= 10U;
-  for (int exponent = b.exponent(); exponent > a.exponent(); --exponent) right *= 10U;
-  return left <=> right;
+  const auto left = times_ten(a.magnitude(), std::int64_t{a.exponent()} - b.exponent());
+  const auto right = times_ten(b.magnitude(), std::int64_t{b.exponent()} - a.exponent());
+  if (!left) return std::strong_ordering::greater;
+  if (!right) return std::strong_ordering::less;
+  return *left <=> *right;
 }
 
 // value × 10^tens / divisor when that is an integer. `value` and `divisor` have no common factor;
@@ -65,33 +67,31 @@ std::optional<std::uint64_t> scale_down(std::uint64_t value, std::int64_t tens) 
   return value;
 }
 
-// The digits of a text, point taken out; empty when something else is there.
-struct Digits {
-  std::uint64_t value = 0;
-  int significant = 0;
-  int decimals = 0;
-};
+std::size_t trailing_zeros(std::string_view digits) {
+  const std::size_t last = digits.find_last_not_of('0');
+  return last == std::string_view::npos ? 0 : digits.size() - 1 - last;
+}
 
-std::optional<Digits> read_digits(std::string_view whole, std::string_view fraction) {
-  Digits digits;
+// The digits of a text, point taken out; empty when something else is there, or too much.
+std::optional<std::uint64_t> read_digits(std::string_view whole, std::string_view fraction) {
+  std::uint64_t value = 0;
   for (const std::string_view part : {whole, fraction}) {
     for (const char c : part) {
       if (!is_digit(c)) return std::nullopt;
-      if (digits.significant > 0 || c != '0') ++digits.significant;
-      if (digits.significant > max_digits) return std::nullopt;
-      digits.value = digits.value * 10U + static_cast<std::uint64_t>(c - '0');
+      if (__builtin_mul_overflow(value, std::uint64_t{10}, &value)) return std::nullopt;
+      if (__builtin_add_overflow(value, static_cast<std::uint64_t>(c - '0'), &value)) {
+        return std::nullopt;
+      }
     }
   }
-  if (fraction.size() > max_digits) return std::nullopt;
-  digits.decimals = static_cast<int>(fraction.size());
-  return digits;
+  return value;
 }
 
 }  // namespace
 
 std::optional<Decimal> Decimal::parse(std::string_view text) {
-  const int sign = text.starts_with('-') ? -1 : 1;
-  if (sign < 0 || text.starts_with('+')) text.remove_prefix(1);
+  const Sign sign = text.starts_with('-') ? Sign::minus : Sign::plus;
+  if (sign == Sign::minus || text.starts_with('+')) text.remove_prefix(1);
 
   const std::size_t point = text.find('.');
   const std::string_view whole = text.substr(0, point);
@@ -100,45 +100,85 @@ std::optional<Decimal> Decimal::parse(std::string_view text) {
   const bool needs_fraction = point != std::string_view::npos || whole.empty();
   if (needs_fraction && fraction.empty()) return std::nullopt;
 
-  const auto digits = read_digits(whole, fraction);
+  if (fraction.size() > most_decimals || whole.size() > most_decimals) return std::nullopt;
+  // The largest numbers of floating point are digits with many zeros behind them.
+  const std::size_t zeros =
+      whole.size() > usual_digits && fraction.empty() ? trailing_zeros(whole) : 0;
+  const auto digits = read_digits(whole.substr(0, whole.size() - zeros), fraction);
   if (!digits) return std::nullopt;
-  const auto mantissa = with_sign(digits->value, sign);
-  if (!mantissa) return std::nullopt;
-  return Decimal(*mantissa, -digits->decimals);
+  return Decimal(sign, *digits, static_cast<int>(zeros) - static_cast<int>(fraction.size()));
 }
 
 std::string Decimal::to_string() const {
-  std::string text = std::to_string(magnitude(mantissa_));
-  if (exponent_ > 0 && mantissa_ != 0) text.append(static_cast<std::size_t>(exponent_), '0');
+  std::string text = std::to_string(magnitude_);
+  if (exponent_ > 0 && magnitude_ != 0) text.append(static_cast<std::size_t>(exponent_), '0');
   if (exponent_ < 0) {
     const auto decimals = static_cast<std::size_t>(-std::int64_t{exponent_});
     if (text.size() <= decimals) text.insert(0, decimals + 1 - text.size(), '0');
     text.insert(text.size() - decimals, 1, '.');
   }
-  return mantissa_ < 0 ? "-" + text : text;
+  return sign_ == Sign::minus ? "-" + text : text;
 }
 
 std::optional<Decimal> Decimal::times(const Decimal& other) const {
-  std::int64_t mantissa = 0;
+  std::uint64_t magnitude = 0;
   int exponent = 0;
-  if (__builtin_mul_overflow(mantissa_, other.mantissa_, &mantissa)) return std::nullopt;
+  if (__builtin_mul_overflow(magnitude_, other.magnitude_, &magnitude)) return std::nullopt;
   if (__builtin_add_overflow(exponent_, other.exponent_, &exponent)) return std::nullopt;
-  return Decimal(mantissa, exponent);
+  return Decimal(sign_ == other.sign_ ? Sign::plus : Sign::minus, magnitude, exponent);
+}
+
+std::optional<Decimal> Decimal::plus(const Decimal& other) const {
+  if (other.magnitude_ == 0 && other.exponent_ >= exponent_) return *this;
+  const int exponent = std::min(exponent_, other.exponent_);
+  const auto left = times_ten(magnitude_, std::int64_t{exponent_} - exponent);
+  const auto right = times_ten(other.magnitude_, std::int64_t{other.exponent_} - exponent);
+  if (!left || !right) return std::nullopt;
+  if (sign_ != other.sign_) {
+    const bool is_left = *left >= *right;
+    return Decimal(is_left ? sign_ : other.sign_, is_left ? *left - *right : *right - *left,
+                   exponent);
+  }
+  std::uint64_t sum = 0;
+  if (__builtin_add_overflow(*left, *right, &sum)) return std::nullopt;
+  return Decimal(sign_, sum, exponent);
 }
 
 std::optional<std::int64_t> Decimal::divided_by(const Decimal& unit) const {
-  if (unit.mantissa_ == 0) return std::nullopt;
-  if (mantissa_ == 0) return 0;
+  if (unit.magnitude_ == 0) return std::nullopt;
+  if (magnitude_ == 0) return 0;
 
-  const std::uint64_t common = std::gcd(magnitude(mantissa_), magnitude(unit.mantissa_));
-  const std::uint64_t value = magnitude(mantissa_) / common;
-  const std::uint64_t divisor = magnitude(unit.mantissa_) / common;
+  const std::uint64_t common = std::gcd(magnitude_, unit.magnitude_);
+  const std::uint64_t value = magnitude_ / common;
+  const std::uint64_t divisor = unit.magnitude_ / common;
   const std::int64_t tens = std::int64_t{exponent_} - unit.exponent_;
   if (tens < 0 && divisor != 1) return std::nullopt;
 
   const auto result = tens < 0 ? scale_down(value, -tens) : scale_up(value, divisor, tens);
   if (!result) return std::nullopt;
-  return with_sign(*result, sign_of(mantissa_) * sign_of(unit.mantissa_));
+  const Decimal quotient(sign_ == unit.sign_ ? Sign::plus : Sign::minus, *result, 0);
+  if (Decimal(quotient.mantissa()) != quotient) return std::nullopt;
+  return quotient.mantissa();
+}
+
+Decimal Decimal::with_decimals(int decimals) const {
+  const std::int64_t tens = std::int64_t{exponent_} + decimals;
+  if (tens >= 0) {
+    const auto grown = times_ten(magnitude_, tens);
+    return grown ? Decimal(sign_, *grown, -decimals) : *this;
+  }
+  std::uint64_t magnitude = magnitude_;
+  std::uint64_t last = 0;
+  for (std::int64_t left = -tens; left > 0; --left) {
+    last = magnitude % 10U;
+    magnitude /= 10U;
+    if (magnitude == 0 && left > 1) {
+      last = 0;
+      break;
+    }
+  }
+  constexpr std::uint64_t half = 5;
+  return {sign_, magnitude + (last >= half ? 1U : 0U), -decimals};
 }
 
 bool operator==(const Decimal& a, const Decimal& b) {
@@ -146,8 +186,8 @@ bool operator==(const Decimal& a, const Decimal& b) {
 }
 
 std::strong_ordering operator<=>(const Decimal& a, const Decimal& b) {
-  const int left = sign_of(a.mantissa_);
-  const int right = sign_of(b.mantissa_);
+  const int left = sign_of(a);
+  const int right = sign_of(b);
   if (left != right) return left <=> right;
   if (left == 0) return std::strong_ordering::equal;
   return left > 0 ? compare_magnitudes(a, b) : compare_magnitudes(b, a);

@@ -54,35 +54,40 @@ std::string Danger::remedy() const {
   return {};
 }
 
-void Dangers::add(modbus::RegisterTable table, modbus::RegisterAddress address, Kind kind,
-                  Danger danger) {
+void Dangers::add(modbus::RegisterTable table, modbus::RegisterAddress address,
+                  const Encoding& encoding, Danger danger) {
   if (danger.hazard == Hazard::none) return;
   const unsigned first = address.value;
-  sources_.push_back({table, first, first + register_count(kind), std::move(danger)});
+  sources_.push_back({table, first, first + register_count(encoding), std::move(danger)});
 }
 
 Dangers::Dangers(const Profile& profile) {
   for (const Action& action : profile.actions) {
-    add(modbus::RegisterTable::holding, action.address, action.kind,
+    add(action.table, action.address, action.encoding,
         {.hazard = hazard_of(action),
          .action = action.name,
          .is_guarded = profile.is_guarded_start(action.name)});
   }
   for (const Parameter& parameter : profile.parameters) {
     const bool runs = profile.commands_motion(parameter);
-    add(parameter.table, parameter.address, parameter.encoding.kind,
-        {.hazard = runs ? Hazard::moves : parameter.hazard,
-         .runs_motor = runs,
-         .is_guarded = runs});
+    const Danger danger{
+        .hazard = runs ? Hazard::moves : parameter.hazard, .runs_motor = runs, .is_guarded = runs};
+    add(parameter.table, parameter.address, parameter.encoding, danger);
+    if (!parameter.write_address) continue;
+    add(parameter.table, *parameter.write_address, parameter.encoding, danger);
   }
 }
 
 std::optional<Danger> Dangers::find(const Parameter& parameter) const {
-  const unsigned first = parameter.address.value;
-  const unsigned end = first + register_count(parameter.encoding.kind);
+  const unsigned count = register_count(parameter.encoding);
+  const auto touches = [&](const Source& source, modbus::RegisterAddress address) {
+    return source.table == parameter.table && source.first < address.value + count &&
+           address.value < source.end;
+  };
   Danger danger{.hazard = parameter.hazard};
   for (const Source& source : sources_) {
-    if (source.table != parameter.table || source.end <= first || end <= source.first) continue;
+    const bool read = touches(source, parameter.address);
+    if (!read && !touches(source, parameter.write_address.value_or(parameter.address))) continue;
     danger.runs_motor |= source.danger.runs_motor;
     danger.is_guarded |= source.danger.is_guarded;
     const bool names_action = danger.action.empty() && source.danger.hazard == danger.hazard;

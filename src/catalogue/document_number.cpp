@@ -10,6 +10,9 @@
 namespace spindle::catalogue {
 namespace {
 
+using modbus::RegisterAddress;
+using modbus::RegisterTable;
+
 /// Numbers of one table, in one of the two usual lengths.
 struct Numbering {
   std::uint64_t first;
@@ -31,6 +34,36 @@ std::string hint_for_document_number(std::uint64_t number) {
                        to_text(numbering.table), number - numbering.first);
   }
   return {};
+}
+
+std::optional<NumberedPlace> parse_document_number(std::string_view text) {
+  constexpr std::size_t short_form = 5;
+  constexpr std::size_t long_form = 6;
+  constexpr std::uint64_t last_short = 9'999;
+  constexpr std::uint64_t last_long = 65'536;
+  const bool is_digits =
+      !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+  if (!is_digits || text.size() > long_form) return std::nullopt;
+  const bool is_long = text.size() == long_form;
+  // Of a number with fewer digits the zeros in front of it, which mean a coil, were left out.
+  const char digit = text.size() >= short_form ? text.front() : '0';
+  std::string_view rest = text.size() >= short_form ? text.substr(1) : text;
+  while (rest.size() > 1 && rest.front() == '0') rest.remove_prefix(1);
+  const auto number = parse_unsigned(rest, is_long ? last_long : last_short);
+  if (!number || *number == 0) return std::nullopt;
+  const RegisterAddress address{static_cast<std::uint16_t>(*number - 1)};
+  switch (digit) {
+    case '0':
+      return NumberedPlace{RegisterTable::coil, address};
+    case '1':
+      return NumberedPlace{RegisterTable::discrete, address};
+    case '3':
+      return NumberedPlace{RegisterTable::input, address};
+    case '4':
+      return NumberedPlace{RegisterTable::holding, address};
+    default:
+      return std::nullopt;
+  }
 }
 
 std::string hint_for_document_number(std::string_view typed) {

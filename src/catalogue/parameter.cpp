@@ -1,34 +1,8 @@
 #include "spindle/catalogue/parameter.hpp"
 
-#include <array>
-#include <limits>
+#include <fmt/format.h>
 
 namespace spindle::catalogue {
-namespace {
-
-struct KindInfo {
-  std::uint16_t registers;
-  std::int64_t lowest;
-  std::int64_t highest;
-};
-
-template <typename T>
-constexpr KindInfo kind_info() {
-  constexpr std::size_t register_bytes = 2;
-  return {sizeof(T) / register_bytes, std::numeric_limits<T>::min(), std::numeric_limits<T>::max()};
-}
-
-/// In the order of the enumeration.
-constexpr std::array kinds = {kind_info<std::uint16_t>(), kind_info<std::int16_t>(),
-                              kind_info<std::uint32_t>(), kind_info<std::int32_t>()};
-
-const KindInfo& info(Kind kind) { return kinds.at(static_cast<std::size_t>(kind)); }
-
-}  // namespace
-
-std::uint16_t register_count(Kind kind) { return info(kind).registers; }
-std::int64_t lowest(Kind kind) { return info(kind).lowest; }
-std::int64_t highest(Kind kind) { return info(kind).highest; }
 
 std::vector<std::string> to_strings(const List<Text>& texts) {
   return {texts.begin(), texts.end()};
@@ -37,10 +11,43 @@ std::vector<std::string> to_strings(const List<Text>& texts) {
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) {
   std::vector<BitName> counting;
   for (const BitName& name : parameter.bits) {
-    if (!name.when || name.when == value) counting.push_back({name.bit, name.text});
+    if (!name.when || name.when == value) {
+      counting.push_back({name.bit, name.text, std::nullopt, name.width});
+    }
   }
   parameter.bits = std::move(counting);
   parameter.bits_by = {};
+  return parameter;
+}
+
+Parameter part_of(const Parameter& parameter, const BitName& bit) {
+  Parameter part = parameter;
+  part.name = fmt::format("{}.{}", parameter.name, bit.text);
+  part.title = bit.width == 1 ? fmt::format("{}: bit {}", parameter.title, bit.bit)
+                              : fmt::format("{}: bits {} to {}", parameter.title, bit.bit,
+                                            bit.bit + bit.width - 1);
+  const std::uint16_t registers = register_count(parameter.encoding);
+  const auto first = static_cast<std::uint8_t>(parameter.encoding.slice.first + bit.bit);
+  part.encoding = {.kind = registers == 1   ? Kind::u16
+                           : registers == 2 ? Kind::u32
+                                            : Kind::u64,
+                   .slice = {first, bit.width},
+                   .word_order = parameter.encoding.word_order,
+                   .byte_order = parameter.encoding.byte_order};
+  part.labels = {};
+  part.bits = {};
+  part.bits_by = {};
+  part.range = {};
+  part.except = std::nullopt;
+  part.default_value = std::nullopt;
+  part.nulls = {};
+  return part;
+}
+
+Parameter with_power(Parameter parameter, std::int64_t power) {
+  Decimal& scale = parameter.encoding.scale;
+  scale = Decimal(scale.sign(), scale.magnitude(), scale.exponent() + static_cast<int>(power));
+  parameter.scale_by = {};
   return parameter;
 }
 

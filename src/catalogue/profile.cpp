@@ -17,6 +17,9 @@ using modbus::RegisterTable;
 
 constexpr std::uint16_t last_register = std::numeric_limits<std::uint16_t>::max();
 
+/// Its digits fit 64 bits.
+constexpr std::uint64_t longest_bcd = 8;
+
 Error unknown(std::string_view name, std::string message, std::string hint) {
   return {.code = Errc::unknown_name,
           .message = std::move(message),
@@ -74,29 +77,33 @@ std::string hint_for(const Profile& profile, std::string_view name) {
 bool covers(const Parameter& parameter, RegisterTable table, std::uint16_t address) {
   const std::uint16_t first = parameter.address.value;
   return parameter.table == table && address >= first &&
-         address - first < register_count(parameter.encoding.kind);
+         address - first < register_count(parameter.encoding);
 }
 
 bool every_register_writable(const Profile& profile, const Parameter& raw) {
-  const std::uint16_t count = register_count(raw.encoding.kind);
+  const std::uint16_t count = register_count(raw.encoding);
   for (std::uint16_t i = 0; i < count; ++i) {
     const auto address = static_cast<std::uint16_t>(raw.address.value + i);
-    if (!profile.writable(RegisterAddress{address})) return false;
+    if (!profile.writable(raw.table, RegisterAddress{address})) return false;
   }
   return true;
 }
 
 bool overlap(const Parameter& one, const Parameter& other) {
   const auto end = [](const Parameter& parameter) {
-    return parameter.address.value + register_count(parameter.encoding.kind);
+    return parameter.address.value + register_count(parameter.encoding);
   };
   return one.table == other.table && one.address.value < end(other) &&
          other.address.value < end(one);
 }
 
 Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
+  if (raw && raw->encoding.word_order == WordOrder::big) {
+    raw->encoding.word_order = profile.link.word_order;
+  }
+  if (raw) raw->encoding.byte_order = profile.link.byte_order;
   if (raw) raw = profile.with_secrecy(*std::move(raw));
-  if (raw && raw->table == RegisterTable::holding && every_register_writable(profile, *raw)) {
+  if (raw && modbus::is_writable(raw->table) && every_register_writable(profile, *raw)) {
     raw->access = Access::read_write;
   }
   return raw;
@@ -121,6 +128,77 @@ std::vector<Parameter> match_numbered(const Profile& profile, std::string_view p
   return found;
 }
 
+/// "f32", "text16" (so many bytes), "bcd4" (likewise); "-le" behind it: the low word comes first.
+/// Empty when it is none that can stand alone.
+std::optional<Encoding> raw_encoding(std::string_view text) {
+  Encoding encoding;
+  constexpr std::string_view low_first = "-le";
+  if (text.ends_with(low_first)) {
+    text.remove_suffix(low_first.size());
+    encoding.word_order = WordOrder::little;
+  }
+  if (const auto kind = kind_words.find(text)) {
+    encoding.kind = *kind;
+    const bool needs_more = *kind == Kind::text || *kind == Kind::bcd || *kind == Kind::u8 ||
+                            *kind == Kind::i8 || *kind == Kind::date;
+    if (needs_more) return std::nullopt;
+    return encoding;
+  }
+  constexpr std::uint64_t longest = 2 * modbus::max_read_count;
+  for (const Kind kind : {Kind::text, Kind::bcd}) {
+    const std::string_view word = to_text(kind);
+    if (!text.starts_with(word)) continue;
+    const auto length = parse_unsigned(text.substr(word.size()), longest);
+    const bool is_too_long = kind == Kind::bcd && length > longest_bcd;
+    if (!length || *length == 0 || is_too_long) return std::nullopt;
+    encoding.kind = kind;
+    encoding.length = static_cast<std::uint16_t>(*length);
+    return encoding;
+  }
+  return std::nullopt;
+}
+
+/// "@holding:0..31" as one register after the other; empty when it is no such range.
+std::vector<std::string> raw_range(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  const std::size_t dots = text.find("..");
+  if (!text.starts_with('@') || colon == std::string_view::npos || dots == std::string_view::npos) {
+    return {};
+  }
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const auto first = parse_unsigned(text.substr(colon + 1, dots - colon - 1), last_register);
+  const auto last = parse_unsigned(text.substr(dots + 2, slash - dots - 2), last_register);
+  if (!first || !last || *last < *first) return {};
+  const std::string_view kind = text.substr(slash);
+  const auto encoding = kind.empty() ? std::optional(Encoding()) : raw_encoding(kind.substr(1));
+  const std::uint64_t step = encoding ? register_count(*encoding) : 1U;
+  std::vector<std::string> names;
+  for (std::uint64_t address = *first; address <= *last; address += step) {
+    names.push_back(fmt::format("{}{}{}", text.substr(0, colon + 1), address, kind));
+  }
+  return names;
+}
+
+/// "control.start": one bit of a register, or some, by the name that the profile gives them.
+std::optional<Result<Parameter>> find_bit(const Profile& profile, std::string_view name) {
+  for (const Parameter& parameter : profile.parameters) {
+    const std::string& whole = parameter.name;
+    const bool begins =
+        name.size() > whole.size() + 1 && name.starts_with(whole) && name[whole.size()] == '.';
+    if (!begins || parameter.bits.empty()) continue;
+    for (const BitName& bit : parameter.bits) {
+      if (!same_ignoring_case(bit.text, name.substr(whole.size() + 1))) continue;
+      if (!bit.when) return part_of(parameter, bit);
+      return tl::unexpected(
+          Error{.code = Errc::usage,
+                .message = fmt::format("which bit it is depends on {}", parameter.bits_by),
+                .hint = fmt::format("'{}' shows the names of all that are set", whole),
+                .name = std::string(name)});
+    }
+  }
+  return std::nullopt;
+}
+
 /// Whether a parameter is looked up to be read, or only to be shown.
 enum class Purpose : std::uint8_t { reading, description };
 
@@ -133,6 +211,10 @@ Result<Parameter> find_any(const Profile& profile, std::string_view name) {
     auto found = find_numbered(*profile.numbered, name);
     if (found) return profile.with_secrecy(*std::move(found));
   }
+  if (auto bit = find_bit(profile, name)) {
+    return std::move(*bit).map(
+        [&](Parameter part) { return profile.with_secrecy(std::move(part)); });
+  }
   return tl::unexpected(unknown(name, fmt::format("no such parameter in profile {}", profile.id),
                                 hint_for(profile, name)));
 }
@@ -143,6 +225,15 @@ void leave_out_consumed(const Profile& profile, std::vector<Parameter>& paramete
 
 Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view name,
                                       Purpose purpose) {
+  if (const auto range = raw_range(name); !range.empty()) {
+    std::vector<Parameter> parameters;
+    for (const std::string& one : range) {
+      auto found = purpose == Purpose::reading ? profile.find(one) : find_any(profile, one);
+      if (!found) return tl::unexpected(std::move(found.error()));
+      parameters.push_back(std::move(*found));
+    }
+    return parameters;
+  }
   if (!is_pattern(name)) {
     auto one = purpose == Purpose::reading ? profile.find(name) : find_any(profile, name);
     if (!one) return tl::unexpected(std::move(one.error()));
@@ -180,9 +271,10 @@ Error bad_raw_register(std::string_view text) {
   if (std::string hint = hint_for_document_number(text); !hint.empty()) {
     return unknown(text, "not a raw register", std::move(hint));
   }
-  return unknown(text, "not a raw register",
-                 fmt::format("write @holding:2 or @input:3204/i16, with {} behind the slash",
-                             kind_words.alternatives()));
+  return unknown(
+      text, "not a raw register",
+      "write @holding:2, @coil:5, @input:3204/i16, @holding:4/f32, @holding:10/text16 or "
+      "@holding:0..31");
 }
 
 Result<Parameter> parse_raw(std::string_view text) {
@@ -193,20 +285,27 @@ Result<Parameter> parse_raw(std::string_view text) {
   const std::string_view rest = body.substr(colon + 1);
   const std::size_t slash = rest.find('/');
   const auto address = parse_unsigned(rest.substr(0, slash), last_register);
-  const auto kind = slash == std::string_view::npos ? std::optional(Kind::u16)
-                                                    : kind_words.find(rest.substr(slash + 1));
-  if (!table || !address || !kind) return tl::unexpected(bad_raw_register(text));
-  if (*address + register_count(*kind) - 1 > last_register) {
+  if (!table || !address) return tl::unexpected(bad_raw_register(text));
+  const bool is_bit = modbus::holds_bits(*table);
+  const auto encoding = slash == std::string_view::npos
+                            ? std::optional(Encoding{.kind = is_bit ? Kind::bit : Kind::u16})
+                            : raw_encoding(rest.substr(slash + 1));
+  if (!encoding || (is_bit && encoding->kind != Kind::bit)) {
+    return tl::unexpected(bad_raw_register(text));
+  }
+  if (*address + register_count(*encoding) - 1 > last_register) {
     return tl::unexpected(
-        unknown(text, "a 32-bit value does not fit behind the last register", {}));
+        unknown(text, "a value of this length does not fit behind the last register", {}));
   }
   std::string name = fmt::format("@{}:{}", to_text(*table), *address);
-  if (*kind != Kind::u16) name += fmt::format("/{}", to_text(*kind));
+  if (slash != std::string_view::npos && rest.substr(slash + 1) != "u16") {
+    name += rest.substr(slash);
+  }
   return Parameter{.name = std::move(name),
                    .title = "Raw register",
                    .table = *table,
                    .address = {static_cast<std::uint16_t>(*address)},
-                   .encoding = {.kind = *kind},
+                   .encoding = *encoding,
                    .unit = {},
                    .source = "register given by the user",
                    .note = {}};
@@ -221,8 +320,8 @@ std::optional<Duration> SerialSpec::gap_at(unsigned baud) const {
   return std::nullopt;
 }
 
-Result<void> check_pair(Kind kind, const LinkSpec& link) {
-  if (!link.even_pairs || register_count(kind) <= link.max_write) return {};
+Result<void> check_pair(const Encoding& encoding, const LinkSpec& link) {
+  if (!link.even_pairs || register_count(encoding) <= link.max_write) return {};
   return tl::unexpected(
       Error{.code = Errc::usage,
             .message = "it cannot be written: by its profile a value of 32 bits is never split "
@@ -241,12 +340,27 @@ bool ExtendedErrorSpec::is_busy(std::int64_t code) const {
 
 Result<Parameter> Profile::find(std::string_view name) const {
   auto found = find_any(*this, name);
-  if (!found || !consumes(*found)) return found;
-  return tl::unexpected(
-      Error{.code = Errc::usage,
-            .message = "reading it clears it, and the result that it tells of would be lost",
-            .hint = "'spindle watch' reads it, and the result behind it",
-            .name = std::string(name)});
+  if (!found) return found;
+  return may_read(*found).map([&] { return *std::move(found); });
+}
+
+Result<void> Profile::may_read(const Parameter& parameter) const {
+  for (const Parameter& named : parameters) {
+    if (named.reading != Reading::consumes || !overlap(named, parameter)) continue;
+    if (events && events->flag == named.name) {
+      return tl::unexpected(
+          Error{.code = Errc::usage,
+                .message = "reading it clears it, and the result that it tells of would be lost",
+                .hint = "'spindle watch' reads it, and the result behind it",
+                .name = parameter.name});
+    }
+    if (named.name == parameter.name) continue;
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = fmt::format("reading it clears {}", named.name),
+                                .hint = fmt::format("'{}' is read when it is named", named.name),
+                                .name = parameter.name});
+  }
+  return {};
 }
 
 Result<std::vector<Parameter>> Profile::select(const std::vector<std::string>& names) const {
@@ -294,22 +408,21 @@ bool Profile::is_guarded_start(std::string_view action) const {
   return found != actions.end() && found->motion == Motion::start;
 }
 
-bool Profile::writable(RegisterAddress address) const {
+bool Profile::writable(RegisterTable table, RegisterAddress address) const {
   const std::uint16_t wanted = address.value;
-  const bool by_number = numbered && numbered->table == RegisterTable::holding &&
+  const bool by_number = numbered && numbered->table == table &&
                          numbered->access == Access::read_write && wanted >= numbered->from &&
                          wanted <= numbered->to;
   return by_number ||
          std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& parameter) {
-           return parameter.access == Access::read_write &&
-                  covers(parameter, RegisterTable::holding, wanted);
+           return parameter.access == Access::read_write && covers(parameter, table, wanted);
          });
 }
 
 std::optional<Profile::LimitRegisters> Profile::limit_registers(const Parameter& parameter) const {
   const std::uint16_t number = parameter.address.value;
   const bool has_limits = limits && parameter.table == RegisterTable::holding &&
-                          register_count(parameter.encoding.kind) == 1 && number >= limits->from &&
+                          register_count(parameter.encoding) == 1 && number >= limits->from &&
                           number <= limits->to;
   if (!has_limits) return std::nullopt;
   const auto mirror = [number](std::uint16_t offset) {

@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <limits>
+#include <unordered_map>
 #include <utility>
 
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
+#include "spindle/catalogue/write_order.hpp"
 
 namespace spindle::catalogue {
 namespace {
@@ -18,28 +22,43 @@ auto find_named(const Entries& entries, std::string_view name) -> decltype(entri
   return found == entries.end() ? nullptr : &*found;
 }
 
-/// Which registers of both tables have a parameter already.
+/// Registers that a parameter stands for. Bits of one register may be those of several.
 class Claims {
  public:
-  /// Takes the registers of a parameter, unless another one has some of them.
+  /// Whether none of its registers, or of its bits, was taken before; then they are.
   bool take(const Parameter& parameter) {
-    const std::size_t first = key_of(parameter);
-    const std::size_t end = first + register_count(parameter.encoding.kind);
-    for (std::size_t key = first; key < end; ++key) {
-      if (taken_[key]) return false;
+    const std::uint16_t count = register_count(parameter.encoding);
+    for (std::uint16_t i = 0; i < count; ++i) {
+      const auto taken = taken_.find(key_of(parameter, i));
+      if (taken != taken_.end() && (taken->second & bits_of(parameter, i)) != 0) return false;
     }
-    for (std::size_t key = first; key < end; ++key) taken_[key] = true;
+    for (std::uint16_t i = 0; i < count; ++i) {
+      taken_[key_of(parameter, i)] |= bits_of(parameter, i);
+    }
     return true;
   }
 
  private:
-  static constexpr std::size_t table_size = 0x10000;
-  static std::size_t key_of(const Parameter& parameter) {
-    const bool input = parameter.table == modbus::RegisterTable::input;
-    return (input ? table_size : 0) + parameter.address.value;
+  static std::uint32_t key_of(const Parameter& parameter, std::uint16_t at) {
+    constexpr unsigned address_bits = 16;
+    return (static_cast<std::uint32_t>(parameter.table) << address_bits) + parameter.address.value +
+           at;
+  }
+  /// Of one of its registers.
+  static std::uint16_t bits_of(const Parameter& parameter, std::uint16_t at) {
+    const Encoding& encoding = parameter.encoding;
+    const auto all = std::numeric_limits<std::uint16_t>::max();
+    if (encoding.slice.is_whole()) return all;
+    const std::uint64_t own = std::numeric_limits<std::uint64_t>::max() >>
+                              (std::numeric_limits<std::uint64_t>::digits - encoding.slice.width);
+    Encoding whole = encoding;
+    whole.slice = {};
+    const std::uint16_t count = register_count(encoding);
+    whole.kind = count == 1 ? Kind::u16 : count == 2 ? Kind::u32 : Kind::u64;
+    return to_registers(whole, own << encoding.slice.first).at(at);
   }
 
-  std::vector<bool> taken_ = std::vector<bool>(2 * table_size + 1);
+  std::unordered_map<std::uint32_t, std::uint16_t> taken_ = {};
 };
 
 bool is_numbered(const Parameter& parameter, const NumberedSpec& facts) {
@@ -86,12 +105,34 @@ class Digest {
   std::uint64_t state_ = 0xcbf29ce484222325;
 };
 
+/// What only some encodings have: those that have none of it keep the digest that they always had.
+void add(Digest& digest, const Encoding& encoding) {
+  const auto& [kind, scale, divisor, offset, decimals, length, count, slice, word_order, byte_order,
+               padding, packing, date] = encoding;
+  const std::array<std::pair<std::string_view, std::int64_t>, 10> numbers = {
+      {{"divisor", std::int64_t{divisor} - 1},
+       {"length", length},
+       {"count", count - 1},
+       {"first", slice.first},
+       {"width", slice.width},
+       {"words", static_cast<int>(word_order)},
+       {"bytes", static_cast<int>(byte_order)},
+       {"padding", static_cast<int>(padding)},
+       {"packing", static_cast<int>(packing)},
+       {"date", static_cast<int>(date)}}};
+  for (const auto& [name, number] : numbers) {
+    if (number != 0) digest.add(fmt::format("{} {}", name, number));
+  }
+  if (offset != Decimal(0)) digest.add(offset.to_string());
+}
+
 void add(Digest& digest, const Parameter& parameter) {
   digest.add(parameter.name);
   digest.add(to_text(parameter.table));
   digest.add(std::to_string(parameter.address.value));
   digest.add(to_text(parameter.encoding.kind));
   digest.add(parameter.encoding.scale.to_string());
+  add(digest, parameter.encoding);
   digest.add(parameter.unit);
   digest.add(to_text(parameter.access));
   for (const Label& label : parameter.labels) {
@@ -214,10 +255,10 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
                          const Profile& profile) {
   const Parameter& parameter = wanted.parameter;
   const Decimal& number = wanted.value.number;
-  const auto registers = encode(parameter, number);
+  const auto registers = encode(parameter, wanted.value, wanted.raw);
   if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = check_pair(parameter.encoding.kind, profile.link); !fits) return fits;
-  if (auto inside = check_range(parameter, number); !inside) return inside;
+  if (auto fits = check_pair(parameter.encoding, profile.link); !fits) return fits;
+  if (auto inside = check_range(parameter, wanted.value); !inside) return inside;
   const bool has_limits = profile.limit_registers(parameter).has_value();
   if (has_limits && (!present.minimum || !present.maximum)) {
     return tl::unexpected(Error{.code = Errc::out_of_range,
@@ -230,11 +271,23 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
   return check_own_limits(parameter, number, present.minimum, present.maximum, profile);
 }
 
+/// As the profile says what has to be written before what.
+std::vector<PlannedWrite> in_order(std::vector<PlannedWrite> writes) {
+  std::vector<Parameter> parameters;
+  for (const PlannedWrite& write : writes) parameters.push_back(write.parameter);
+  std::vector<PlannedWrite> ordered;
+  for (const std::size_t index : write_order(parameters)) {
+    ordered.push_back(std::move(writes[index]));
+  }
+  return ordered;
+}
+
 std::optional<Skip> skip_of(const SnapshotEntry& wanted, const SnapshotEntry* present,
                             Destination destination, bool comparable) {
   if (present == nullptr) return Skip::absent;
   if (present->value == wanted.value && comparable) return Skip::equal;
   if (wanted.parameter.access == Access::read_only) return Skip::read_only;
+  if (wanted.value.content == Content::none) return Skip::no_value;
   const bool belongs_to_one = wanted.parameter.cloning == Cloning::never;
   if (belongs_to_one && destination == Destination::other_tool) return Skip::not_cloned;
   return std::nullopt;
@@ -256,9 +309,9 @@ std::vector<Parameter> stored_parameters(const Profile& profile) {
   const Dangers dangers(profile);
   std::vector<Parameter> stored;
   for (const Parameter& parameter : profile.parameters) {
-    const bool is_setting = parameter.table == modbus::RegisterTable::holding &&
+    const bool is_setting = modbus::is_writable(parameter.table) &&
                             parameter.access == Access::read_write && !dangers.find(parameter);
-    if (is_setting && claims.take(parameter)) stored.push_back(parameter);
+    if (is_setting && claims.take(parameter)) stored.push_back(profile.with_secrecy(parameter));
   }
   return stored;
 }
@@ -275,7 +328,8 @@ Snapshot snapshot_of_defaults(const Profile& profile) {
   snapshot.profile = profile.id;
   for (Parameter& parameter : stored_parameters(profile)) {
     if (!parameter.default_value) continue;
-    auto raw = encode(parameter, *parameter.default_value);
+    auto raw = encode(parameter, {*parameter.default_value},
+                      Registers(register_count(parameter.encoding)));
     if (!raw) continue;  // the loader of profiles refuses such a default
     auto value = decode(parameter, *raw);
     if (!value) continue;
@@ -384,6 +438,7 @@ RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const 
     plan.writes.push_back({parameter, now->value, wanted->value, now->unit});
   }
   unit_findings.tell(plan.findings);
+  plan.writes = in_order(std::move(plan.writes));
   return plan;
 }
 

@@ -57,6 +57,21 @@ Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std:
   return units;
 }
 
+Result<RegisterBounds> to_registers(std::string_view option, const std::string& text) {
+  constexpr std::uint64_t last_register = 0xFFFF;
+  constexpr std::string_view dots = "..";
+  const std::string_view range = text;
+  const auto at = range.find(dots);
+  const bool is_one = at == std::string_view::npos;
+  const auto from = parse_unsigned(range.substr(0, at), last_register);
+  const auto to = is_one ? from : parse_unsigned(range.substr(at + dots.size()), last_register);
+  if (from && to && *from <= *to) {
+    return RegisterBounds{static_cast<std::uint16_t>(*from), static_cast<std::uint16_t>(*to)};
+  }
+  return tl::unexpected(bad_option(option, fmt::format("'{}' does not fit", text),
+                                   "it takes registers from 0 to 65535, such as 0..999"));
+}
+
 Error unknown_choice(std::string_view option, const std::string& text,
                      const std::vector<std::string>& words) {
   std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));

@@ -37,6 +37,13 @@ Result<Duration> to_duration(std::string_view option, const std::string& text);
 /// "1-3,7": units of a serial line, each once, in the order given.
 Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text);
 
+/// "0..999", "0x0..0x3E7" or one register; both ends count.
+struct RegisterBounds {
+  std::uint16_t from = 0;
+  std::uint16_t to = 0;
+};
+Result<RegisterBounds> to_registers(std::string_view option, const std::string& text);
+
 /// How an error tells of a word that an option does not take.
 Error unknown_choice(std::string_view option, const std::string& text,
                      const std::vector<std::string>& words);

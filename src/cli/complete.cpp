@@ -251,6 +251,8 @@ class Completer {
     std::vector<Candidate> values;
     if (kind == "FORMAT") values = candidates_of(format_words);
     if (kind == "WHEN") values = candidates_of(color_words);
+    if (kind == "NUMBERING") values = candidates_of(files::numbering_words);
+    if (kind == "TABLE") values = candidates_of(modbus::table_words);
     if (kind == "NAME|FILE") values = profiles();
     if (kind == "FAULT") values = faults();
     if (kind == "OUTAGE") values = outages();

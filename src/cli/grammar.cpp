@@ -1,6 +1,7 @@
 #include "grammar.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -42,6 +43,30 @@ struct WatchArguments {
   std::vector<std::string> arguments;  ///< TARGET... [NAME|PATTERN...]
 };
 
+/// Registers as they are typed, before it is known whether all of it goes together.
+struct RegisterArguments {
+  std::optional<RegisterBounds> bounds = std::nullopt;
+  std::optional<modbus::RegisterTable> table = std::nullopt;
+
+  [[nodiscard]] std::optional<work::RegisterSpan> span() const {
+    if (!bounds) return std::nullopt;
+    return work::RegisterSpan{table.value_or(modbus::RegisterTable::holding), bounds->from,
+                              bounds->to};
+  }
+};
+
+struct DumpArguments {
+  commands::DumpOptions options;
+  RegisterArguments registers;
+};
+
+struct ScanArguments {
+  commands::ScanOptions options;
+  RegisterArguments registers;
+  bool has_units = false;
+  bool has_pause = false;
+};
+
 /// The options of every command, where the parser writes them.
 struct AllOptions {
   commands::IdentifyOptions identify;
@@ -50,12 +75,13 @@ struct AllOptions {
   commands::SetOptions set;
   commands::DoOptions perform;
   commands::PingOptions ping;
-  commands::ScanOptions scan;
+  ScanArguments scan;
   WatchArguments watch;
   commands::RemoteStartOptions remote_start;
   commands::RemoteStopOptions remote_stop;
   commands::AlarmsOptions alarms;
   commands::BackupOptions backup;
+  DumpArguments dump;
   commands::DiffOptions diff;
   commands::RestoreOptions restore;
   commands::SimulateOptions simulate;
@@ -64,6 +90,7 @@ struct AllOptions {
   commands::ProfileNameOptions profile_list;
   commands::ProfileNameOptions profile_show;
   commands::ProfileNameOptions profile_check;
+  commands::ProfileNewOptions profile_new;
 };
 
 /// The grammar while it is being parsed: the innermost command that was named.
@@ -215,13 +242,14 @@ void add_list(CLI::App& app, ParseState& draft) {
 }
 
 void add_get(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"get", "TARGET [NAME|PATTERN...]",
-                           "read parameters by name, pattern, number (p242) or raw register "
-                           "(@holding:2, @input:3204/i16)",
-                           "spindle get sim:doga-bm 'preset.1.*torque*'\n"
-                           "spindle get station3 status.ready status.alarm\n"
-                           "spindle get @line1 'preset.1.*' --json\n"
-                           "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16"};
+  constexpr Words words = {
+      "get", "TARGET [NAME|PATTERN...]",
+      "read parameters by name, pattern, number (p242) or raw register "
+      "(@holding:2, @holding:4/f32, @coil:5), counted from 0",
+      "spindle get sim:doga-bm 'preset.1.*torque*'\n"
+      "spindle get station3 status.ready status.alarm\n"
+      "spindle get @line1 'preset.1.*' --json\n"
+      "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:0..31"};
   add_command(app, draft, words, draft.options.get, commands::get,
               [](Binder& bind, commands::GetOptions& options) {
                 bind.required("TARGET", options.target, target_words);
@@ -253,6 +281,8 @@ void add_set(CLI::App& app, ParseState& draft) {
                 bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
                           "check and show everything, write nothing");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);
+                bind.flag("--raw", options.raw, commands::RawWrites::ask,
+                          "also registers such as @holding:4 that no profile says can be written");
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
                           broadcast_words);
                 bind_jobs(bind, options.jobs);
@@ -304,27 +334,72 @@ std::string scan_words() {
   return "The line is asked at the rate and parity of the target or profile, and at no others: a\n"
          "driver that hears three bad frames in a row stops its motor, and every frame at a wrong\n"
          "rate is bad. A wrong unit costs one --timeout; nothing is asked twice. Behind a gateway\n"
-         "(tcp://) a unit that the gateway cannot reach counts as absent.\n";
+         "(tcp://) a unit that the gateway cannot reach counts as absent.\n"
+         "\n"
+         "With --registers, the registers of one tool are read, and nothing is written. A block "
+         "that\n"
+         "the tool refuses is halved until it is known which registers are there. What the "
+         "profile\n"
+         "says that reading clears is not read; without a profile that is not known. Ctrl-C ends "
+         "it\n"
+         "with what is known by then.\n";
+}
+
+void bind_registers(Binder& bind, RegisterArguments& arguments, std::string_view meaning) {
+  bind.option("--registers", "FROM..TO", arguments.bounds, to_registers, meaning);
+  bind.option("--table", "TABLE", arguments.table, one_of(modbus::table_words),
+              fmt::format("their table: {} (default holding)",
+                          fmt::join(modbus::table_words.words(), " or ")));
+}
+
+/// Units are asked for on a line, registers of one tool.
+std::optional<Error> check_scan(const ScanArguments& arguments) {
+  const bool about_registers = arguments.registers.bounds.has_value();
+  if (about_registers && arguments.has_units) {
+    return usage("--units and --registers exclude each other",
+                 "scan the line for units first, then the registers of one of them (?unit=N)");
+  }
+  if (about_registers) return std::nullopt;
+  for (const auto& [is_given, name] : {std::pair(arguments.registers.table.has_value(), "--table"),
+                                       std::pair(arguments.has_pause, "--pause")}) {
+    if (is_given) {
+      return usage(fmt::format("{} goes with --registers", name), "add --registers 0..999");
+    }
+  }
+  return std::nullopt;
+}
+
+void bind_scan(Binder& bind, ScanArguments& arguments) {
+  commands::ScanOptions& options = arguments.options;
+  constexpr std::uint8_t usual_last_unit = 31;
+  for (std::uint8_t unit = 1; unit <= usual_last_unit; ++unit) options.units.push_back({unit});
+  bind.required("BUS", options.bus,
+                "URL of the line, or a tool that is on it; the tool whose registers are scanned");
+  bind.option("--units", "LIST", options.units, to_units, "which to ask (default 1-31)")
+      ->each([&arguments](const std::string&) { arguments.has_units = true; });
+  bind_registers(bind, arguments.registers, "find which of these registers of the tool answer");
+  bind.option("--pause", "DURATION", options.pause, to_duration,
+              "between two requests for registers (default 20ms)")
+      ->each([&arguments](const std::string&) { arguments.has_pause = true; });
+  bind.check([&arguments] { return check_scan(arguments); });
 }
 
 void add_scan(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"scan", "BUS [--units 1-31]",
-                           "which units answer on a serial line or behind a gateway",
+  constexpr Words words = {"scan", "BUS [--units 1-31|--registers 0..999]",
+                           "which units answer on a serial line or behind a gateway, or which "
+                           "registers of a tool",
                            "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
                            "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
                            "spindle scan rtu+tcp://192.168.10.30:4001 --json\n"
-                           "spindle scan tcp://192.168.10.31 --units 1-5",
+                           "spindle scan tcp://192.168.10.31 --units 1-5\n"
+                           "spindle scan station3 --registers 0..999 --table input",
                            scan_words};
-  add_command(app, draft, words, draft.options.scan, commands::scan,
-              [](Binder& bind, commands::ScanOptions& options) {
-                constexpr std::uint8_t usual_last_unit = 31;
-                for (std::uint8_t unit = 1; unit <= usual_last_unit; ++unit) {
-                  options.units.push_back({unit});
-                }
-                bind.required("BUS", options.bus, "URL of the line, or a tool that is on it");
-                bind.option("--units", "LIST", options.units, to_units,
-                            "which to ask (default 1-31)");
-              });
+  const auto run = [](const ScanArguments& arguments, Context& context) {
+    commands::ScanOptions options = arguments.options;
+    options.registers = arguments.registers.span();
+    return commands::scan(options, context);
+  };
+  add_command(app, draft, words, draft.options.scan, run, bind_scan);
 }
 
 std::string trouble_words() {
@@ -504,28 +579,67 @@ std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
   return std::nullopt;
 }
 
+void add_dump(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"dump", "TARGET FILE [--registers 0..999]",
+                           "raw registers into a file that diff can compare",
+                           "spindle dump station3 monday.yaml\n"
+                           "spindle dump tcp://192.168.10.40 unknown.yaml --registers 0..999\n"
+                           "spindle dump station3 - --registers 0..99 --table input"};
+  const auto note_file = [&draft](const std::string& file) {
+    if (file == "-") draft.only_as_text = "with - the dump itself is on standard output";
+  };
+  const auto run = [](const DumpArguments& arguments, Context& context) {
+    commands::DumpOptions options = arguments.options;
+    options.registers = arguments.registers.span();
+    options.table = arguments.registers.table;
+    return commands::dump(options, context);
+  };
+  add_command(app, draft, words, draft.options.dump, run,
+              [note_file](Binder& bind, DumpArguments& arguments) {
+                commands::DumpOptions& options = arguments.options;
+                bind.required("TARGET", options.target, "tool name or URL");
+                bind.required("FILE", options.file, "where to; - is standard output");
+                bind.check([&options, note_file]() -> std::optional<Error> {
+                  note_file(options.file);
+                  return std::nullopt;
+                });
+                bind_registers(bind, arguments.registers,
+                               "which (default: all that the profile knows, of every table)");
+                bind.option("--pause", "DURATION", options.pause, to_duration,
+                            "between two requests (default 20ms)");
+                bind.flag("--force", options.overwrite, Overwrite::allow,
+                          "replace a file that is there");
+                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                          "also what the profile marks as secret");
+              });
+}
+
 void add_diff(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"diff", "A {B|--dir FOLDER} [NAME|PATTERN...] [--ignore PATTERN]",
-                           "compare tools, backup files and defaults by parameter name",
-                           "spindle diff station3 station3.yaml\n"
-                           "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
-                           "spindle diff station3 station4 --ignore 'preset.1.*'\n"
-                           "spindle diff @line1 --dir backups"};
-  add_command(
-      app, draft, words, draft.options.diff, commands::diff,
-      [](Binder& bind, commands::DiffOptions& options) {
-        bind.required("A", options.a, "tool, backup file, or 'defaults'; with --dir also @group");
-        bind.argument("B", options.b, "tool, backup file, or 'defaults'");
-        bind.argument("NAME", options.patterns, "compare only these");
-        bind.repeatable("--ignore", "PATTERN", options.ignored, "leave these out, repeatable");
-        bind.option("--dir", "FOLDER", options.folder,
-                    "compare each tool with its own backup in this folder, as backup "
-                    "--dir writes it");
-        bind_jobs(bind, options.jobs);
-        bind.check([&options] {
-          return make_name_of("B", options.b, options.folder, options.patterns, "diff");
-        });
-      });
+  constexpr Words words = {
+      "diff", "A {B|--dir FOLDER} [NAME|PATTERN...] [--ignore PATTERN]",
+      "compare tools, backup files and defaults by parameter name, and dumps by "
+      "register",
+      "spindle diff station3 station3.yaml\n"
+      "spindle diff monday.yaml friday.yaml 'preset.*' --json\n"
+      "spindle diff station3 station4 --ignore 'preset.1.*'\n"
+      "spindle diff station3 dump.yaml\n"
+      "spindle diff @line1 --dir backups"};
+  add_command(app, draft, words, draft.options.diff, commands::diff,
+              [](Binder& bind, commands::DiffOptions& options) {
+                bind.required("A", options.a,
+                              "tool, backup or dump file, or 'defaults'; with --dir also @group");
+                bind.argument("B", options.b, "tool, backup or dump file, or 'defaults'");
+                bind.argument("NAME", options.patterns, "compare only these");
+                bind.repeatable("--ignore", "PATTERN", options.ignored,
+                                "leave these out, repeatable");
+                bind.option("--dir", "FOLDER", options.folder,
+                            "compare each tool with its own backup in this folder, as backup "
+                            "--dir writes it");
+                bind_jobs(bind, options.jobs);
+                bind.check([&options] {
+                  return make_name_of("B", options.b, options.folder, options.patterns, "diff");
+                });
+              });
 }
 
 void add_restore(CLI::App& app, ParseState& draft) {
@@ -645,6 +759,16 @@ void add_simulate(CLI::App& app, ParseState& draft) {
               });
 }
 
+std::string profile_new_words() {
+  return "The table has a header: register (or address), name, type, scale, unit, access,\n"
+         "description, table and evidence, in any order; register alone is needed. Fields are\n"
+         "separated by commas, semicolons or tabs. Rows that cannot be read are told and left "
+         "out.\n"
+         "Where no column says it, the evidence is 'inferred': check each entry before you rely "
+         "on\n"
+         "it.\n";
+}
+
 void add_profile_commands(CLI::App& profile, ParseState& draft) {
   using Options = commands::ProfileNameOptions;
   const auto list = [](const Options&, Context& context) {
@@ -663,17 +787,30 @@ void add_profile_commands(CLI::App& profile, ParseState& draft) {
               {"check", "PROFILE", "every fault of a file, with its place",
                "spindle profile check ./my-tool.yaml"},
               draft.options.profile_check, commands::profile_check, bind_name);
+  const auto bind_new = [](Binder& bind, commands::ProfileNewOptions& options) {
+    bind.required("NAME", options.name, "of the profile; the file is NAME.yaml");
+    bind.option("--from", "FILE", options.map,
+                "table of registers (CSV) whose rows become parameters");
+    bind.option("--numbering", "NUMBERING", options.numbering, one_of(files::numbering_words),
+                "what its register numbers are: addresses, or modicon (40001)");
+  };
+  add_command(profile, draft,
+              {"new", "NAME [--from MAP.csv]", "write the file of a new profile, to be completed",
+               "spindle profile new my-tool\nspindle profile new my-tool --from registers.csv",
+               profile_new_words},
+              draft.options.profile_new, commands::profile_new, bind_new);
 }
 
 void add_profile(CLI::App& app, ParseState& draft) {
   using Options = commands::ProfileNameOptions;
-  constexpr Words words = {"profile", "list|show|check [PROFILE]",
+  constexpr Words words = {"profile", "list|show|check|new [PROFILE]",
                            "the catalogue files: which exist, what they say, whether one is valid",
                            "spindle profile list\n"
                            "spindle profile show doga-bm\n"
-                           "spindle profile check ./my-tool.yaml"};
+                           "spindle profile check ./my-tool.yaml\n"
+                           "spindle profile new my-tool --from registers.csv"};
   const auto none = [](const Options&, Context&) -> Result<Outcome> {
-    return tl::unexpected(Binder::missing("profile", "list, show or check"));
+    return tl::unexpected(Binder::missing("profile", "list, show, check or new"));
   };
   add_command(app, draft, words, draft.options.profile, none,
               [&draft](Binder& bind, Options&) { add_profile_commands(bind.command(), draft); });
@@ -703,9 +840,10 @@ void build(CLI::App& app, ParseState& draft) {
   app.allow_extras();
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
-  for (const auto add : {add_identify, add_list, add_get, add_set, add_do, add_watch,
-                         add_remote_start, add_remote_stop, add_alarms, add_backup, add_diff,
-                         add_restore, add_ping, add_scan, add_simulate, add_profile, add_tools}) {
+  for (const auto add :
+       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_remote_start,
+        add_remote_stop, add_alarms, add_backup, add_dump, add_diff, add_restore, add_ping,
+        add_scan, add_simulate, add_profile, add_tools}) {
     add(app, draft);
   }
 }

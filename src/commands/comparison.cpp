@@ -42,7 +42,7 @@ std::string units_in_words(const Difference& difference) {
 report::Record difference_record(const Difference& difference, const std::string& target,
                                  const Clock& clock) {
   const auto side = [](std::string key, const std::optional<catalogue::Value>& value) {
-    return value ? report::Field{std::move(key), value->number, value->to_string()}
+    return value ? report::Field{std::move(key), value_cell(*value), value->to_string()}
                  : report::Field{std::move(key), report::Cell(), "-"};
   };
   return {.type = "diff",

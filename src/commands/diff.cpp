@@ -5,6 +5,7 @@
 
 #include "backup_paths.hpp"
 #include "comparison.hpp"
+#include "dump_diff.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
@@ -125,6 +126,9 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
                                 .message = "one side must be a tool or a backup",
                                 .hint = "write for example 'spindle diff station3 defaults'"});
   }
+  const auto dumps = read_dump_sides(options, context);
+  if (!dumps) return tl::unexpected(dumps.error());
+  if (dumps->any()) return diff_dumps(*dumps, options, context);
   const auto a = resolve_side(options.a, context);
   if (!a) return tl::unexpected(a.error());
   const auto b = resolve_side(options.b, context);

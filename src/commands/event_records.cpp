@@ -133,10 +133,10 @@ Record NewsRecords::event(const device::ToolEvent& news) const {
   std::string text;
   for (std::size_t index = 0; index < keys_.size(); ++index) {
     const auto& [parameter, at] = layout_->fields()[index];
-    const auto words = catalogue::register_count(parameter->encoding.kind);
+    const auto words = catalogue::register_count(parameter->encoding);
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
-    record.fields.push_back({keys_[index], value->number, value->to_string()});
+    record.fields.push_back({keys_[index], value_cell(*value), value->to_string()});
     if (index != error_at_) continue;
     std::string meaning = error_text(value->number.mantissa());
     if (value->number.mantissa() != 0) {
@@ -166,10 +166,10 @@ Record NewsRecords::value(const device::PolledValue& news, const std::string& ty
                    {"table", std::string(catalogue::to_text(parameter.table))},
                    {"register", number(parameter.address.value)},
                    {"raw", news.registers},
-                   {"value", news.value.number, news.value.to_string()},
+                   {"value", value_cell(news.value), news.value.to_string()},
                    {"label", text_or_null(news.value.label)},
                    {"unit", text_or_null(unit)},
-                   {"previous", news.previous ? Cell(news.previous->number) : Cell()}};
+                   {"previous", news.previous ? value_cell(*news.previous) : Cell()}};
   const bool differs = news.previous && !(*news.previous == news.value);
   const std::string before = differs ? news.previous->to_string() + " -> " : "";
   record.fields.push_back(only_shown("kind", type));

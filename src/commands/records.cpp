@@ -20,13 +20,16 @@ Cell number_or_null(const std::optional<Decimal>& value) {
 }
 
 Cell number_or_null(const std::optional<catalogue::Value>& value) {
-  return value ? Cell(value->number) : Cell(std::monostate());
+  return value ? value_cell(*value) : Cell(std::monostate());
 }
 
 /// "bit 3 FWD (while motor.input-mode is 0)"; the condition only where there is one.
 std::string bit_text(const catalogue::BitName& bit, const Parameter& parameter) {
-  if (!bit.when) return fmt::format("bit {} {}", bit.bit, bit.text);
-  return fmt::format("bit {} {} while {} is {}", bit.bit, bit.text, parameter.bits_by, *bit.when);
+  const std::string place = bit.width == 1
+                                ? fmt::format("bit {}", bit.bit)
+                                : fmt::format("bits {}..{}", bit.bit, bit.bit + bit.width - 1);
+  if (!bit.when) return fmt::format("{} {}", place, bit.text);
+  return fmt::format("{} {} while {} is {}", place, bit.text, parameter.bits_by, *bit.when);
 }
 
 /// What it means, with the labels of an enumeration or the bits of a bit field behind it.
@@ -60,6 +63,19 @@ void add_drive_fields(const Parameter& parameter, report::Record& record) {
   if (!parameter.risk.empty()) record.fields.push_back({"risk", parameter.risk});
 }
 
+/// What only some encodings have.
+void add_encoding_fields(const catalogue::Encoding& encoding, report::Record& record) {
+  const auto add = [&](const char* key, std::int64_t value, std::int64_t usual) {
+    if (value != usual) record.fields.push_back({key, number(value)});
+  };
+  add("divisor", encoding.divisor, 1);
+  if (encoding.offset != Decimal(0)) record.fields.push_back({"offset", encoding.offset});
+  add("length", encoding.length, 0);
+  add("count", encoding.count, 1);
+  if (encoding.is_part()) record.fields.push_back({"first_bit", number(encoding.slice.first)});
+  add("bit_count", encoding.slice.width, 0);
+}
+
 /// What may be given: nothing (a fixed value), labels, or a range.
 std::string values_of(const catalogue::Action& action) {
   if (action.motion != catalogue::Motion::none) return {};
@@ -78,11 +94,50 @@ std::string values_of(const catalogue::Action& action) {
 
 /// The type as people read it: "u16", "u16 * 0.01".
 std::string type_of(const catalogue::Encoding& encoding) {
-  if (encoding.scale == Decimal(1)) return {};
-  return fmt::format("{} * {}", catalogue::to_text(encoding.kind), encoding.scale.to_string());
+  const std::string_view kind = catalogue::to_text(encoding.kind);
+  const std::string step = catalogue::step_in_words(encoding);
+  std::string type(kind);
+  if (encoding.length > 0) type += std::to_string(encoding.length);
+  if (encoding.count > 1) type += fmt::format("[{}]", encoding.count);
+  if (!encoding.slice.is_whole()) {
+    const unsigned last = unsigned{encoding.slice.first} + encoding.slice.width - 1;
+    const std::string bits = encoding.slice.width == 1
+                                 ? fmt::format("bit {}", last)
+                                 : fmt::format("bits {}..{}", encoding.slice.first, last);
+    type = encoding.kind == catalogue::Kind::bit ? bits : fmt::format("{} {}", type, bits);
+  }
+  if (step != "1") type += " * " + step;
+  if (encoding.offset != Decimal(0)) {
+    const bool is_minus = encoding.offset.sign() == Sign::minus;
+    type += fmt::format(" {} {}", is_minus ? '-' : '+',
+                        (is_minus ? encoding.offset.negated() : encoding.offset).to_string());
+  }
+  return type == kind ? std::string() : type;
 }
 
 }  // namespace
+
+Cell value_cell(const catalogue::Value& value) {
+  switch (value.content) {
+    case catalogue::Content::number:
+      return value.shown_number();
+    case catalogue::Content::text:
+      return value.text;
+    case catalogue::Content::list: {
+      report::Numbers numbers;
+      report::Texts texts;
+      for (const catalogue::Value& one : value.elements) {
+        const bool is_number = one.is_number();
+        numbers.push_back(is_number ? std::optional(one.shown_number()) : std::nullopt);
+        if (one.content == catalogue::Content::text) texts.push_back(one.text);
+      }
+      return texts.empty() ? Cell(numbers) : Cell(texts);
+    }
+    case catalogue::Content::none:
+      break;
+  }
+  return {};
+}
 
 Cell milliseconds(Duration duration) {
   const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(duration);
@@ -98,7 +153,7 @@ report::Record value_record(const device::Reading& reading, const Target& target
                    {"table", std::string(catalogue::to_text(parameter.table))},
                    {"register", number(parameter.address.value)},
                    {"raw", *reading.registers},
-                   {"value", reading.value->number, reading.value->to_string()},
+                   {"value", value_cell(*reading.value), reading.value->to_string()},
                    {"label", text_or_null(reading.value->label)},
                    {"unit", text_or_null(unit_of(parameter, target))}};
   if (limits == device::Limits::read) {
@@ -145,6 +200,7 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   add("evidence", std::string(catalogue::to_text(parameter.evidence)));
   add("source", parameter.source.to_string());
   add("note", text_or_null(parameter.note));
+  add_encoding_fields(parameter.encoding, record);
   add_drive_fields(parameter, record);
   if (parameter.hazard != catalogue::Hazard::none) {
     record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});

@@ -14,6 +14,9 @@ using report::number;
 using report::text_or_null;
 
 /// Milliseconds with microseconds behind the point.
+/// As JSON and CSV have it: a number, a text, numbers, or null.
+report::Cell value_cell(const catalogue::Value& value);
+
 report::Cell milliseconds(Duration duration);
 
 /// The `value` record of a reading that succeeded.

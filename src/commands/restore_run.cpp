@@ -109,25 +109,38 @@ Result<void> RestoreRun::save_present() {
 }
 
 void RestoreRun::write_all() {
-  const std::vector<PlannedWrite>& writes = task_->plan.writes;
-  for (const PlannedWrite& write : writes) {
-    if (context_->interrupt.signalled()) {
-      fail(context_->interrupt.error());
-    } else if (auto done = write_one(write); !done) {
-      fail(done.error());
-    }
-    if (!errors_.empty()) return roll_back();
-    progress_.advance({.what = tool_->target.shown + ": writing",
-                       .done = ++counts_.written,
-                       .total = writes.size()});
-  }
+  work::write_in_passes(
+      task_->plan.writes,
+      [&](const PlannedWrite& write, work::Attempt attempt) { return write_one(write, attempt); },
+      [&](const PlannedWrite& write) { give_up(write); });
+  if (!errors_.empty()) roll_back();
 }
 
-Result<void> RestoreRun::write_one(const PlannedWrite& write) {
-  const device::Written written = changer_.make(write.parameter, write.before, write.after);
+work::Step RestoreRun::write_one(const PlannedWrite& write, work::Attempt attempt) {
+  if (context_->interrupt.signalled()) {
+    fail(context_->interrupt.error());
+    return work::Step::ended;
+  }
+  device::Written written = changer_.make(write.parameter, write.before, write.after);
+  if (written.done()) {
+    note(write.parameter, write.before, Ending::written, *written.now);
+    progress_.advance({.what = tool_->target.shown + ": writing",
+                       .done = ++counts_.written,
+                       .total = task_->plan.writes.size()});
+    return work::Step::done;
+  }
+  const bool may_wait =
+      attempt == work::Attempt::first && written.result == device::WriteResult::refused;
+  refused_.insert_or_assign(&write, std::move(written));
+  if (may_wait) return work::Step::refused;
+  give_up(write);
+  return work::Step::ended;
+}
+
+void RestoreRun::give_up(const PlannedWrite& write) {
+  const device::Written& written = refused_.at(&write);
   note(write.parameter, write.before, ending_of(written.result), written.now.value_or(write.after));
-  if (written.done()) return {};
-  return tl::unexpected(*written.error);
+  fail(*written.error);
 }
 
 void RestoreRun::verify() {

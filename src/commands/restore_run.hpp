@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,7 +35,9 @@ class RestoreRun {
  private:
   Result<void> save_present();
   void write_all();
-  Result<void> write_one(const catalogue::PlannedWrite& write);
+  work::Step write_one(const catalogue::PlannedWrite& write, work::Attempt attempt);
+  /// Of a write that did not succeed.
+  void give_up(const catalogue::PlannedWrite& write);
   void verify();
   void compare_everything();
   void roll_back();
@@ -63,6 +66,7 @@ class RestoreRun {
   std::vector<Error> errors_ = {};  ///< told last, where they are not overlooked
   std::string saved_ = {};
   RestoreCounts counts_;
+  std::map<const catalogue::PlannedWrite*, device::Written> refused_ = {};
 };
 
 }  // namespace spindle::commands

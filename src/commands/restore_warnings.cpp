@@ -67,6 +67,7 @@ void warn_of_origin(const Snapshot& backup, const Snapshot& present,
 
 std::string why_skipped(const catalogue::Parameter& parameter, Skip why, const Profile& profile) {
   if (why == Skip::absent) return "this tool has no such register";
+  if (why == Skip::no_value) return "the backup says that it had no value";
   const auto danger = catalogue::danger_of(parameter, profile);
   if (!danger) return "it is not copied to another tool";
   const std::string remedy = danger->remedy();

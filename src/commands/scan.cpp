@@ -82,6 +82,7 @@ Error with_unit(Error error, modbus::UnitId unit) {
 }  // namespace
 
 Result<Outcome> scan(const ScanOptions& options, Context& context) {
+  if (options.registers) return scan_registers(options, context);
   const auto bus = resolve_bus(options, context);
   if (!bus) return tl::unexpected(bus.error());
   auto profile = load_bus_profile(*bus, context);

@@ -24,10 +24,17 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
+  /// Where no names are used nothing has to be known of the registers.
+  [[nodiscard]] Need need() const override {
+    const auto& texts = options_->assignments;
+    const bool raw_only = options_->raw == RawWrites::ask && !texts.empty() &&
+                          std::all_of(texts.begin(), texts.end(), is_raw);
+    return raw_only ? Need::raw_registers : Need::named_registers;
+  }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
   Result<Plan> plan(const Profile& profile, const Target& /*target*/) const override {
-    return parse_assignments(options_->assignments, profile)
+    return parse_assignments(options_->assignments, profile, options_->raw)
         .and_then([&](std::vector<Assignment> assignments) {
           return check_storing(options_->storing, profile).map([&] {
             return SetPlan{.assignments = std::move(assignments)};
@@ -35,13 +42,14 @@ class Set final : public Verb<SetPlan, SetResult> {
         });
   }
 
-  Result<Plan> examine(OpenTool& tool, Plan plan, Context& /*context*/) const override {
+  Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
     auto steps = options_->addressing == Addressing::broadcast
                      ? steps_for_everybody(plan.assignments)
                      : check_against_tool(plan.assignments, tool.device);
     if (!steps) return tl::unexpected(std::move(steps.error()));
     plan.steps = std::move(*steps);
     plan.serial = serial_of(tool.device);
+    tell_roundings(plan.steps, tool.target, context);
     return plan;
   }
 
@@ -51,6 +59,9 @@ class Set final : public Verb<SetPlan, SetResult> {
     std::vector<std::string_view> what;
     if (options_->addressing == Addressing::broadcast) what.emplace_back("set");
     if (stores()) what.emplace_back(store_action);
+    const std::string raw =
+        options_->raw == RawWrites::ask ? raw_in_words(options_->assignments) : std::string();
+    if (!raw.empty()) what.emplace_back(raw);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
                        context);

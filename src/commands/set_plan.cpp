@@ -1,12 +1,15 @@
 #include "set_plan.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/snapshot.hpp"
+#include "spindle/catalogue/write_order.hpp"
 #include "spindle/work/change.hpp"
 
 namespace spindle::commands {
@@ -20,7 +23,7 @@ using catalogue::Value;
 Error not_writable(const Parameter& parameter, const Profile& profile) {
   Error error{
       .code = Errc::read_only, .name = parameter.name, .register_address = parameter.address.value};
-  if (!parameter.name.starts_with("@") || parameter.table == modbus::RegisterTable::input) {
+  if (!is_raw(parameter.name) || !modbus::is_writable(parameter.table)) {
     return error;
   }
   error.message = "this register is no parameter that can be written";
@@ -47,7 +50,21 @@ Result<void> check_danger(const Parameter& parameter, const Profile& profile) {
             .register_address = parameter.address.value});
 }
 
-Result<Assignment> parse_assignment(const std::string& text, const Profile& profile) {
+/// Whether the user may write it. What may move or lock a tool is no setting in any case.
+Result<void> check_access(const Parameter& parameter, const Profile& profile, RawWrites raw) {
+  const bool is_asked =
+      raw == RawWrites::ask && is_raw(parameter.name) && modbus::is_writable(parameter.table);
+  if (parameter.access == catalogue::Access::read_only && !is_asked) {
+    Error error = not_writable(parameter, profile);
+    const bool may_be_raw = is_raw(parameter.name) && modbus::is_writable(parameter.table);
+    if (may_be_raw && error.hint.empty()) error.hint = "--raw writes it all the same, and asks";
+    return tl::unexpected(std::move(error));
+  }
+  return check_danger(parameter, profile);
+}
+
+Result<Assignment> parse_assignment(const std::string& text, const Profile& profile,
+                                    RawWrites raw) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     return tl::unexpected(Error{.code = Errc::usage,
@@ -56,16 +73,17 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
   }
   auto parameter = profile.find(text.substr(0, equals));
   if (!parameter) return tl::unexpected(std::move(parameter.error()));
-  if (parameter->access == catalogue::Access::read_only) {
-    return tl::unexpected(not_writable(*parameter, profile));
+  if (auto allowed = check_access(*parameter, profile, raw); !allowed) {
+    return tl::unexpected(std::move(allowed.error()));
   }
-  if (auto harmless = check_danger(*parameter, profile); !harmless) {
-    return tl::unexpected(std::move(harmless.error()));
-  }
-  if (auto fits = catalogue::check_pair(parameter->encoding.kind, profile.link); !fits) {
+  if (auto fits = catalogue::check_pair(parameter->encoding, profile.link); !fits) {
     fits.error().name = parameter->name;
     fits.error().register_address = parameter->address.value;
     return tl::unexpected(std::move(fits.error()));
+  }
+  // What is meant by it is known once the tool was read.
+  if (!parameter->scale_by.empty()) {
+    return Assignment{std::move(*parameter), {}, text.substr(equals + 1)};
   }
   auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
   if (!value) {
@@ -78,9 +96,14 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
 
 bool overlap(const Parameter& a, const Parameter& b) {
   const auto end = [](const Parameter& p) {
-    return p.address.value + catalogue::register_count(p.encoding.kind);
+    return p.address.value + catalogue::register_count(p.encoding);
   };
-  return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
+  const bool meet = a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
+  if (!meet || !a.encoding.is_part() || !b.encoding.is_part() || a.address != b.address)
+    return meet;
+  const auto& [first, width] = a.encoding.slice;
+  const auto& [other, other_width] = b.encoding.slice;
+  return first < other + other_width && other < first + width;
 }
 
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
@@ -96,14 +119,43 @@ Result<void> check_own_limits(const Assignment& assignment, const device::Readin
                                      profile);
 }
 
-/// Names of bits as they count on this tool.
-Result<void> resolve_bits(Assignment& assignment, const device::Reading& reading) {
-  if (assignment.parameter.bits_by.empty()) return {};
+/// Names of bits and steps of a scale as they count on this tool.
+Result<void> resolve_by_tool(Assignment& assignment, const device::Reading& reading) {
+  if (assignment.parameter.bits_by.empty() && assignment.parameter.scale_by.empty()) return {};
   assignment.parameter = reading.parameter;
   auto value = catalogue::parse_value(assignment.parameter, assignment.text);
   if (!value) return tl::unexpected(std::move(value.error()));
   assignment.value = std::move(*value);
   return {};
+}
+
+/// A value cannot be counted in steps that the same command changes.
+Result<void> check_scales_stay(const std::vector<Assignment>& assignments) {
+  for (const Assignment& assignment : assignments) {
+    const catalogue::Text& power = assignment.parameter.scale_by;
+    const bool changes =
+        !power.empty() &&
+        std::any_of(assignments.begin(), assignments.end(),
+                    [&](const Assignment& other) { return other.parameter.name == power.view(); });
+    if (!changes) continue;
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = fmt::format("its steps are worth what {} says, which is set, too", power),
+              .hint = fmt::format("set {} first, and this one in a command behind it", power),
+              .name = assignment.parameter.name});
+  }
+  return {};
+}
+
+/// As the profile says what has to be written before what.
+std::vector<SetStep> in_order(std::vector<SetStep> steps) {
+  std::vector<Parameter> parameters;
+  for (const SetStep& step : steps) parameters.push_back(step.assignment.parameter);
+  std::vector<SetStep> ordered;
+  for (const std::size_t index : catalogue::write_order(parameters)) {
+    ordered.push_back(std::move(steps[index]));
+  }
+  return ordered;
 }
 
 /// Whether a tool is still the one that was planned for, and holds what it held.
@@ -147,11 +199,20 @@ Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device) {
   return check_unchanged(plan, now).map([&] { return std::move(now); });
 }
 
+bool is_raw(const std::string& assignment) { return assignment.starts_with('@'); }
+
+std::string raw_in_words(const std::vector<std::string>& assignments) {
+  std::vector<std::string> raw;
+  std::copy_if(assignments.begin(), assignments.end(), std::back_inserter(raw), is_raw);
+  if (raw.empty()) return {};
+  return fmt::format("write {}, of which it may not be known what it does", fmt::join(raw, ", "));
+}
+
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
-                                                  const Profile& profile) {
+                                                  const Profile& profile, RawWrites raw) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
-    auto assignment = parse_assignment(text, profile);
+    auto assignment = parse_assignment(text, profile, raw);
     if (!assignment) return tl::unexpected(std::move(assignment.error()));
     for (const Assignment& earlier : assignments) {
       if (!overlap(earlier.parameter, assignment->parameter)) continue;
@@ -168,6 +229,9 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
 
 Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
                                                 device::Device& device) {
+  if (auto stay = check_scales_stay(assignments); !stay) {
+    return tl::unexpected(std::move(stay.error()));
+  }
   std::vector<Parameter> parameters;
   parameters.reserve(assignments.size());
   for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
@@ -177,19 +241,33 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   for (std::size_t index = 0; index < assignments.size(); ++index) {
     const device::Reading& reading = (*readings)[index];
     if (!reading.value) return tl::unexpected(reading.value.error());
-    if (auto known = resolve_bits(assignments[index], reading); !known) {
+    if (auto known = resolve_by_tool(assignments[index], reading); !known) {
       return tl::unexpected(std::move(known.error()));
     }
     auto allowed = check_own_limits(assignments[index], reading, device.profile());
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
     steps.push_back({std::move(assignments[index]), *reading.value});
   }
-  return steps;
+  return in_order(std::move(steps));
 }
 
 Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignments) {
   std::vector<SetStep> steps;
   for (Assignment& assignment : assignments) {
+    if (!assignment.parameter.scale_by.empty()) {
+      return tl::unexpected(Error{.code = Errc::usage,
+                                  .message =
+                                      "what its steps are worth stands in a register of each "
+                                      "tool, and none can be asked",
+                                  .name = assignment.parameter.name});
+    }
+    if (assignment.parameter.encoding.is_part()) {
+      return tl::unexpected(Error{.code = Errc::usage,
+                                  .message = "what stands beside it in its register is not known, "
+                                             "and none can be asked",
+                                  .hint = "set the whole register, or each tool by itself",
+                                  .name = assignment.parameter.name});
+    }
     if (!assignment.parameter.bits_by.empty()) {
       assignment.parameter = catalogue::with_bits_for(assignment.parameter, std::nullopt);
       auto value = catalogue::parse_value(assignment.parameter, assignment.text);

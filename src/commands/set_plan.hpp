@@ -6,6 +6,7 @@
 
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/catalogue/value.hpp"
+#include "spindle/commands/commands.hpp"
 #include "spindle/device/device.hpp"
 
 namespace spindle::commands {
@@ -37,9 +38,16 @@ struct SetPlan {
 /// The serial number by the tool's identity; empty: the product does not say it.
 std::string serial_of(const device::Device& device);
 
+/// Whether it is a register or a coil by its number, "@holding:4=17".
+bool is_raw(const std::string& assignment);
+
+/// "write @holding:4=17, of which it may not be known what it does"; empty where none is raw.
+std::string raw_in_words(const std::vector<std::string>& assignments);
+
 /// What can be known from the profile: names, access, types, ranges, and that none starts a motor.
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
-                                                  const catalogue::Profile& profile);
+                                                  const catalogue::Profile& profile,
+                                                  RawWrites raw = RawWrites::refuse);
 
 /// What only the tool can say: its present values, its own limits, and which bits have names. Reads
 /// only.

@@ -79,10 +79,11 @@ report::Record change_record(const Parameter& parameter, const std::optional<Val
                         .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"register", number(parameter.address.value)},
-                   {"old", before ? report::Cell(before->number) : report::Cell(),
+                   {"old", before ? value_cell(*before) : report::Cell(),
                     before ? before->to_string() : std::string()},
-                   {"new", now.number, now.to_string()},
+                   {"new", value_cell(now), now.to_string()},
                    {"unit", text_or_null(unit_of(parameter, target))}};
+  if (now.typed) record.fields.push_back({"typed", *now.typed});
   if (planned) {
     const bool changes = before != now;
     record.fields.push_back({"changes", changes, changes ? "yes" : "no"});
@@ -143,6 +144,16 @@ void tell_effects(const std::vector<SetStep>& steps, const Target& target, const
     const std::string_view words = effect_words(parameter.effect);
     if (words.empty() || !step.changes()) continue;
     context.renderer.note(fmt::format("{}: {} {}", target.shown, parameter.name, words));
+  }
+}
+
+void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
+                    const Context& context) {
+  for (const SetStep& step : steps) {
+    const auto& [parameter, value, text] = step.assignment;
+    if (!value.typed) continue;
+    context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name,
+                                      catalogue::rounding_in_words(parameter, value)));
   }
 }
 

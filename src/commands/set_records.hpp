@@ -71,4 +71,8 @@ void tell_risks(const std::vector<SetStep>& steps, const Target& target, const C
 /// When what was written acts, where that is not at once.
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);
 
+/// Tells which values are not what was typed, because that lies between two steps.
+void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
+                    const Context& context);
+
 }  // namespace spindle::commands

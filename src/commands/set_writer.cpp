@@ -25,16 +25,9 @@ Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
 
 Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
   SetCounts& counts = result_.counts;
-  for (const SetStep& step : steps) {
-    if (result_.outcome.failed() > 0) break;
-    if (context_->interrupt.signalled()) {
-      fail(context_->interrupt.error());
-    } else if (step.changes()) {
-      write_one(step);
-    } else {
-      succeed(step, Ending::unchanged, *step.before);
-    }
-  }
+  work::write_in_passes(
+      steps, [&](const SetStep& step, work::Attempt attempt) { return write_one(step, attempt); },
+      [&](const SetStep& step) { give_up(step); });
   counts.left = steps.size() - counts.changed - counts.unchanged - counts.failed;
   tell_effects(steps, tool_->target, *context_);
   return end(set_summary(counts, tool_->target.shown));
@@ -72,10 +65,34 @@ void SetWriter::send_one(const SetStep& step) {
   log_.end(id, change);
 }
 
-void SetWriter::write_one(const SetStep& step) {
+work::Step SetWriter::write_one(const SetStep& step, work::Attempt attempt) {
+  if (context_->interrupt.signalled()) {
+    fail(context_->interrupt.error());
+    return work::Step::ended;
+  }
+  if (!step.changes()) {
+    succeed(step, Ending::unchanged, *step.before);
+    return work::Step::unchanged;
+  }
   const auto& [parameter, value, text] = step.assignment;
-  const device::Written written = changer_.make(parameter, *step.before, value);
-  if (written.done()) return succeed(step, Ending::written, *written.now);
+  device::Written written = changer_.make(parameter, *step.before, value);
+  if (written.done()) {
+    Value now = *written.now;
+    now.typed = value.typed;
+    succeed(step, Ending::written, now);
+    return work::Step::done;
+  }
+  const bool may_wait =
+      attempt == work::Attempt::first && written.result == device::WriteResult::refused;
+  refused_.insert_or_assign(&step, std::move(written));
+  if (may_wait) return work::Step::refused;
+  give_up(step);
+  return work::Step::ended;
+}
+
+void SetWriter::give_up(const SetStep& step) {
+  const auto& [parameter, value, text] = step.assignment;
+  const device::Written& written = refused_.at(&step);
   ++result_.counts.failed;
   note(step, ending_of(written.result), written.now.value_or(value));
   fail(work::of_write(parameter.name, *written.error));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <vector>
 
 #include "change_log.hpp"
@@ -15,7 +16,7 @@ struct SetResult {
 };
 
 /// Carries out the steps of one tool, records every change, and stops at the first that fails or
-/// when a signal asks for it.
+/// when a signal asks for it. What the tool refuses is tried once more behind the others.
 class SetWriter {
  public:
   /// All must outlive it.
@@ -40,7 +41,9 @@ class SetWriter {
   void succeed(const SetStep& step, Ending ending, const catalogue::Value& now);
   void fail(const Error& error);
   void send_one(const SetStep& step);
-  void write_one(const SetStep& step);
+  work::Step write_one(const SetStep& step, work::Attempt attempt);
+  /// Of a write that did not succeed.
+  void give_up(const SetStep& step);
   Result<SetResult> end(Summary summary);
 
   OpenTool* tool_;
@@ -49,6 +52,7 @@ class SetWriter {
   Listing listing_;
   work::ChangeLog log_;
   work::Changer changer_;
+  std::map<const SetStep*, device::Written> refused_ = {};
   SetResult result_ = {};
 };
 

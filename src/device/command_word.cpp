@@ -59,7 +59,7 @@ Result<CommandWord> CommandWord::of(const catalogue::Profile& profile) {
   }
   const auto command = profile.find(facts->command);
   if (!command) return tl::unexpected(command.error());
-  const int low_word = catalogue::register_count(command->encoding.kind) - 1;
+  const int low_word = catalogue::register_count(command->encoding) - 1;
   motor.command_register_ = {static_cast<std::uint16_t>(command->address.value + low_word)};
   return motor;
 }

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "device/hints.hpp"
+#include "spindle/base/text.hpp"
+#include "spindle/catalogue/register_sets.hpp"
 #include "spindle/device/command_word.hpp"
 
 namespace spindle::device {
@@ -25,22 +27,23 @@ using catalogue::Area;
 using catalogue::Parameter;
 using catalogue::Value;
 using link::RegisterRange;
+using modbus::FunctionCode;
 
 RegisterRange range_of(const Parameter& parameter) {
-  return {parameter.table, parameter.address.value,
-          catalogue::register_count(parameter.encoding.kind)};
+  return {parameter.table, parameter.address.value, catalogue::register_count(parameter.encoding)};
 }
 
 RegisterRange range_at(const Parameter& parameter, modbus::RegisterAddress address) {
-  return {parameter.table, address.value, catalogue::register_count(parameter.encoding.kind)};
+  return {parameter.table, address.value, catalogue::register_count(parameter.encoding)};
 }
 
 /// What an action writes, as a parameter that can be encoded.
 Parameter as_parameter(const catalogue::Action& action) {
   Parameter parameter;
   parameter.name = action.name;
+  parameter.table = action.table;
   parameter.address = action.address;
-  parameter.encoding.kind = action.kind;
+  parameter.encoding = action.encoding;
   return parameter;
 }
 
@@ -77,6 +80,30 @@ RegisterRange read_of(const link::SpontaneousShape& shape) {
           0, static_cast<std::uint16_t>(shape.byte_count / 2)};
 }
 
+/// The requests that write these registers or coils, as the profile wants them.
+std::vector<modbus::Pdu> write_requests(modbus::RegisterTable table, modbus::RegisterAddress first,
+                                        const Registers& registers,
+                                        const catalogue::LinkSpec& link) {
+  if (table == modbus::RegisterTable::coil) {
+    return {registers.size() == 1 ? modbus::write_coil_request(first, registers.front())
+                                  : modbus::write_coils_request(first, RegisterView(registers))};
+  }
+  constexpr auto several = static_cast<std::uint8_t>(FunctionCode::write_multiple_registers);
+  const bool may_be_whole =
+      link.write_function ? *link.write_function == several : registers.size() > 1;
+  if (may_be_whole && registers.size() <= std::max<std::size_t>(link.max_write, 1)) {
+    return {modbus::write_request(first, RegisterView(registers))};
+  }
+  std::vector<modbus::Pdu> requests;
+  for (const std::uint16_t& word : registers) {
+    requests.push_back(link.write_function == several
+                           ? modbus::write_request(first, RegisterView(&word, 1))
+                           : modbus::write_request(first, word));
+    ++first.value;
+  }
+  return requests;
+}
+
 link::ReadLimits read_limits(const catalogue::Profile& profile,
                              const std::vector<link::SpontaneousShape>& unasked) {
   link::ReadLimits limits;
@@ -85,7 +112,16 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
   limits.neighbours =
       profile.id.empty() ? link::Neighbours::anywhere : link::Neighbours::contiguous;
   limits.max_read = profile.link.max_read;
+  limits.max_read_bits = profile.link.max_read_bits;
+  limits.max_gap = profile.link.max_gap;
   std::vector<Area> absent(profile.link.absent.begin(), profile.link.absent.end());
+  for (const Parameter& parameter : profile.parameters) {
+    if (parameter.reading != catalogue::Reading::consumes) continue;
+    const RegisterRange alone = range_of(parameter);
+    absent.push_back({.table = alone.table,
+                      .from = alone.first,
+                      .to = static_cast<std::uint16_t>(alone.first + alone.count - 1)});
+  }
   std::sort(absent.begin(), absent.end(),
             [](const Area& a, const Area& b) { return a.from < b.from; });
   for (const Area& area : profile.link.contiguous) {
@@ -189,6 +225,13 @@ bool can_be_read_back(const Error& error) {
 bool is_postponed(const Error& error) {
   return is_exception(error, modbus::ExceptionCode::acknowledge) ||
          is_exception(error, modbus::ExceptionCode::server_device_busy);
+}
+
+/// Whether the server has done nothing yet, and is to be asked again.
+bool is_busy(const Error& error, const catalogue::LinkSpec& link) {
+  if (link.busy.empty()) return is_exception(error, modbus::ExceptionCode::server_device_busy);
+  return error.exception &&
+         std::find(link.busy.begin(), link.busy.end(), *error.exception) != link.busy.end();
 }
 
 bool is_interruption(const Error& error) {
@@ -400,15 +443,15 @@ Result<void> Device::require_known_registers() {
 Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& parameters,
                                                Limits limits, const link::Progress& progress) {
   for (const Parameter& parameter : parameters) {
-    if (!profile_->consumes(parameter)) continue;
-    return tl::unexpected(about({.code = Errc::usage, .message = "reading it clears it"},
-                                parameter.name, parameter.address));
+    if (auto allowed = profile_->may_read(parameter); !allowed) {
+      return tl::unexpected(about(std::move(allowed.error()), parameter.name, parameter.address));
+    }
   }
   std::vector<RegisterRange> wanted;
   wanted.reserve(parameters.size());
   for (const Parameter& parameter : parameters) {
     wanted.push_back(range_of(parameter));
-    if (const auto decider = decider_of(parameter)) wanted.push_back(range_of(*decider));
+    for (const Parameter& decider : deciders_of(parameter)) wanted.push_back(range_of(decider));
   }
   std::vector<RegisterRange> wanted_limits;
   if (limits == Limits::read) wanted_limits = limit_ranges(parameters, nullptr);
@@ -453,24 +496,43 @@ std::vector<RegisterRange> Device::limit_ranges(const std::vector<Parameter>& pa
   return ranges;
 }
 
-/// The parameter that decides what the bits of another one are called.
-std::optional<Parameter> Device::decider_of(const Parameter& parameter) const {
-  if (parameter.bits_by.empty()) return std::nullopt;
-  auto decider = profile_->find(parameter.bits_by);
-  if (!decider) return std::nullopt;
-  return std::move(*decider);
+/// The parameters that decide what the bits of another one are called, and what its steps are
+/// worth.
+std::vector<Parameter> Device::deciders_of(const Parameter& parameter) const {
+  std::vector<Parameter> deciders;
+  for (const catalogue::Text* name : {&parameter.bits_by, &parameter.scale_by}) {
+    if (name->empty()) continue;
+    if (auto decider = profile_->find(*name)) deciders.push_back(std::move(*decider));
+  }
+  return deciders;
 }
 
-/// The parameter with the names of bits that count by what was read along.
-Parameter Device::meant_by(const Parameter& parameter, const link::RegisterImage& image) const {
-  const auto decider = decider_of(parameter);
-  if (!decider) return parameter;
-  std::optional<std::int64_t> value;
-  const auto registers = image.get(range_of(*decider));
-  if (registers) {
-    if (const auto decoded = decode(*decider, *registers)) value = decoded->number.mantissa();
+/// The parameter as it is meant by what was read along: with the names of bits that count, and the
+/// scale. Error where what its steps are worth could not be read.
+Result<Parameter> Device::meant_by(const Parameter& parameter,
+                                   const link::RegisterImage& image) const {
+  Parameter meant = parameter;
+  for (const Parameter& decider : deciders_of(parameter)) {
+    const auto value = image.get(range_of(decider)).and_then([&](const Registers& registers) {
+      return decode(decider, registers);
+    });
+    const bool scales = decider.name == parameter.scale_by.view();
+    if (scales && !value) return tl::unexpected(value.error());
+    if (scales) {
+      const auto power = catalogue::power_of(*value);
+      if (!power) {
+        return tl::unexpected(Error{
+            .code = Errc::bad_value,
+            .message = fmt::format("{} is no power of ten: {}", decider.name, value->to_string())});
+      }
+      meant = catalogue::with_power(std::move(meant), *power);
+      continue;
+    }
+    std::optional<std::int64_t> number;
+    if (value && value->is_number()) number = value->number.mantissa();
+    meant = catalogue::with_bits_for(std::move(meant), number);
   }
-  return catalogue::with_bits_for(parameter, value);
+  return meant;
 }
 
 Reading Device::reading_of(const Parameter& parameter, Limits limits,
@@ -481,13 +543,15 @@ Reading Device::reading_of(const Parameter& parameter, Limits limits,
     error.name = parameter.name;
     return error;
   };
-  const Parameter meant = meant_by(parameter, values);
-  const auto value_at = [&](const RegisterRange& range, const link::RegisterImage& image) {
-    return image.get(range)
-        .and_then([&](const Registers& registers) { return decode(meant, registers); })
-        .map_error(with_name);
+  const auto meant = meant_by(parameter, values);
+  const auto value_at = [&](const RegisterRange& range,
+                            const link::RegisterImage& image) -> Result<Value> {
+    const auto registers = image.get(range);
+    if (!registers) return tl::unexpected(with_name(registers.error()));
+    if (!meant) return tl::unexpected(with_name(meant.error()));
+    return decode(*meant, *registers).map_error(with_name);
   };
-  Reading reading{.parameter = meant,
+  Reading reading{.parameter = meant.value_or(parameter),
                   .registers = values.get(range_of(parameter)).map_error(with_name),
                   .value = value_at(range_of(parameter), values)};
   const auto own = limits == Limits::read ? profile_->limit_registers(parameter) : std::nullopt;
@@ -520,14 +584,10 @@ Error Device::about(Error error, const std::string& name, modbus::RegisterAddres
 
 /// A product that takes one register a request gets the words of a pair one after the other, in the
 /// order of their registers.
-Result<void> Device::write_registers(modbus::RegisterAddress first, const Registers& registers) {
-  if (registers.size() > 1 && registers.size() <= profile_->link.max_write) {
-    return client_.write(first, RegisterView(registers));
-  }
-  modbus::RegisterAddress at = first;
-  for (const std::uint16_t word : registers) {
-    if (auto written = client_.write(at, word); !written) return written;
-    ++at.value;
+Result<void> Device::write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
+                                     const Registers& registers) {
+  for (const modbus::Pdu& request : write_requests(table, first, registers, profile_->link)) {
+    if (auto written = client_.write(request); !written) return written;
   }
   return {};
 }
@@ -548,23 +608,29 @@ Result<void> Device::while_busy(const std::function<Result<void>()>& write) {
 }
 
 Result<void> Device::send_write(const Parameter& parameter, const Registers& registers) {
-  return while_busy([&] { return write_registers(parameter.address, registers); })
+  const modbus::RegisterAddress first = parameter.write_address.value_or(parameter.address);
+  return while_busy([&] { return write_registers(parameter.table, first, registers); })
       .map_error(
           [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
 }
 
 /// By the standard a busy tool (06) is to be asked again later, and has done nothing yet.
-Result<void> Device::send_while_busy(const Parameter& parameter, const Registers& registers) {
-  const TimePoint limit = clock().now() + session_->options().answer_timeout;
-  Duration pause = first_busy_pause;
+Result<void> Device::send_while_busy(const Parameter& parameter, const Value& value,
+                                     Registers registers) {
+  const catalogue::LinkSpec& link = profile_->link;
+  const TimePoint limit =
+      clock().now() + (link.busy.empty() ? session_->options().answer_timeout : link.busy_limit);
+  Duration pause = link.busy.empty() ? first_busy_pause : link.busy_every;
   while (true) {
     auto sent = send_write(parameter, registers);
-    const bool busy =
-        !sent && is_exception(sent.error(), modbus::ExceptionCode::server_device_busy);
     const TimePoint next = clock().now() + pause;
-    if (!busy || next > limit) return sent;
+    if (sent || !is_busy(sent.error(), link) || next > limit) return sent;
     if (auto slept = clock().sleep_until(next); !slept) return slept;
-    pause *= 2;
+    if (link.busy.empty()) pause *= 2;
+    if (!parameter.encoding.is_part()) continue;
+    auto now = registers_for(parameter, value);  // what stands beside it may have changed
+    if (!now) return tl::unexpected(std::move(now.error()));
+    registers = std::move(*now);
   }
 }
 
@@ -593,7 +659,7 @@ Result<Value> Device::settled(const Parameter& parameter, const Value& expected,
 /// that failed at it (04) may have failed in the middle.
 Written Device::refused(Error error, const Parameter& parameter, const Value& before,
                         const Value& value) {
-  const bool pair = catalogue::register_count(parameter.encoding.kind) > 1;
+  const bool pair = catalogue::register_count(parameter.encoding) > 1;
   const bool failed =
       is_exception(error, modbus::ExceptionCode::server_device_failure) && !error.device_code;
   if (!pair && !failed) return {WriteResult::refused, before, std::move(error)};
@@ -638,19 +704,45 @@ Written Device::judged(const Parameter& parameter, const Value& before, const Va
   return {same ? kept : WriteResult::coerced, *now, std::move(error), Doubt::may_act_late};
 }
 
+/// The registers of a value; those of which only some bits are its own are read first.
+Result<Registers> Device::registers_for(const Parameter& parameter, const Value& value) {
+  if (auto fits = catalogue::check_pair(parameter.encoding, profile_->link); !fits) {
+    return tl::unexpected(std::move(fits.error()));
+  }
+  if (!parameter.encoding.is_part()) return catalogue::encode(parameter, value);
+  const auto present = client_.read(range_of(parameter));
+  if (!present) return present;
+  return catalogue::encode(parameter, value, *present);
+}
+
 Written Device::write(const Parameter& parameter, const Value& before, const Value& value,
                       Proof proof) {
-  auto registers = catalogue::encode(parameter, value.number).and_then([&](Registers words) {
-    return catalogue::check_pair(parameter.encoding.kind, profile_->link).map([&] {
-      return words;
-    });
-  });
+  const auto locked = unlock_for(parameter);
+  if (!locked) {
+    return {WriteResult::refused, before, about(locked.error(), parameter.name, parameter.address)};
+  }
+  Written written = write_unlocked(parameter, before, value, proof);
+  if (!*locked) return written;
+  const auto put_back = lock_again(**locked);
+  if (put_back) return written;
+  if (written.error) {
+    written.error->message = not_put_back(message_of(*written.error), put_back.error());
+    return written;
+  }
+  Error error = about(put_back.error(), parameter.name, parameter.address);
+  error.message = not_put_back("it was written", put_back.error());
+  return {WriteResult::unknown, written.now, std::move(error)};
+}
+
+Written Device::write_unlocked(const Parameter& parameter, const Value& before, const Value& value,
+                               Proof proof) {
+  auto registers = registers_for(parameter, value);
   if (!registers) {
     return {WriteResult::refused, before,
             about(std::move(registers.error()), parameter.name, parameter.address)};
   }
   const Duration settling = parameter.settle.value_or(profile_->link.settle);
-  auto sent = send_while_busy(parameter, *registers);
+  auto sent = send_while_busy(parameter, value, *registers);
   if (!sent && is_refusal(sent.error())) {
     return refused(std::move(sent.error()), parameter, before, value);
   }
@@ -664,10 +756,56 @@ Written Device::write(const Parameter& parameter, const Value& before, const Val
   const bool did_not_take =
       !sent && is_lost(sent.error()) && now && *now == before && !(*now == value);
   if (did_not_take) {
-    sent = send_while_busy(parameter, *registers);
+    if (parameter.encoding.is_part()) registers = registers_for(parameter, value);
+    if (!registers) return judged(parameter, before, value, sent, now);
+    sent = send_while_busy(parameter, value, *registers);
     if (sent || can_be_read_back(sent.error())) now = settled(parameter, value, settling, proof);
   }
   return judged(parameter, before, value, sent, now);
+}
+
+/// Writes what others have to wait for. Returns what it held; empty: nothing was written.
+Result<std::optional<Device::Lock>> Device::unlock_for(const Parameter& parameter) {
+  const auto& unlock = profile_->unlock;
+  if (!unlock || parameter.name == unlock->parameter.view()) return std::nullopt;
+  const auto& needed = unlock->needed_by;
+  const bool is_needed =
+      needed.empty() || std::any_of(needed.begin(), needed.end(), [&](const auto& pattern) {
+        return glob_match(pattern, parameter.name);
+      });
+  if (!is_needed) return std::nullopt;
+  auto lock = profile_->find(unlock->parameter);
+  if (!lock) return tl::unexpected(std::move(lock.error()));
+  const auto before = read_value(*lock);
+  if (!before) return tl::unexpected(before.error());
+  const Value key{Decimal(unlock->value)};
+  if (*before == key) return std::nullopt;
+  const Written written = write_unlocked(*lock, *before, key, Proof::first_right);
+  if (written.done()) return Lock{std::move(*lock), *before};
+  Error error = *written.error;
+  const bool is_open = written.may_have_changed();
+  if (const auto put_back = is_open ? lock_again({*lock, *before}) : Result<void>(); !put_back) {
+    error.message = not_put_back(message_of(error), put_back.error());
+  }
+  return tl::unexpected(std::move(error));
+}
+
+Result<void> Device::lock_again(const Lock& lock) {
+  const Value key{Decimal(profile_->unlock->value)};
+  Written written = write_unlocked(lock.parameter, key, lock.before, Proof::first_right);
+  const bool was_stopped = written.error && (written.error->code == Errc::interrupted ||
+                                             written.error->code == Errc::terminated);
+  if (was_stopped) {  // the command ends, but not with a tool that is open
+    session_->set_uninterruptible();
+    written = write_unlocked(lock.parameter, key, lock.before, Proof::first_right);
+  }
+  if (written.done()) return {};
+  return tl::unexpected(*written.error);
+}
+
+std::string Device::not_put_back(std::string_view what, const Error& why) const {
+  return fmt::format("{}, but {} could not be put back: {}", what, profile_->unlock->parameter,
+                     message_of(why));
 }
 
 void Device::shield(Clock& calm) {
@@ -676,25 +814,25 @@ void Device::shield(Clock& calm) {
 }
 
 Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
-  const auto registers = catalogue::encode(as_parameter(action), Decimal(value));
+  const auto registers = catalogue::encode(as_parameter(action), {Decimal(value)});
   if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = catalogue::check_pair(action.kind, profile_->link); !fits) return fits;
-  return while_busy([&] { return write_registers(action.address, *registers); })
+  if (auto fits = catalogue::check_pair(action.encoding, profile_->link); !fits) return fits;
+  return while_busy([&] { return write_registers(action.table, action.address, *registers); })
       .map_error([&](Error error) { return about(std::move(error), action.name, action.address); });
 }
 
 Result<void> Device::send(const Parameter& parameter, const Decimal& number) {
-  const auto registers = catalogue::encode(parameter, number);
+  const auto registers = registers_for(parameter, {number});
   if (!registers) return tl::unexpected(registers.error());
-  return write_registers(parameter.address, *registers).map_error([&](Error error) {
+  const auto first = parameter.write_address.value_or(parameter.address);
+  return write_registers(parameter.table, first, *registers).map_error([&](Error error) {
     return about(std::move(error), parameter.name, parameter.address);
   });
 }
 
 Result<void> Device::write_word(modbus::RegisterAddress address, std::uint16_t word) {
-  return client_.write(address, word).map_error([this](Error error) {
-    return located(std::move(error));
-  });
+  return write_registers(modbus::RegisterTable::holding, address, {word})
+      .map_error([this](Error error) { return located(std::move(error)); });
 }
 
 Result<Shown> Device::shows(const std::string& parameter, std::int64_t number) {
@@ -708,7 +846,7 @@ Result<ActionResult> Device::perform(const catalogue::Action& action, std::int64
   if (action.confirm.empty()) return carry_out(action, value);
   const auto confirming = profile_->find(action.confirm);
   if (!confirming) return tl::unexpected(confirming.error());
-  const Value expected{Decimal(action.confirm_value.value_or(value)), {}};
+  const Value expected{Decimal(action.confirm_value.value_or(value))};
   if (action.prepare) {
     const auto now = read_value(*confirming);
     if (!now) return tl::unexpected(now.error());
@@ -789,7 +927,9 @@ Result<void> Device::prepare(const catalogue::Preparation& preparation) {
   const std::uint16_t word = words->front();
   const auto cleared = static_cast<std::uint16_t>(word & ~unsigned{bits_to_clear(preparation)});
   if (cleared == word) return {};
-  return while_busy([&] { return client_.write(preparation.address, cleared); });
+  return while_busy([&] {
+    return write_registers(modbus::RegisterTable::holding, preparation.address, {cleared});
+  });
 }
 
 /// Until the status says that the tool does no longer work by itself; no limit: it never does.
@@ -814,28 +954,26 @@ Result<Shown> Device::await_ready(Duration limit) {
 // ---- everybody ----
 
 Result<void> Device::broadcast_word(modbus::RegisterAddress address, std::uint16_t word) {
-  return session_->broadcast(modbus::write_request(address, word)).map_error([this](Error error) {
-    return located(std::move(error));
-  });
+  return broadcast_registers(modbus::RegisterTable::holding, address, {word});
+}
+
+Result<void> Device::broadcast_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
+                                         const Registers& registers) {
+  for (const modbus::Pdu& request : write_requests(table, first, registers, profile_->link)) {
+    auto sent = session_->broadcast(request);
+    if (!sent) return tl::unexpected(located(std::move(sent.error())));
+  }
+  return {};
 }
 
 Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
-  const auto registers = catalogue::encode(parameter, value.number);
+  const auto registers = catalogue::encode(parameter, value);
   if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = catalogue::check_pair(parameter.encoding.kind, profile_->link); !fits)
-    return fits;
-  if (registers->size() > 1 && registers->size() <= profile_->link.max_write) {
-    return session_->broadcast(modbus::write_request(parameter.address, RegisterView(*registers)))
-        .map_error([&](Error error) {
-          return about(std::move(error), parameter.name, parameter.address);
-        });
-  }
-  modbus::RegisterAddress at = parameter.address;
-  for (const std::uint16_t word : *registers) {
-    if (auto sent = broadcast_word(at, word); !sent) return sent;
-    ++at.value;
-  }
-  return {};
+  if (auto fits = catalogue::check_pair(parameter.encoding, profile_->link); !fits) return fits;
+  const auto first = parameter.write_address.value_or(parameter.address);
+  return broadcast_registers(parameter.table, first, *registers).map_error([&](Error error) {
+    return about(std::move(error), parameter.name, parameter.address);
+  });
 }
 
 /// No register says when it is done, so the longest time that it may take is waited for.
@@ -843,12 +981,22 @@ Result<void> Device::broadcast(const catalogue::Action& action, std::int64_t val
   Result<void> sent;
   if (action.prepare) sent = broadcast_word(action.prepare->address, 0);
   if (sent && action.rest) sent = broadcast_word(action.address, *action.rest);
-  if (sent) sent = broadcast(as_parameter(action), Value{Decimal(value), {}});
+  if (sent) sent = broadcast(as_parameter(action), Value{Decimal(value)});
   if (!sent || !action.rest) return sent;
   if (action.busy > Duration::zero()) {
     sent = clock().sleep_until(clock().now() + action.busy);
   }
   return sent ? broadcast_word(action.address, *action.rest) : sent;
+}
+
+Result<Registers> Device::read_block(const RegisterRange& range) {
+  for (const std::uint16_t address : catalogue::consumed_registers(*profile_, range.table)) {
+    if (address < range.first || address - range.first >= range.count) continue;
+    Error error{.code = Errc::usage, .message = "reading it clears it"};
+    error.register_address = address;
+    return tl::unexpected(located(std::move(error)));
+  }
+  return read_raw(range);
 }
 
 Result<Registers> Device::read_raw(const RegisterRange& range) {
@@ -859,9 +1007,7 @@ Result<void> Device::switch_events(EventOutput output) {
   const auto& arm = profile_->events->arm;
   if (!arm) return {};
   const std::uint16_t value = output == EventOutput::on ? arm->value : arm->disarm;
-  return client_.write(modbus::RegisterAddress{arm->address}, value).map_error([this](Error error) {
-    return located(std::move(error));
-  });
+  return write_word(modbus::RegisterAddress{arm->address}, value);
 }
 
 Result<std::uint16_t> Device::event_number() {

@@ -9,7 +9,7 @@ namespace {
 using catalogue::Parameter;
 
 std::uint32_t end_of(const Parameter& parameter) {
-  return parameter.address.value + catalogue::register_count(parameter.encoding.kind);
+  return parameter.address.value + catalogue::register_count(parameter.encoding);
 }
 
 bool joins(const std::vector<Parameter>& piece, const Parameter& parameter) {

@@ -11,8 +11,10 @@
 #include <utility>
 
 #include "files/fields.hpp"
+#include "files/identity_lines.hpp"
 #include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
+#include "files/yaml_text.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
 #include "spindle/catalogue/danger.hpp"
@@ -34,7 +36,7 @@ constexpr std::string_view known_format = "1";
 constexpr std::string_view kind = "spindle-backup";
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 /// The longest value that any encoding has.
-constexpr std::size_t most_words = 2;
+constexpr std::size_t most_words = 125;
 
 constexpr auto missing_words = enum_table<Missing>({{"absent", Missing::absent},
                                                     {"unreadable", Missing::unreadable},
@@ -42,64 +44,7 @@ constexpr auto missing_words = enum_table<Missing>({{"absent", Missing::absent},
 
 // ---- writing ----
 
-bool is_plain(std::string_view text) {
-  const auto is_letter = [](char c) { return c >= 'a' && c <= 'z'; };
-  const auto is_plain_character = [&](char c) {
-    return is_letter(c) || (c >= '0' && c <= '9') || c == '.' || c == '-';
-  };
-  constexpr std::array<std::string_view, 8> other_meaning = {"y",  "n",   "yes",  "no",
-                                                             "on", "off", "true", "null"};
-  return !text.empty() && is_letter(text.front()) && text != "false" &&
-         std::all_of(text.begin(), text.end(), is_plain_character) &&
-         std::find(other_meaning.begin(), other_meaning.end(), text) == other_meaning.end();
-}
-
-/// Characters that a reader of YAML would fold or refuse, or that no reader would see: controls,
-/// marks of width and direction, separators of lines, and those that are none.
-constexpr std::array<std::pair<char32_t, char32_t>, 7> escaped_ranges = {{{0x00, 0x1F},
-                                                                          {0x7F, 0x9F},
-                                                                          {0x200B, 0x200F},
-                                                                          {0x2028, 0x202E},
-                                                                          {0x2060, 0x206F},
-                                                                          {0xFEFF, 0xFEFF},
-                                                                          {0xFFF9, 0xFFFF}}};
-
-bool is_escaped(char32_t value) {
-  return std::any_of(escaped_ranges.begin(), escaped_ranges.end(), [value](const auto& range) {
-    return value >= range.first && value <= range.second;
-  });
-}
-
-void append_escaped(std::string& out, char32_t value) {
-  constexpr char32_t last_of_two_digits = 0xFF;
-  const auto number = static_cast<std::uint32_t>(value);
-  if (value <= last_of_two_digits) {
-    fmt::format_to(std::back_inserter(out), "\\x{:02x}", number);
-  } else {
-    fmt::format_to(std::back_inserter(out), "\\u{:04x}", number);
-  }
-}
-
-/// In quotes, so that every reader of YAML takes it for the same text. What is no character at all
-/// has no place in YAML, and is replaced.
-std::string quoted(std::string_view text) {
-  std::string out = "\"";
-  while (!text.empty()) {
-    const CodePoint character = first_code_point(text);
-    if (is_escaped(character.value) || !character.well_formed) {
-      append_escaped(out, character.value);
-    } else {
-      if (text.front() == '"' || text.front() == '\\') out += '\\';
-      out += text.substr(0, character.length);
-    }
-    text.remove_prefix(character.length);
-  }
-  return out + '"';
-}
-
-std::string scalar(std::string_view text) {
-  return is_plain(text) ? std::string(text) : quoted(text);
-}
+constexpr std::string_view no_value = "null";
 
 std::string to_text(const Registers& raw) {
   if (raw.size() == 1) return std::to_string(raw.front());
@@ -116,23 +61,33 @@ std::string place_of(const Parameter& parameter) {
   return text;
 }
 
+/// A number as it is, with all its decimals; anything else as text; null where there is none.
+std::string value_in_file(const Value& value) {
+  if (value.content == catalogue::Content::none) return std::string(no_value);
+  if (!value.label.empty()) return quoted(value.label);
+  return value.is_number() ? value.exact() : quoted(value.exact());
+}
+
+/// Bytes that are no characters have no place in YAML; then the registers say it all.
+bool is_readable(std::string_view text) {
+  while (!text.empty()) {
+    const CodePoint character = first_code_point(text);
+    if (!character.well_formed) return false;
+    text.remove_prefix(character.length);
+  }
+  return true;
+}
+
 std::string line_of(const SnapshotEntry& entry) {
-  std::string line = fmt::format(
-      "  - {{{}, raw: {}, value: {}", place_of(entry.parameter), to_text(entry.raw),
-      entry.value.label.empty() ? entry.value.number.to_string() : quoted(entry.value.label));
+  std::string line =
+      fmt::format("  - {{{}, raw: {}", place_of(entry.parameter), to_text(entry.raw));
+  if (is_readable(entry.value.exact())) {
+    line += fmt::format(", value: {}", value_in_file(entry.value));
+  }
   if (!entry.unit.empty()) line += fmt::format(", unit: {}", scalar(entry.unit));
   if (entry.minimum) line += fmt::format(", minimum: {}", entry.minimum->to_string());
   if (entry.maximum) line += fmt::format(", maximum: {}", entry.maximum->to_string());
   return line + "}\n";
-}
-
-std::string line_of(const SnapshotIdentity& identity) {
-  std::string line = "identity: {";
-  if (!identity.model.empty()) line += fmt::format("model: {}, ", quoted(identity.model));
-  if (identity.model_code) line += fmt::format("model-code: {}, ", *identity.model_code);
-  if (!identity.serial.empty()) line += fmt::format("serial: {}, ", quoted(identity.serial));
-  if (identity.firmware) line += fmt::format("firmware: {}, ", *identity.firmware);
-  return line + fmt::format("raw: {}}}\n", quoted(to_hex(identity.raw)));
 }
 
 std::string lines_of_missing(const Snapshot& snapshot) {
@@ -157,7 +112,7 @@ std::optional<Registers> read_raw(const YamlNode& node, Diagnostics& findings) {
   if (node.kind == YamlNode::Kind::scalar) return add(node) ? std::optional(raw) : std::nullopt;
   if (!expect(node, YamlNode::Kind::sequence, findings)) return std::nullopt;
   if (node.items.empty() || node.items.size() > most_words) {
-    findings.add(node.at, fmt::format("a value has one or {} registers", most_words));
+    findings.add(node.at, fmt::format("a value has 1 to {} registers", most_words));
     return std::nullopt;
   }
   return std::all_of(node.items.begin(), node.items.end(), add) ? std::optional(raw) : std::nullopt;
@@ -175,12 +130,17 @@ void read_raw_value(const YamlNode& node, BackupLine& line, const Asked& asked) 
 }
 
 void read_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
+  if (node.kind == YamlNode::Kind::nothing) {
+    line.value = no_value;
+    line.value_at = node.at;
+    return;
+  }
   line.value = to_text(node, asked.findings);
   line.value_at = node.at;
 }
 
 constexpr Field<BackupLine> entry_fields[] = {
-    custom("raw", Need::optional, "one register, or a list of two", read_raw_value),
+    custom("raw", Need::optional, "one register, or a list of them", read_raw_value),
     custom("value", Need::optional, "text", read_value),
     field<&BackupLine::unit>("unit"),
     field<&BackupLine::minimum>("minimum"),
@@ -223,25 +183,6 @@ std::size_t read_lines(const YamlNode* list, Read read, BackupFile& file, Diagno
   for (const YamlNode& node : list->items) read(node, file, findings);
   return list->items.size();
 }
-
-/// Bytes in hexadecimal digits, separated by one blank or more.
-Bytes read_hex(const YamlNode& node, Diagnostics& findings) {
-  std::vector<std::string_view> words = split(node.text, ' ');
-  std::erase(words, "");
-  return to_bytes(node, words, findings);
-}
-
-void read_identity_bytes(const YamlNode& node, SnapshotIdentity& identity, const Asked& asked) {
-  identity.raw = read_hex(node, asked.findings);
-}
-
-constexpr Field<SnapshotIdentity> identity_fields[] = {
-    field<&SnapshotIdentity::model>("model"),
-    field_as<std::uint16_t, &SnapshotIdentity::model_code>("model-code"),
-    field<&SnapshotIdentity::serial>("serial"),
-    field_as<std::uint16_t, &SnapshotIdentity::firmware>("firmware"),
-    custom("raw", Need::optional, "bytes in hexadecimal digits", read_identity_bytes),
-};
 
 constexpr Field<Snapshot> profile_fields[] = {
     field<&Snapshot::profile>("id", Need::required),
@@ -404,6 +345,8 @@ class Names {
 /// Whether a text says this value: its label in any case, or the same number.
 bool says(std::string_view text, const Value& value, const Parameter& parameter) {
   if (!value.label.empty() && text == value.label) return true;
+  if (value.content == catalogue::Content::none) return text == no_value;
+  if (!value.is_number()) return text == value.exact();
   if (const auto number = Decimal::parse(text)) return *number == value.number;
   const auto parsed = catalogue::parse_value(parameter, text);
   return parsed && *parsed == value;
@@ -414,8 +357,9 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
                                       const SourceLocation& at, Diagnostics& findings) {
   if (!line.raw) {
     auto registers =
-        catalogue::parse_value(parameter, *line.value).and_then([&](const Value& value) {
-          return catalogue::encode(parameter, value.number);
+        catalogue::parse_exact_value(parameter, *line.value).and_then([&](const Value& value) {
+          return catalogue::encode(parameter, value,
+                                   Registers(catalogue::register_count(parameter.encoding)));
         });
     if (registers) return *std::move(registers);
     const std::string hint = hint_of(registers.error());
@@ -427,7 +371,7 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
   if (!value) {
     findings.add(at, fmt::format("{}: {} registers, but {} has {}", line.name, line.raw->size(),
                                  catalogue::to_text(parameter.encoding.kind),
-                                 catalogue::register_count(parameter.encoding.kind)));
+                                 catalogue::register_count(parameter.encoding)));
     return std::nullopt;
   }
   if (line.value && !says(*line.value, *value, parameter)) {

@@ -19,8 +19,10 @@ std::string text_or_null(const std::string& text) {
   return text.empty() ? std::string(null) : quoted(text);
 }
 
-std::string number_or_null(const std::optional<Decimal>& number) {
-  return number ? number->to_string() : std::string(null);
+std::string value_or_null(const std::optional<LoggedValue>& value) {
+  if (!value) return std::string(null);
+  const auto* number = std::get_if<Decimal>(&*value);
+  return number != nullptr ? number->to_string() : quoted(std::get<std::string>(*value));
 }
 
 }  // namespace
@@ -33,7 +35,7 @@ std::string render_change(const Change& change) {
       quoted(change.time), quoted(change.user), quoted(change.command), quoted(change.target),
       text_or_null(change.serial), quoted(change.name),
       change.register_address ? std::to_string(*change.register_address) : std::string(null),
-      number_or_null(change.old_value), number_or_null(change.new_value), quoted(change.result),
+      value_or_null(change.old_value), value_or_null(change.new_value), quoted(change.result),
       text_or_null(change.id));
 }
 

@@ -17,5 +17,6 @@ struct KeyList {
 std::vector<KeyList> profile_keys();
 std::vector<KeyList> tools_keys();
 std::vector<KeyList> backup_keys();
+std::vector<KeyList> dump_keys();
 
 }  // namespace spindle::files

@@ -79,11 +79,13 @@ class DriveRules {
   }
 
   void check_bits(const catalogue::Parameter& parameter, const Origin& origin) {
-    const unsigned width = catalogue::register_count(parameter.encoding.kind) * 16U;
+    const catalogue::BitSlice& slice = parameter.encoding.slice;
+    const unsigned width =
+        slice.is_whole() ? catalogue::register_count(parameter.encoding) * 16U : slice.width;
     if (!parameter.bits_by.empty()) require(parameter.bits_by, origin.of("bits-by"));
     for (std::size_t i = 0; i < parameter.bits.size(); ++i) {
       const catalogue::BitName& bit = parameter.bits[i];
-      if (bit.bit >= width) {
+      if (unsigned{bit.bit} + bit.width > width) {
         findings_.add_once(origin.of("bits"),
                            fmt::format("{}: bit {} is behind the last", parameter.name, bit.bit));
       }
@@ -105,7 +107,8 @@ class DriveRules {
   void check_pair(const catalogue::Parameter& parameter, const catalogue::BitName& a,
                   const catalogue::BitName& b, const Origin& origin) {
     const bool together = !a.when || !b.when || a.when == b.when;
-    if (!together || (a.bit != b.bit && a.text != b.text)) return;
+    const bool meet = a.bit < b.bit + b.width && b.bit < a.bit + a.width;
+    if (!together || (!meet && a.text != b.text)) return;
     findings_.add_once(origin.of("bits"), fmt::format("{}: bit {} and name '{}' are there twice",
                                                       parameter.name, b.bit, b.text));
   }
@@ -137,7 +140,7 @@ class DriveRules {
                                                         "says that it is busy",
                                                         action.name));
     }
-    const bool pair = catalogue::register_count(action.kind) == 2;
+    const bool pair = catalogue::register_count(action.encoding) == 2;
     if (pair && draft_.profile.link.even_pairs && action.address.value % 2 != 0) {
       findings_.add_once(origin.of("register"),
                          fmt::format("{}: a 32-bit value begins at an odd register, {}",

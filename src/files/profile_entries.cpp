@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 
 #include "files/fields.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/document_number.hpp"
 
 namespace spindle::files {
 namespace {
@@ -73,7 +75,7 @@ constexpr std::size_t most_parameters = 10'000;
 constexpr std::string_view counter = "{n}";
 
 /// Longer ones would break every table.
-constexpr std::size_t longest_unit = 12;
+constexpr std::size_t longest_unit = 24;
 
 constexpr auto clone_words = enum_table<catalogue::Cloning>(
     {{"never", catalogue::Cloning::never}, {"allowed", catalogue::Cloning::allowed}});
@@ -83,6 +85,10 @@ constexpr auto reading_words = enum_table<catalogue::Reading>(
 
 constexpr auto notation_words = enum_table<catalogue::Notation>(
     {{"decimal", catalogue::Notation::decimal}, {"hex", catalogue::Notation::hexadecimal}});
+
+constexpr std::uint8_t bits_per_byte = 8;
+enum class Half : std::uint8_t { low, high };
+constexpr auto half_words = enum_table<Half>({{"low", Half::low}, {"high", Half::high}});
 
 constexpr auto motion_words = enum_table<catalogue::Motion>({{"start", catalogue::Motion::start},
                                                              {"stop", catalogue::Motion::stop},
@@ -117,19 +123,31 @@ void read_except(const YamlNode& node, Parameter& parameter, const Asked& asked)
   }
 }
 
+constexpr std::uint64_t highest_bit = 63;
+
+/// "3", or "4..7" for bits that are one number.
+std::optional<catalogue::BitSlice> parse_slice(std::string_view text) {
+  const std::size_t dots = text.find("..");
+  const auto first = parse_unsigned(text.substr(0, dots), highest_bit);
+  const auto last =
+      dots == std::string_view::npos ? first : parse_unsigned(text.substr(dots + 2), highest_bit);
+  if (!first || !last || *last < *first) return std::nullopt;
+  return catalogue::BitSlice{static_cast<std::uint8_t>(*first),
+                             static_cast<std::uint8_t>(*last - *first + 1)};
+}
+
 std::vector<catalogue::BitName> to_bit_names(const YamlNode& node, std::optional<std::int64_t> when,
                                              Diagnostics& findings) {
-  constexpr std::uint64_t highest_bit = 31;
   expect(node, YamlNode::Kind::map, findings);
   std::vector<catalogue::BitName> bits;
   for (const YamlEntry& entry : node.entries) {
-    const auto bit = parse_unsigned(entry.key, highest_bit);
-    if (!bit) {
+    const auto slice = parse_slice(entry.key);
+    if (!slice) {
       findings.add(entry.key_at,
                    fmt::format("'{}' is not a bit from 0 to {}", entry.key, highest_bit));
     }
     auto text = to_text(entry.value, findings);
-    if (bit && text) bits.push_back({static_cast<std::uint8_t>(*bit), std::move(*text), when});
+    if (slice && text) bits.push_back({slice->first, std::move(*text), when, slice->width});
   }
   return bits;
 }
@@ -160,27 +178,89 @@ constexpr Field<Parameter> bits_by_fields[] = {
     custom("names", Need::required, "names of bits by number", read_names_of_bits),
 };
 
+/// "0.01" or "20/32768".
 void read_scale(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  const std::size_t slash = node.text.find('/');
+  if (node.kind == YamlNode::Kind::scalar && slash != std::string::npos) {
+    const auto scale = Decimal::parse(std::string_view(node.text).substr(0, slash));
+    const auto divisor = parse_unsigned(std::string_view(node.text).substr(slash + 1),
+                                        std::numeric_limits<std::uint32_t>::max());
+    if (!scale || *scale <= Decimal(0) || !divisor || *divisor == 0) {
+      asked.findings.add(node.at, fmt::format("'{}' is no fraction such as 20/32768", node.text));
+      return;
+    }
+    parameter.encoding.scale = *scale;
+    parameter.encoding.divisor = static_cast<std::uint32_t>(*divisor);
+    return;
+  }
   Decimal scale;
   if (!read_value(node, scale, asked)) return;
-  if (scale > Decimal(0)) {
+  if (scale != Decimal(0)) {
     parameter.encoding.scale = scale;
   } else {
-    asked.findings.add(asked.map.at, "scale must be above zero");
+    asked.findings.add(asked.map.at, "scale must not be zero");
   }
+}
+
+void read_slice(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  const auto text = to_text(node, asked.findings);
+  if (!text) return;
+  if (const auto slice = parse_slice(*text)) {
+    parameter.encoding.slice = *slice;
+  } else {
+    asked.findings.add(node.at, fmt::format("'{}' is not a bit, nor bits such as 4..7", node.text));
+  }
+}
+
+void read_half(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  Half half = Half::low;
+  read_word(half_words, node, half, asked);
+  const std::uint8_t first = half == Half::high ? bits_per_byte : 0;
+  parameter.encoding.slice = {first, bits_per_byte};
+}
+
+/// Patterns are told when the encoding is known; see set_nulls().
+void read_nulls(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  const auto add = [&](const YamlNode& item) {
+    const auto text = to_text(item, asked.findings);
+    if (!text) return;
+    const bool is_negative = text->starts_with('-');
+    const auto number = parse_unsigned(std::string_view(*text).substr(is_negative ? 1 : 0),
+                                       std::numeric_limits<std::uint64_t>::max());
+    if (!number) {
+      asked.findings.add(item.at, fmt::format("'{}' is not a whole number", *text));
+      return;
+    }
+    std::vector<std::uint64_t> nulls(parameter.nulls.begin(), parameter.nulls.end());
+    nulls.push_back(is_negative ? 0U - *number : *number);
+    parameter.nulls = std::move(nulls);
+  };
+  if (node.kind != YamlNode::Kind::sequence) return add(node);
+  for (const YamlNode& item : node.items) add(item);
+}
+
+/// One name or pattern, or a list of them.
+template <catalogue::List<catalogue::Text> Parameter::*member>
+void read_patterns(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  if (node.kind == YamlNode::Kind::sequence) {
+    read_value(node, parameter.*member, asked);
+    return;
+  }
+  catalogue::Text one;
+  if (read_value(node, one, asked)) parameter.*member = {one};
 }
 
 /// As documents print it; "torque" stands for the torque unit that is set on the tool.
 void read_unit(const YamlNode& node, Parameter& parameter, const Asked& asked) {
   auto unit = to_text(node, asked.findings);
   if (!unit) return;
-  const bool is_word = std::none_of(unit->begin(), unit->end(),
-                                    [](unsigned char c) { return c <= ' ' || c == 0x7F; });
-  if (is_word && unit->size() <= longest_unit) {
+  const bool is_clean = std::none_of(unit->begin(), unit->end(),
+                                     [](unsigned char c) { return c < ' ' || c == 0x7F; }) &&
+                        !unit->starts_with(' ') && !unit->ends_with(' ');
+  if (is_clean && unit->size() <= longest_unit) {
     parameter.unit = std::move(*unit);
   } else {
-    asked.findings.add(node.at,
-                       fmt::format("a unit is one word of at most {} bytes", longest_unit));
+    asked.findings.add(node.at, fmt::format("a unit is a text of at most {} bytes", longest_unit));
   }
 }
 
@@ -198,7 +278,27 @@ constexpr Field<Parameter> parameter_fields[] = {
     word<catalogue::kind_words, &Parameter::encoding, &catalogue::Encoding::kind>("encoding",
                                                                                   Need::required)
         .shared(),
-    custom("scale", Need::optional, "decimal number", read_scale).shared(),
+    custom("scale", Need::optional, "decimal number, or a fraction", read_scale).shared(),
+    field<&Parameter::scale_by>("scale-from").shared(),
+    field<&Parameter::encoding, &catalogue::Encoding::offset>("offset").shared(),
+    field<&Parameter::encoding, &catalogue::Encoding::decimals>("decimals").shared(),
+    field<&Parameter::encoding, &catalogue::Encoding::length>("length").shared(),
+    field<&Parameter::encoding, &catalogue::Encoding::count>("count").shared(),
+    custom("bit", Need::optional, "bit, or bits such as 4..7", read_slice),
+    custom("half", Need::optional, "low | high", read_half),
+    word<catalogue::word_order_words, &Parameter::encoding, &catalogue::Encoding::word_order>(
+        "word-order")
+        .shared(),
+    word<catalogue::byte_order_words, &Parameter::encoding, &catalogue::Encoding::byte_order>(
+        "byte-order")
+        .shared(),
+    word<catalogue::padding_words, &Parameter::encoding, &catalogue::Encoding::padding>("padding")
+        .shared(),
+    word<catalogue::packing_words, &Parameter::encoding, &catalogue::Encoding::packing>("packing")
+        .shared(),
+    word<catalogue::date_layout_words, &Parameter::encoding, &catalogue::Encoding::date>("date")
+        .shared(),
+    custom("null", Need::optional, "number, or list of numbers", read_nulls).shared(),
     custom("unit", Need::optional, "text", read_unit).shared(),
     field<&Parameter::range>("range").shared(),
     custom("except", Need::optional, "range of decimal numbers", read_except),
@@ -211,6 +311,13 @@ constexpr Field<Parameter> parameter_fields[] = {
     field<&Parameter::risk>("risk"),
     field<&Parameter::settle>("settle").shared(),
     word<catalogue::hazard_words, &Parameter::hazard>("hazard").shared(),
+    field<&Parameter::write_address>("write-register"),
+    custom("before", Need::optional, "name or pattern, or list of them",
+           read_patterns<&Parameter::before>)
+        .shared(),
+    custom("after", Need::optional, "name or pattern, or list of them",
+           read_patterns<&Parameter::after>)
+        .shared(),
     word<catalogue::access_words, &Parameter::access>("access", Need::required).shared(),
     word<reading_words, &Parameter::reading>("reading"),
     word<catalogue::evidence_words, &Parameter::evidence>("evidence", Need::required).shared(),
@@ -241,12 +348,36 @@ void check_repetition(YamlMap& map, Template& entry) {
   if (!entry.repeated) map.findings().add(map.node().at, "key 'n' needs a 'stride' above zero");
 }
 
-Template read_template(YamlMap& map, const YamlNode* group) {
+/// Bits that are the value's, of what was written down as a number.
+void set_nulls(Parameter& parameter) {
+  if (parameter.nulls.empty()) return;
+  std::vector<std::uint64_t> nulls;
+  for (const std::uint64_t number : parameter.nulls) {
+    const std::uint64_t pattern =
+        catalogue::to_pattern(parameter.encoding, catalogue::Integer{Sign::plus, number});
+    nulls.push_back(pattern);
+  }
+  parameter.nulls = std::move(nulls);
+}
+
+/// What an encoding means without being told.
+void complete(Parameter& parameter) {
+  catalogue::Encoding& encoding = parameter.encoding;
+  const bool is_half = encoding.kind == catalogue::Kind::u8 || encoding.kind == catalogue::Kind::i8;
+  if (is_half && encoding.slice.is_whole()) encoding.slice = {0, bits_per_byte};
+  if (encoding.kind == catalogue::Kind::bcd && encoding.length == 0) encoding.length = 2;
+  set_nulls(parameter);
+}
+
+Template read_template(YamlMap& map, const YamlNode* group, const ProfileDraft& draft) {
   Template entry;
+  entry.parameter.encoding.word_order = draft.profile.link.word_order;
+  entry.parameter.encoding.byte_order = draft.profile.link.byte_order;
   const YamlNode* prefix = group == nullptr ? nullptr : group->find("name");
   if (prefix != nullptr && map.node().find("name") != nullptr) entry.parameter.name = prefix->text;
   read_fields(parameter_fields, map, entry.parameter);
   read_fields(template_fields, map, entry);
+  complete(entry.parameter);
   check_repetition(map, entry);
   map.finish();
   return entry;
@@ -318,8 +449,8 @@ void add_entries(const std::vector<Template>& entries, ProfileDraft& draft, Diag
 void read_entry(const YamlNode& node, const YamlNode* group, ProfileDraft& draft,
                 std::vector<Template>& entries, Diagnostics& findings) {
   const std::size_t before = findings.told();
-  YamlMap map(node, findings, group);
-  Template entry = read_template(map, group);
+  YamlMap map(node, findings, group, draft.top.entry);
+  Template entry = read_template(map, group, draft);
   Origin origin{.entry = &node, .group = group, .layer = draft.layers, .overlaps = entry.overlaps};
   origin.sound = findings.told() == before;
   entry.origin = origin;
@@ -366,10 +497,11 @@ constexpr Field<catalogue::Preparation> preparation_fields[] = {
 constexpr Field<Action> action_fields[] = {
     field<&Action::name>("name", Need::required),
     field<&Action::title>("title"),
+    word<modbus::table_words, &Action::table>("table"),
     field<&Action::address>("register", Need::required),
     field<&Action::value>("value"),
     field<&Action::stop_value>("stop"),
-    word<catalogue::kind_words, &Action::kind>("encoding"),
+    word<catalogue::kind_words, &Action::encoding, &catalogue::Encoding::kind>("encoding"),
     word<motion_words, &Action::motion>("motion"),
     field<&Action::rest>("rest"),
     field<&Action::busy>("busy"),
@@ -377,8 +509,8 @@ constexpr Field<Action> action_fields[] = {
     field<&Action::labels>("labels"),
     custom("range", Need::optional, "range 0..65535", read_action_range),
     word<catalogue::hazard_words, &Action::hazard>("hazard", Need::required),
-    word<catalogue::evidence_words, &Action::evidence>("evidence", Need::required),
-    field<&Action::source>("source", Need::required),
+    word<catalogue::evidence_words, &Action::evidence>("evidence", Need::required).shared(),
+    field<&Action::source>("source", Need::required).shared(),
     field<&Action::note>("note"),
     field<&Action::check>("check"),
     field<&Action::tells>("tells"),
@@ -391,12 +523,12 @@ constexpr Field<Action> action_fields[] = {
 void check_labels(const YamlNode& node, Action& action, Diagnostics& findings) {
   std::vector<Label> fitting;
   for (const Label& label : action.labels) {
-    if (label.number >= catalogue::lowest(action.kind) &&
-        label.number <= catalogue::highest(action.kind)) {
+    if (Decimal(label.number) >= catalogue::lowest(action.encoding) &&
+        Decimal(label.number) <= catalogue::highest(action.encoding)) {
       fitting.push_back(label);
     } else {
       findings.add(node.find("labels")->at, fmt::format("{} does not fit {}", label.number,
-                                                        catalogue::to_text(action.kind)));
+                                                        catalogue::to_text(action.encoding.kind)));
     }
   }
   if (fitting.size() != action.labels.size()) action.labels = std::move(fitting);
@@ -434,14 +566,46 @@ void add_action(Action action, const Origin& origin, ProfileDraft& draft, Diagno
   }
 }
 
+/// 40001 is holding register 0: the numbers of older documents say the table, and count from 1.
+void renumber(YamlNode& entry, Diagnostics& findings) {
+  for (YamlEntry& key : entry.entries) {
+    if (key.key != "fields") continue;
+    for (YamlNode& field : key.value.items) renumber(field, findings);
+  }
+  const auto at = std::find_if(entry.entries.begin(), entry.entries.end(),
+                               [](const YamlEntry& key) { return key.key == "register"; });
+  if (at == entry.entries.end()) return;
+  const auto meant = catalogue::parse_document_number(at->value.text);
+  if (!meant) {
+    findings.add(at->value.at, fmt::format("'{}' is no number such as 40001, which 'numbering: "
+                                           "modicon' promises",
+                                           at->value.text));
+    return;
+  }
+  at->value.text = std::to_string(meant->address.value);
+  if (entry.find("table") != nullptr) {
+    findings.add(at->value.at, "the number says the table, so 'table' has to be left out");
+    return;
+  }
+  YamlEntry table = *at;
+  table.key = "table";
+  table.value.text = modbus::to_text(meant->table);
+  entry.entries.push_back(std::move(table));
+}
+
 }  // namespace
 
 std::vector<Key> parameter_keys() { return keys_of<parameter_fields, template_fields>(); }
 std::vector<Key> action_keys() { return keys_of<action_fields>(); }
 
-void read_parameters(const YamlNode& list, ProfileDraft& draft, const Asked& asked) {
+void read_parameters(const YamlNode& written, ProfileDraft& draft, const Asked& asked) {
   Diagnostics& findings = asked.findings;
-  if (!expect(list, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
+  if (!expect(written, YamlNode::Kind::sequence, findings)) draft.incomplete = true;
+  if (draft.numbering == Numbering::modicon) {
+    draft.renumbered.push_back(std::make_unique<YamlNode>(written));
+    for (YamlNode& node : draft.renumbered.back()->items) renumber(node, findings);
+  }
+  const YamlNode& list = draft.numbering == Numbering::modicon ? *draft.renumbered.back() : written;
   for (const YamlNode& node : list.items) {
     if (const YamlNode* fields = node.find("fields")) {
       read_group(node, *fields, draft, findings);
@@ -453,13 +617,22 @@ void read_parameters(const YamlNode& list, ProfileDraft& draft, const Asked& ask
   }
 }
 
-void read_actions(const YamlNode& list, ProfileDraft& draft, const Asked& asked) {
+void read_actions(const YamlNode& written, ProfileDraft& draft, const Asked& asked) {
   Diagnostics& findings = asked.findings;
-  expect(list, YamlNode::Kind::sequence, findings);
+  expect(written, YamlNode::Kind::sequence, findings);
+  if (draft.numbering == Numbering::modicon) {
+    draft.renumbered.push_back(std::make_unique<YamlNode>(written));
+    for (YamlNode& node : draft.renumbered.back()->items) renumber(node, findings);
+  }
+  const YamlNode& list = draft.numbering == Numbering::modicon ? *draft.renumbered.back() : written;
   for (const YamlNode& node : list.items) {
     const std::size_t before = findings.told();
     Action action;
-    read_map(action_fields, node, action, findings);
+    action.encoding.word_order = draft.profile.link.word_order;
+    action.encoding.byte_order = draft.profile.link.byte_order;
+    YamlMap map(node, findings, nullptr, draft.top.entry);
+    read_fields(action_fields, map, action);
+    map.finish();
     check_labels(node, action, findings);
     find_range(node, action, findings);
     if (action.name.empty()) continue;

@@ -100,6 +100,8 @@ void read_area_list(const YamlNode& node, std::vector<Area>& areas, const Asked&
 constexpr Field<std::vector<Area>> areas_fields[] = {
     custom("holding", Need::optional, "list of ranges", read_area_list),
     custom("input", Need::optional, "list of ranges", read_area_list),
+    custom("coil", Need::optional, "list of ranges", read_area_list),
+    custom("discrete", Need::optional, "list of ranges", read_area_list),
 };
 
 }  // namespace
@@ -126,6 +128,28 @@ void read_transaction(const YamlNode& node, LinkSpec&, const Asked& asked) {
   read_word(transaction_words, node, echoed, asked);
 }
 
+void read_write_function(const YamlNode& node, LinkSpec& link, const Asked& asked) {
+  constexpr auto single = static_cast<std::uint8_t>(modbus::FunctionCode::write_single_register);
+  constexpr auto several =
+      static_cast<std::uint8_t>(modbus::FunctionCode::write_multiple_registers);
+  std::uint8_t function = 0;
+  if (!read_value(node, function, asked)) return;
+  if (function == single || function == several) {
+    link.write_function = function;
+  } else {
+    asked.findings.add(node.at,
+                       fmt::format("function {} writes no register; it is 6 or 16", function));
+  }
+}
+
+void read_busy(const YamlNode& node, LinkSpec& link, const Asked& asked) {
+  std::vector<std::uint8_t> codes;
+  for (const std::int64_t code : to_numbers<std::uint8_t>(node, asked.findings)) {
+    codes.push_back(static_cast<std::uint8_t>(code));
+  }
+  link.busy = std::move(codes);
+}
+
 constexpr Field<catalogue::GapRule> gap_fields[] = {
     field<&catalogue::GapRule::up_to_baud>("up-to"),
     field<&catalogue::GapRule::gap>("gap", Need::required),
@@ -147,6 +171,14 @@ constexpr Field<LinkSpec> link_fields[] = {
     custom("transaction", Need::optional, "echoed", read_transaction),
     field<&LinkSpec::max_read>("max-read"),
     field<&LinkSpec::max_write>("max-write"),
+    field<&LinkSpec::max_read_bits>("max-read-bits"),
+    custom("write-function", Need::optional, "6 | 16", read_write_function),
+    field<&LinkSpec::max_gap>("max-gap"),
+    custom("busy", Need::optional, "list of exception codes", read_busy),
+    field<&LinkSpec::busy_every>("busy-every"),
+    field<&LinkSpec::busy_limit>("busy-limit"),
+    word<catalogue::word_order_words, &LinkSpec::word_order>("word-order"),
+    word<catalogue::byte_order_words, &LinkSpec::byte_order>("byte-order"),
     field<&LinkSpec::keep_alive>("keep-alive"),
     field<&LinkSpec::answer>("answer"),
     field<&LinkSpec::connect>("connect"),
@@ -285,6 +317,12 @@ constexpr Field<catalogue::ExtendedErrorSpec> refusal_fields[] = {
     field<&catalogue::ExtendedErrorSpec::give_up_after>("give-up-after"),
 };
 
+constexpr Field<catalogue::UnlockSpec> unlock_fields[] = {
+    field<&catalogue::UnlockSpec::parameter>("parameter", Need::inherited),
+    field_as<std::uint32_t, &catalogue::UnlockSpec::value>("value", Need::inherited),
+    field<&catalogue::UnlockSpec::needed_by>("for"),
+};
+
 void read_alarm_parameters(const YamlNode& node, catalogue::AlarmList& list, const Asked& asked) {
   catalogue::Text pattern;
   if (read_value(node, pattern, asked)) list.parameters = {pattern};
@@ -320,6 +358,25 @@ constexpr Field<ProfileDraft> title_fields[] = {
     field<&ProfileDraft::profile, &Profile::title>("title", Need::required),
     field<&ProfileDraft::profile, &Profile::maker>("maker"),
     field<&ProfileDraft::profile, &Profile::series>("series"),
+};
+
+void read_dropped(const YamlNode& node, ProfileDraft& draft, const Asked& asked) {
+  catalogue::List<catalogue::Text> names;
+  if (read_value(node, names, asked)) draft.dropped = to_strings(names);
+}
+
+/// Shared by all entries of the file, which look for it themselves.
+void read_nothing(const YamlNode&, ProfileDraft&, const Asked&) {}
+
+/// What a file says of all its entries.
+constexpr Field<ProfileDraft> common_fields[] = {
+    word<numbering_words, &ProfileDraft::numbering>("numbering"),
+    custom("evidence", Need::optional, "of all entries", read_nothing),
+    custom("source", Need::optional, "of all entries", read_nothing),
+    custom("access", Need::optional, "of all parameters", read_nothing),
+    custom("drop", Need::optional, "list of names or patterns", read_dropped),
+    word<catalogue::evidence_words, &ProfileDraft::inherited_evidence>("inherited-evidence",
+                                                                       Need::optional, "evidence"),
 };
 
 constexpr Field<ProfileDraft> list_fields[] = {
@@ -378,6 +435,7 @@ constexpr Section sections[] = {
     section<&Profile::alarm_reset>(
         field<&ProfileDraft::profile, &Profile::alarm_reset>("alarm-reset"),
         &ProfileDraft::alarm_reset),
+    map_section<&Profile::unlock, unlock_fields>("unlock", &ProfileDraft::unlock),
 };
 
 /// Reads a section where it is there, and remembers where it stands.
@@ -497,10 +555,13 @@ void check_start_value(const catalogue::Profile& profile, const YamlEntry& entry
     return;
   }
   for (const catalogue::Parameter& parameter : *meant) {
-    const catalogue::Kind kind = parameter.encoding.kind;
-    if (raw >= catalogue::lowest(kind) && raw <= catalogue::highest(kind)) continue;
-    findings.add_once(entry.value.at, fmt::format("does not fit {}, the encoding of {}",
-                                                  catalogue::to_text(kind), parameter.name));
+    const catalogue::Encoding& encoding = parameter.encoding;
+    const bool fits = encoding.is_integer() && Decimal(raw) >= catalogue::lowest(encoding) &&
+                      Decimal(raw) <= catalogue::highest(encoding);
+    if (fits || encoding.is_float()) continue;
+    findings.add_once(entry.value.at,
+                      fmt::format("does not fit {}, the encoding of {}",
+                                  catalogue::to_text(encoding.kind), parameter.name));
   }
 }
 
@@ -522,7 +583,7 @@ std::set<std::size_t> sharing(const std::vector<catalogue::Parameter>& parameter
   std::set<std::size_t> found;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const catalogue::Parameter& parameter = parameters[i];
-    for (unsigned part = 0; part < catalogue::register_count(parameter.encoding.kind); ++part) {
+    for (unsigned part = 0; part < catalogue::register_count(parameter.encoding); ++part) {
       const auto [owner, is_first] =
           owners.try_emplace({parameter.table, parameter.address.value + part}, i);
       if (!is_first) found.insert({owner->second, i});
@@ -574,11 +635,62 @@ ProfileHead read_head(const YamlNode& document, Diagnostics& findings) {
   return head;
 }
 
+namespace {
+
+/// Leaves out what a base says and this file drops, side by side with where it was written.
+template <typename Entry>
+std::size_t drop_named(std::string_view pattern, std::vector<Entry>& entries,
+                       std::vector<Origin>& origins) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (entries[i].name == pattern || glob_match(pattern, entries[i].name)) continue;
+    if (kept != i) {
+      entries[kept] = std::move(entries[i]);
+      origins[kept] = origins[i];
+    }
+    ++kept;
+  }
+  const std::size_t dropped = entries.size() - kept;
+  entries.resize(kept);
+  origins.resize(kept);
+  return dropped;
+}
+
+/// What a file says of all that its base says.
+void change_inherited(ProfileDraft& draft, Diagnostics& findings) {
+  for (const std::string& pattern : draft.dropped) {
+    const std::size_t dropped = drop_named(pattern, draft.read_parameters, draft.parameters) +
+                                drop_named(pattern, draft.read_actions, draft.actions);
+    if (dropped == 0 && !draft.incomplete) {
+      findings.add(draft.top.of("drop"), fmt::format("'{}' is nothing that a base has", pattern));
+    }
+  }
+  if (!draft.dropped.empty()) {
+    draft.parameter_index.clear();
+    for (std::size_t i = 0; i < draft.read_parameters.size(); ++i) {
+      draft.parameter_index.emplace(draft.read_parameters[i].name, i);
+    }
+  }
+  if (!draft.inherited_evidence) return;
+  const auto lower = [&](auto& entry) {
+    entry.evidence = std::max(entry.evidence, *draft.inherited_evidence);
+  };
+  std::for_each(draft.read_parameters.begin(), draft.read_parameters.end(), lower);
+  std::for_each(draft.read_actions.begin(), draft.read_actions.end(), lower);
+}
+
+}  // namespace
+
 void read_profile(const YamlNode& document, ProfileDraft& draft, Diagnostics& findings) {
   YamlMap map(document, findings);
   draft.top = {.entry = &document, .layer = draft.layers};
   for (const Field<ProfileHead>& head : head_fields) map.know(head.key.name);
   read_fields(title_fields, map, draft);
+  draft.numbering = Numbering::address;
+  draft.dropped.clear();
+  draft.inherited_evidence.reset();
+  read_fields(common_fields, map, draft);
+  change_inherited(draft, findings);
   const bool has_link = draft.link.entry != nullptr || draft.incomplete;
   for (const Section& section : sections) read_section(section, map, draft, has_link);
   read_fields(list_fields, map, draft);
@@ -669,7 +781,7 @@ void check_simulation(const catalogue::Profile& profile, const YamlNode& documen
 }
 
 std::vector<KeyList> profile_keys() {
-  KeyList document{"profile", keys_of<head_fields, title_fields>()};
+  KeyList document{"profile", keys_of<head_fields, title_fields, common_fields>()};
   for (const Section& section : sections) document.keys.push_back(section.field.key);
   for (const Key& key : keys_of<list_fields>()) document.keys.push_back(key);
   std::vector<KeyList> lists;

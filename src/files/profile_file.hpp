@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -7,6 +10,7 @@
 
 #include "files/yaml_reader.hpp"
 #include "spindle/catalogue/profile.hpp"
+#include "spindle/files/register_map.hpp"
 
 namespace spindle::files {
 
@@ -42,6 +46,13 @@ struct ProfileDraft {
   Origin alarm_lists = {};
   Origin watched = {};
   Origin alarm_reset = {};
+  Origin unlock = {};
+  // Of the layer that is read now.
+  Numbering numbering = Numbering::address;
+  std::vector<std::string> dropped = {};
+  std::optional<catalogue::Evidence> inherited_evidence = std::nullopt;
+  /// Copies whose registers count from 0, which positions refer to.
+  std::vector<std::unique_ptr<YamlNode>> renumbered = {};
   std::unordered_map<std::string, std::size_t> parameter_index = {};
   /// Parameters that were left out because not all of them could be read.
   std::unordered_set<std::string> half_read = {};

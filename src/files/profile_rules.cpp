@@ -11,6 +11,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/value.hpp"
+#include "spindle/catalogue/write_order.hpp"
 
 namespace spindle::files {
 namespace {
@@ -35,7 +36,7 @@ struct Span {
 
 Span span_of(const Parameter& parameter, std::size_t index) {
   const unsigned first = parameter.address.value;
-  return {parameter.table, first, first + catalogue::register_count(parameter.encoding.kind) - 1U,
+  return {parameter.table, first, first + catalogue::register_count(parameter.encoding) - 1U,
           index};
 }
 
@@ -119,6 +120,14 @@ void registers_are_in_the_table(const ProfileDraft& draft, Diagnostics& findings
   });
 }
 
+/// Bits of one register may be those of several parameters.
+bool share_bits(const Parameter& a, const Parameter& b) {
+  const auto& one = a.encoding.slice;
+  const auto& other = b.encoding.slice;
+  if (one.is_whole() || other.is_whole() || a.address != b.address) return true;
+  return one.first < other.first + other.width && other.first < one.first + one.width;
+}
+
 void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
   std::vector<Span> spans;
   spans.reserve(draft.parameters.size());
@@ -132,7 +141,9 @@ void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
   for (std::size_t i = 1; i < spans.size(); ++i) {
     const Span& span = spans[i];
     const Span& before = spans[reaching];
-    const bool overlap = span.table == before.table && span.first <= before.last;
+    const bool overlap =
+        span.table == before.table && span.first <= before.last &&
+        share_bits(draft.profile.parameters[span.index], draft.profile.parameters[before.index]);
     const bool declared =
         draft.parameters[span.index].overlaps || draft.parameters[before.index].overlaps;
     if (overlap && !declared) {
@@ -150,7 +161,8 @@ void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
 void pairs_are_even(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.link.even_pairs) return;
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
-    const bool pair = catalogue::register_count(parameter.encoding.kind) == 2;
+    const bool pair = catalogue::register_count(parameter.encoding) == 2 &&
+                      parameter.encoding.kind != catalogue::Kind::text;
     if (!pair || parameter.address.value % 2 == 0) return;
     findings.add_once(origin.of("register"),
                       fmt::format("{}: a 32-bit value begins at an odd register, {}",
@@ -160,10 +172,126 @@ void pairs_are_even(const ProfileDraft& draft, Diagnostics& findings) {
 
 void input_registers_are_read_only(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
-    if (parameter.table != RegisterTable::input || parameter.access == Access::read_only) return;
+    if (modbus::is_writable(parameter.table) || parameter.access == Access::read_only) return;
     findings.add_once(origin.of("access"),
-                      fmt::format("{}: input registers cannot be written", parameter.name));
+                      fmt::format("{}: {} cannot be written", parameter.name,
+                                  parameter.table == RegisterTable::input ? "input registers"
+                                                                          : "discrete inputs"));
   });
+}
+
+// ---- encodings ----
+
+/// The first thing that is wrong with an encoding; empty when it is good.
+std::string fault_of(const Parameter& parameter) {
+  using catalogue::Kind;
+  const catalogue::Encoding& encoding = parameter.encoding;
+  constexpr std::uint16_t longest_bcd = 8;
+  const bool is_bit_table = modbus::holds_bits(parameter.table);
+  if (is_bit_table && encoding.kind != Kind::bit) return "a coil is a 'bit'";
+  if (is_bit_table && encoding.is_part()) return "a coil has no bits of its own";
+  if (encoding.kind == Kind::bit && !is_bit_table && !encoding.is_part()) {
+    return "key 'bit' is missing, which says the bit of the register";
+  }
+  if (encoding.kind == Kind::text && encoding.length == 0) {
+    return "key 'length' is missing, which says how many bytes the text has";
+  }
+  if (encoding.packing == catalogue::Packing::low && encoding.kind != Kind::text) {
+    return "only a text is packed";
+  }
+  if (encoding.length > 0 && encoding.kind != Kind::text && encoding.kind != Kind::bcd) {
+    return "only a text and BCD digits have a length";
+  }
+  if (encoding.kind == Kind::bcd && encoding.length > longest_bcd) {
+    return "more than 16 BCD digits";
+  }
+  const unsigned room = encoding.kind == Kind::bit ? 16 : 16U * catalogue::register_count(encoding);
+  if (unsigned{encoding.slice.first} + encoding.slice.width > room) {
+    return "its bits are behind the last one of its registers";
+  }
+  if (encoding.is_part() && (!encoding.is_integer() || encoding.kind == Kind::bcd)) {
+    return "only whole numbers are made of some bits";
+  }
+  if (encoding.count == 0) return "count must be above zero";
+  if (catalogue::register_count(encoding) > modbus::max_read_count) {
+    return "it is longer than one request can read";
+  }
+  if (encoding.count > 1 && encoding.is_part()) return "bits of a register are no list";
+  constexpr int most_decimals = 18;
+  if (encoding.decimals.value_or(0) > most_decimals) return "more than 18 decimals";
+  const bool scales = encoding.scale != Decimal(1) || encoding.divisor != 1 ||
+                      encoding.offset != Decimal(0) || !parameter.scale_by.empty();
+  if (scales && !encoding.is_integer() && !encoding.is_float()) return "only numbers have a scale";
+  if (!parameter.nulls.empty() && !encoding.is_integer() && !encoding.is_float()) {
+    return "only numbers have a 'null'";
+  }
+  return {};
+}
+
+void encodings_are_whole(const ProfileDraft& draft, Diagnostics& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (const std::string fault = fault_of(parameter); !fault.empty()) {
+      findings.add_once(origin.of("encoding"), fmt::format("{}: {}", parameter.name, fault));
+    }
+  });
+}
+
+/// What is decided by another parameter, and in which order they are written.
+void others_are_there(const ProfileDraft& draft, Diagnostics& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    const std::string scale_by = parameter.scale_by;
+    if (scale_by.empty() || draft.incomplete) return;
+    const Parameter* power = parameter_named(draft, scale_by);
+    if (power == nullptr) {
+      findings.add_once(origin.of("scale-from"), no_such_parameter(draft, scale_by));
+    } else if (!power->encoding.is_integer() || power->encoding.scale != Decimal(1) ||
+               power->encoding.divisor != 1 || power->encoding.count > 1 ||
+               !power->scale_by.empty()) {
+      findings.add_once(origin.of("scale-from"),
+                        fmt::format("{}: {} is no whole number", parameter.name, scale_by));
+    }
+  });
+  const std::vector<Parameter> all(draft.profile.parameters.begin(),
+                                   draft.profile.parameters.end());
+  const auto circle = catalogue::waiting_in_a_circle(all);
+  if (!circle.empty()) {
+    findings.add_once(draft.top.entry->at,
+                      fmt::format("each of these waits for another one to be written: {}",
+                                  fmt::join(circle, ", ")));
+  }
+}
+
+/// A write elsewhere than it is read hits what stands there.
+void writes_hit_no_other(const ProfileDraft& draft, Diagnostics& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (!parameter.write_address || origin.overlaps) return;
+    const unsigned first = parameter.write_address->value;
+    const unsigned last = first + catalogue::register_count(parameter.encoding) - 1U;
+    for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
+      const Parameter& other = draft.profile.parameters[i];
+      const Span span = span_of(other, i);
+      const bool hit = span.table == parameter.table && span.first <= last && first <= span.last;
+      if (!hit || other.name == parameter.name || draft.parameters[i].overlaps) continue;
+      findings.add_once(
+          origin.of("write-register"),
+          fmt::format("{} is written to a register of {}; write 'overlaps: true' if this is meant",
+                      parameter.name, other.name));
+    }
+  });
+}
+
+void unlock_is_known(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.unlock || draft.incomplete) return;
+  const auto& [name, value, needed_by] = *draft.profile.unlock;
+  const Parameter* lock = parameter_named(draft, name);
+  if (lock == nullptr) {
+    findings.add_once(draft.unlock.of("parameter"), no_such_parameter(draft, name));
+  } else if (lock->access == Access::read_only) {
+    findings.add_once(draft.unlock.of("parameter"),
+                      fmt::format("{} cannot be written, so it unlocks nothing", name));
+  } else if (const auto fits = catalogue::encode(*lock, {Decimal(value)}); !fits) {
+    findings.add_once(draft.unlock.of("value"), message_of(fits.error()));
+  }
 }
 
 // ---- values ----
@@ -177,7 +305,8 @@ void ranges_fit(const ProfileDraft& draft, Diagnostics& findings) {
     }
     for (const auto& limit : {minimum, maximum}) {
       if (!limit) continue;
-      const auto registers = catalogue::encode(parameter, *limit);
+      const auto registers = catalogue::encode(
+          parameter, {*limit}, Registers(catalogue::register_count(parameter.encoding)));
       if (!registers) {
         findings.add_once(origin.of("range"),
                           fmt::format("{}: {}", parameter.name, message_of(registers.error())));
@@ -189,7 +318,8 @@ void ranges_fit(const ProfileDraft& draft, Diagnostics& findings) {
 void defaults_fit(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     if (!parameter.default_value) return;
-    const auto value = catalogue::parse_value(parameter, parameter.default_value->to_string());
+    const auto value =
+        catalogue::parse_exact_value(parameter, parameter.default_value->to_string());
     if (value) return;
     findings.add_once(origin.of("default"),
                       fmt::format("{}: {}", parameter.name, message_of(value.error())));
@@ -238,10 +368,12 @@ void read_only_is_never_cloned(const ProfileDraft& draft, Diagnostics& findings)
 void secrets_are_stored(const ProfileDraft& draft, Diagnostics& findings) {
   for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
     const bool marked = parameter.secrecy == catalogue::Secrecy::secret;
-    if (!marked || parameter.table == RegisterTable::holding) return;
-    findings.add_once(origin.of("secret"),
-                      fmt::format("{}: no backup holds input registers, so 'secret' says nothing",
-                                  parameter.name));
+    if (!marked || modbus::is_writable(parameter.table)) return;
+    findings.add_once(
+        origin.of("secret"),
+        fmt::format(
+            "{}: no backup holds {}, so 'secret' says nothing", parameter.name,
+            parameter.table == RegisterTable::input ? "input registers" : "discrete inputs"));
   });
 }
 
@@ -250,9 +382,12 @@ std::string fault_of(const catalogue::List<Label>& labels, const Parameter& para
   Parameter earlier = parameter;
   std::vector<Label> known;
   for (const Label& label : labels) {
-    const catalogue::Kind kind = parameter.encoding.kind;
-    if (label.number < catalogue::lowest(kind) || label.number > catalogue::highest(kind)) {
-      return fmt::format("label {} does not fit {}", label.number, catalogue::to_text(kind));
+    const catalogue::Encoding& encoding = parameter.encoding;
+    if (!encoding.is_integer()) return "only whole numbers have labels";
+    if (Decimal(label.number) < catalogue::lowest(encoding) ||
+        Decimal(label.number) > catalogue::highest(encoding)) {
+      return fmt::format("label {} does not fit {}", label.number,
+                         catalogue::to_text(encoding.kind));
     }
     if (label.text.empty()) return fmt::format("the label of {} is empty", label.number);
     for (const Label& other : known) {
@@ -275,7 +410,9 @@ void labels_are_unique(const ProfileDraft& draft, Diagnostics& findings) {
     if (parameter.labels.empty()) return;
     Parameter plain{.name = {},
                     .title = {},
-                    .encoding = {parameter.encoding.kind},
+                    .encoding = {.kind = parameter.encoding.kind,
+                                 .length = parameter.encoding.length,
+                                 .slice = parameter.encoding.slice},
                     .unit = {},
                     .source = {},
                     .note = {}};
@@ -286,7 +423,7 @@ void labels_are_unique(const ProfileDraft& draft, Diagnostics& findings) {
   });
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     Parameter plain;
-    plain.encoding.kind = action.kind;
+    plain.encoding = action.encoding;
     const std::string fault = fault_of(action.labels, plain);
     if (!fault.empty()) {
       findings.add_once(origin.of("labels"), fmt::format("{}: {}", action.name, fault));
@@ -314,7 +451,7 @@ void actions_stay_off_parameters(const ProfileDraft& draft, Diagnostics& finding
   for_each_action(draft, [&](const Action& action, const Origin& origin) {
     if (!numbered || numbered->table != RegisterTable::holding) return;
     const unsigned first = action.address.value;
-    const unsigned last = first + catalogue::register_count(action.kind) - 1U;
+    const unsigned last = first + catalogue::register_count(action.encoding) - 1U;
     const unsigned taken = std::max<unsigned>(first, numbered->from);
     if (taken > last || taken > numbered->to) return;
     findings.add_once(
@@ -470,9 +607,6 @@ bool share(const Span& span, RegisterTable table, unsigned first, unsigned last)
 /// What else reads registers that reading clears, in words; empty: nothing.
 std::string other_reader(const ProfileDraft& draft, const Span& span) {
   const catalogue::Profile& profile = draft.profile;
-  for (const catalogue::Area& area : profile.link.contiguous) {
-    if (share(span, area.table, area.from, area.to)) return "'contiguous' reads it along";
-  }
   const auto& numbered = profile.numbered;
   if (numbered && share(span, numbered->table, numbered->from, numbered->to)) {
     return "it has a number, too";
@@ -495,8 +629,18 @@ std::string other_reader(const ProfileDraft& draft, const Span& span) {
     if (action.confirm == name) return fmt::format("action '{}' reads it", action.name);
   }
   if (profile.refusals && profile.refusals->parameter == name) return "refusals read it";
+  const auto names_it = [&](const auto& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  if (names_it(profile.watched)) return "'watch' reads it again and again";
+  for (const catalogue::AlarmList& list : profile.alarm_lists) {
+    if (names_it(list.parameters)) return "an alarm list reads it";
+  }
   for (std::size_t i = 0; i < profile.parameters.size(); ++i) {
     const Span other = span_of(profile.parameters[i], i);
+    if (profile.parameters[i].scale_by == name) {
+      return fmt::format("the scale of {} stands there", profile.parameters[i].name);
+    }
     if (profile.parameters[i].bits_by == name) {
       return fmt::format("the bits of {} depend on it", profile.parameters[i].name);
     }
@@ -511,10 +655,8 @@ void consumed_registers_have_one_reader(const ProfileDraft& draft, Diagnostics& 
   for (std::size_t i = 0; i < draft.parameters.size(); ++i) {
     const Parameter& parameter = draft.profile.parameters[i];
     if (parameter.reading != catalogue::Reading::consumes) continue;
-    const auto& events = draft.profile.events;
     std::string why = other_reader(draft, span_of(parameter, i));
     if (parameter.access != Access::read_only) why = "it would be read back behind a write";
-    if (!events || events->flag != parameter.name) why = "it is not the 'flag' of the events";
     if (why.empty()) continue;
     findings.add_once(draft.parameters[i].of("reading"),
                       fmt::format("{}: reading clears it, but {}", parameter.name, why));
@@ -547,7 +689,7 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Diagnostics& findi
 void arming_is_no_parameter(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events || !draft.profile.events->arm) return;
   const modbus::RegisterAddress address{draft.profile.events->arm->address};
-  if (!draft.profile.writable(address)) return;
+  if (!draft.profile.writable(RegisterTable::holding, address)) return;
   findings.add_once(draft.events.of("arm"),
                     fmt::format("register {} arms events, but is also a parameter", address.value));
 }
@@ -622,14 +764,18 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Diagnostics& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Diagnostics&);
 
-constexpr std::array<Rule, 32> rules = {
+constexpr std::array<Rule, 36> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
     registers_are_in_the_table,
     overlaps_are_declared,
+    writes_hit_no_other,
     pairs_are_even,
     input_registers_are_read_only,
+    encodings_are_whole,
+    others_are_there,
+    unlock_is_known,
     ranges_fit,
     read_only_has_no_default,
     read_only_is_never_cloned,

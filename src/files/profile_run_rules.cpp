@@ -18,7 +18,7 @@ using catalogue::StartActionSpec;
 
 unsigned width_of(const Parameter& parameter) {
   constexpr unsigned bits = 16;
-  return catalogue::register_count(parameter.encoding.kind) * bits;
+  return catalogue::register_count(parameter.encoding) * bits;
 }
 
 class RunRules {
@@ -217,7 +217,7 @@ class RunRules {
     if (parameter == nullptr || !value) return;
     if (parameter->encoding.scale != Decimal(1)) {
       findings_.add_once(at, fmt::format("{}: a command has no scale", parameter->name));
-    } else if (std::int64_t{*value} > catalogue::highest(parameter->encoding.kind)) {
+    } else if (Decimal(std::int64_t{*value}) > catalogue::highest(parameter->encoding)) {
       findings_.add_once(at, fmt::format("{} does not take {}", parameter->name, *value));
     }
   }

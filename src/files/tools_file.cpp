@@ -9,10 +9,16 @@
 #include "files/fields.hpp"
 #include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
+#include "spindle/base/duration.hpp"
 #include "spindle/files/profile_store.hpp"
 
 namespace spindle::files {
 namespace {
+
+// As in a URL, whose layer is not seen here.
+constexpr Duration longest_timeout = std::chrono::minutes(10);
+constexpr Duration longest_gap = std::chrono::seconds(1);
+constexpr std::uint64_t most_retries = 100;
 
 constexpr std::array<std::string_view, 7> torque_units = {"kgf.cm", "kgf.m",  "N.m",   "cN.m",
                                                           "lbf.in", "ozf.in", "lbf.ft"};
@@ -63,6 +69,30 @@ void read_torque_unit(const YamlNode& node, Tool& tool, const Asked& asked) {
   }
 }
 
+void read_time(const YamlNode& node, Duration longest, std::optional<Duration>& target,
+               const Asked& asked) {
+  Duration time = {};
+  if (!read_value(node, time, asked)) return;
+  if (time <= Duration::zero() || time > longest) {
+    asked.findings.add(node.at, fmt::format("it is a time up to {}", spindle::to_text(longest)));
+    return;
+  }
+  target = time;
+}
+
+void read_timeout(const YamlNode& node, Tool& tool, const Asked& asked) {
+  read_time(node, longest_timeout, tool.timeout, asked);
+}
+
+void read_gap(const YamlNode& node, Tool& tool, const Asked& asked) {
+  read_time(node, longest_gap, tool.gap, asked);
+}
+
+void read_retries(const YamlNode& node, Tool& tool, const Asked& asked) {
+  const auto retries = to_unsigned(node, most_retries, asked.findings);
+  if (retries) tool.retries = static_cast<unsigned>(*retries);
+}
+
 void read_verified(const YamlNode& node, Tool& tool, const Asked& asked) {
   tool.verified = read_words(node, asked.findings);
 }
@@ -71,6 +101,9 @@ constexpr Field<Tool> tool_fields[] = {
     field<&Tool::url>("url", Need::required),
     field<&Tool::profile>("profile"),
     custom("torque-unit", Need::optional, "text", read_torque_unit),
+    custom("timeout", Need::optional, "duration", read_timeout),
+    custom("gap", Need::optional, "duration", read_gap),
+    custom("retries", Need::optional, "number 0..100", read_retries),
     custom("verified", Need::optional, "list of text", read_verified),
 };
 

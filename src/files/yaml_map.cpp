@@ -100,14 +100,18 @@ std::string unknown_word(std::string_view what, std::string_view text,
   return fmt::format("unknown {} '{}'; known: {}", what, text, fmt::join(words, ", "));
 }
 
-YamlMap::YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* group)
-    : map_(map), group_(group), findings_(findings) {
+YamlMap::YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* group,
+                 const YamlNode* file)
+    : map_(map), group_(group), file_(file), findings_(findings) {
   expect(map, YamlNode::Kind::map, findings);
 }
 
 const YamlNode* YamlMap::find(std::string_view key, bool shared) const {
   const YamlNode* node = map_.find(key);
-  return node == nullptr && shared && group_ != nullptr ? group_->find(key) : node;
+  for (const YamlNode* outer : {group_, file_}) {
+    if (node == nullptr && shared && outer != nullptr) node = outer->find(key);
+  }
+  return node;
 }
 
 const YamlNode* YamlMap::require(std::string_view key, bool shared) {

@@ -41,9 +41,10 @@ std::string unknown_word(std::string_view what, std::string_view text,
 /// Looks keys up in a map, and tells which of its keys are unknown.
 class YamlMap {
  public:
-  /// `group` is what keys that may be shared are looked up in where the map itself has none; may be
-  /// null.
-  YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* group = nullptr);
+  /// `group` and then `file` are what keys that may be shared are looked up in where the map itself
+  /// has none; both may be null.
+  YamlMap(const YamlNode& map, Diagnostics& findings, const YamlNode* group = nullptr,
+          const YamlNode* file = nullptr);
 
   void know(std::string_view key) { known_.push_back(key); }
   /// The value of a key; null when it is not there.
@@ -60,6 +61,7 @@ class YamlMap {
  private:
   const YamlNode& map_;
   const YamlNode* group_;
+  const YamlNode* file_;
   Diagnostics& findings_;
   std::vector<std::string_view> known_;
 };

@@ -197,10 +197,16 @@ class TreeBuilder {
     check_properties(at, scalar.anchor, scalar.tag);
     const std::string_view text = to_view(scalar.value, scalar.length);
     const bool plain = scalar.style == YAML_PLAIN_SCALAR_STYLE;
-    const bool nothing = plain && is_null_word(text);
+    // 'null' is a key of profiles.
+    const bool nothing = plain && is_null_word(text) && !(text == "null" && is_at_key());
     YamlNode node = make(nothing ? YamlNode::Kind::nothing : YamlNode::Kind::scalar, at);
     if (!nothing) node.text = text;
     add(std::move(node));
+  }
+
+  /// Whether what comes next is a key of a map.
+  [[nodiscard]] bool is_at_key() const {
+    return !open_.empty() && open_.back().node.kind == YamlNode::Kind::map && !open_.back().key;
   }
 
   void finish() {

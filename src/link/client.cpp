@@ -30,7 +30,7 @@ bool is_forbidden(const RegisterRange& range, const ReadLimits& limits) {
 /// Cuts what alone is too long for one request or has the forbidden shape.
 void append_pieces(RegisterRange range, const ReadLimits& limits,
                    std::vector<RegisterRange>& pieces) {
-  const std::uint16_t longest = std::max<std::uint16_t>(limits.max_read, 1);
+  const std::uint16_t longest = std::max<std::uint16_t>(limits.most_in_read(range.table), 1);
   while (range.count > longest || is_forbidden(range, limits)) {
     std::uint16_t size = std::min(range.count, longest);
     if (size == range.count || is_forbidden({range.table, range.first, size}, limits)) --size;
@@ -69,6 +69,11 @@ bool may_bridge(modbus::RegisterTable table, std::uint32_t from, std::uint32_t t
   const auto last = register_key(table, static_cast<std::uint16_t>(to - 1));
   const auto hole = absent.lower_bound(first);
   if (hole != absent.end() && *hole <= last) return false;
+  const auto holds_hole = [&](const RegisterRange& area) {
+    return area.table == table && area.first < to && from < end_of(area);
+  };
+  if (std::any_of(limits.absent.begin(), limits.absent.end(), holds_hole)) return false;
+  if (to - from <= limits.max_gap) return true;
   return std::any_of(limits.contiguous.begin(), limits.contiguous.end(),
                      [&](const RegisterRange& area) {
                        return area.table == table && area.first <= from && to <= end_of(area);
@@ -82,7 +87,7 @@ void add(std::vector<PlannedRead>& plan, const RegisterRange& piece, const ReadL
   if (joins) {
     PlannedRead& last = plan.back();
     const std::uint32_t end = std::max(end_of(last.range), end_of(piece));
-    if (end - last.range.first <= limits.max_read &&
+    if (end - last.range.first <= limits.most_in_read(piece.table) &&
         may_bridge(piece.table, end_of(last.range), piece.first, limits, absent)) {
       last.range = span_of(last.range, end);
       last.wanted.push_back(piece);
@@ -127,6 +132,14 @@ Error exception_error(const modbus::Pdu& request, std::uint8_t code) {
           .exception = code};
 }
 
+/// Whether a block may be refused for what stands in a part of it.
+bool may_be_of_a_part(const Error& error) {
+  using modbus::ExceptionCode;
+  return error.exception == static_cast<std::uint8_t>(ExceptionCode::illegal_data_address) ||
+         error.exception == static_cast<std::uint8_t>(ExceptionCode::illegal_data_value) ||
+         error.exception == static_cast<std::uint8_t>(ExceptionCode::server_device_failure);
+}
+
 bool is_missing_register(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
@@ -161,9 +174,13 @@ std::vector<PlannedRead> plan_reads(const std::vector<RegisterRange>& wanted,
 std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits& limits,
                                    const std::set<std::uint32_t>& absent) {
   constexpr std::uint16_t most_more = 3;
+  // Eight coils make a byte more, so that no two answers look alike.
+  constexpr std::uint16_t bits_per_byte = 8;
+  const std::uint16_t step = modbus::holds_bits(range.table) ? bits_per_byte : 1;
   std::vector<OtherRead> others;
-  for (std::uint16_t more = 1; more <= most_more; ++more) {
-    if (range.count + more > limits.max_read) break;
+  for (std::uint16_t turn = 1; turn <= most_more; ++turn) {
+    const auto more = static_cast<std::uint16_t>(turn * step);
+    if (range.count + more > limits.most_in_read(range.table)) break;
     for (const std::uint16_t before : {std::uint16_t{0}, more}) {
       if (before > range.first || end_of(range) + more - before > all_registers) continue;
       const RegisterRange other{range.table, static_cast<std::uint16_t>(range.first - before),
@@ -272,13 +289,17 @@ Result<Registers> Client::read_once(const RegisterRange& range) {
   if (session_->options().rules.framing == modbus::Framing::rtu) {
     others = other_reads(range, limits_, absent_registers());
   }
-  return ask(request, retries_, others).map(modbus::registers_of);
+  return ask(request, retries_, others).map([&](const modbus::Pdu& response) {
+    return modbus::registers_of(request, response);
+  });
 }
 
 Result<Registers> Client::read_once_ever(const RegisterRange& range) {
   constexpr unsigned never = 0;
-  return ask(modbus::read_request(range.table, {range.first}, range.count), never)
-      .map(modbus::registers_of);
+  const auto request = modbus::read_request(range.table, {range.first}, range.count);
+  return ask(request, never).map([&](const modbus::Pdu& response) {
+    return modbus::registers_of(request, response);
+  });
 }
 
 Result<RegisterImage> Client::read_each(const std::vector<RegisterRange>& wanted,
@@ -332,7 +353,7 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
       return tl::unexpected(std::move(registers.error()));
     }
     // A hole that is refused is as the profile says.
-    const bool is_final = !is_missing_register(registers.error()) || part.wanted.size() == 1 ||
+    const bool is_final = !may_be_of_a_part(registers.error()) || part.wanted.size() == 1 ||
                           !holes_of(part.range, limits_).empty();
     if (is_final) {
       remember(part, registers.error(), image);
@@ -385,12 +406,8 @@ std::set<std::uint32_t> Client::absent_registers() const {
   return registers;
 }
 
-Result<void> Client::write(modbus::RegisterAddress address, std::uint16_t value) {
-  return ask(modbus::write_request(address, value), 0).map([](const modbus::Pdu&) {});
-}
-
-Result<void> Client::write(modbus::RegisterAddress first, RegisterView values) {
-  return ask(modbus::write_request(first, values), 0).map([](const modbus::Pdu&) {});
+Result<void> Client::write(const modbus::Pdu& request) {
+  return ask(request, 0).map([](const modbus::Pdu&) {});
 }
 
 Result<Bytes> Client::report_server_id() {

@@ -20,7 +20,6 @@ namespace {
 constexpr std::uint8_t max_serial_unit = 247;  // Modbus over Serial Line 1.02, 2.2
 
 // A longer silence is a slip of the pen; answers themselves take less.
-constexpr Duration max_gap = std::chrono::seconds(1);
 
 Error bad_target(std::string_view url, std::string message, std::string hint = {}) {
   return Error{.code = Errc::bad_target,
@@ -214,14 +213,19 @@ Error bad_option(const Endpoint& endpoint, std::string_view name, std::string_vi
   return bad_target(endpoint.text, fmt::format("{}={}: {} is {}", name, value, name, allowed));
 }
 
-Result<void> set_unit(Endpoint& endpoint, std::string_view value) {
+std::uint8_t last_unit(const Endpoint& endpoint) {
   const bool is_rtu = endpoint.medium == Medium::serial || endpoint.medium == Medium::rtu_over_tcp;
-  const std::uint8_t maximum = is_rtu ? max_serial_unit : std::uint8_t{255};
-  const auto unit = parse_unsigned(value, maximum);
-  if (!unit) {
-    return tl::unexpected(
-        bad_option(endpoint, "unit", value, fmt::format("a number from 0 to {}", maximum)));
-  }
+  return is_rtu && !endpoint.reserved_units ? max_serial_unit : std::uint8_t{255};
+}
+
+Error bad_unit(const Endpoint& endpoint, std::string_view value) {
+  return bad_option(endpoint, "unit", value,
+                    fmt::format("a number from 0 to {}", last_unit(endpoint)));
+}
+
+Result<void> set_unit(Endpoint& endpoint, std::string_view value) {
+  const auto unit = parse_unsigned(value, 255);
+  if (!unit) return tl::unexpected(bad_unit(endpoint, value));
   endpoint.unit = modbus::UnitId{static_cast<std::uint8_t>(*unit)};
   return {};
 }
@@ -258,11 +262,31 @@ Result<void> set_stop(Endpoint& endpoint, std::string_view value) {
 
 Result<void> set_gap(Endpoint& endpoint, std::string_view value) {
   const auto gap = parse_duration(value);
-  if (!gap || *gap > max_gap) {
+  if (!gap || *gap > longest_gap) {
     return tl::unexpected(
-        bad_option(endpoint, "gap", value, fmt::format("a time up to {}", to_text(max_gap))));
+        bad_option(endpoint, "gap", value, fmt::format("a time up to {}", to_text(longest_gap))));
   }
   endpoint.gap = *gap;
+  return {};
+}
+
+Result<void> set_timeout(Endpoint& endpoint, std::string_view value) {
+  const auto timeout = parse_duration(value);
+  if (!timeout || *timeout <= Duration::zero() || *timeout > longest_timeout) {
+    return tl::unexpected(bad_option(endpoint, "timeout", value,
+                                     fmt::format("a time up to {}", to_text(longest_timeout))));
+  }
+  endpoint.timeout = *timeout;
+  return {};
+}
+
+Result<void> set_retries(Endpoint& endpoint, std::string_view value) {
+  const auto retries = parse_unsigned(value, most_retries);
+  if (!retries) {
+    return tl::unexpected(
+        bad_option(endpoint, "retries", value, fmt::format("a number from 0 to {}", most_retries)));
+  }
+  endpoint.retries = static_cast<unsigned>(*retries);
   return {};
 }
 
@@ -278,14 +302,31 @@ Result<void> set_echo(Endpoint& endpoint, std::string_view value) {
   return set_word(endpoint, "echo", value, words, endpoint.echo);
 }
 
+Result<void> set_reserved(Endpoint& endpoint, std::string_view value) {
+  constexpr auto words = enum_table<bool>({{"true", true}, {"false", false}});
+  return set_word(endpoint, "reserved", value, words, endpoint.reserved_units);
+}
+
+/// Whether the unit may be asked for at all; known only when all options are.
+Result<void> check_unit(const Endpoint& endpoint) {
+  if (!endpoint.unit || endpoint.unit->value <= last_unit(endpoint)) return {};
+  Error error = bad_unit(endpoint, std::to_string(endpoint.unit->value));
+  error.hint = fmt::format("units from {} are reserved; with &reserved=true they are asked",
+                           max_serial_unit + 1);
+  return tl::unexpected(std::move(error));
+}
+
 const std::vector<UrlOption>& url_options() {
   using enum Medium;
   static const std::vector<UrlOption> options = {
       {"unit", {tcp, serial, rtu_over_tcp, simulated}, set_unit},
+      {"reserved", {serial, rtu_over_tcp}, set_reserved},
       {"baud", {serial, rtu_over_tcp, simulated}, set_baud},
       {"parity", {serial}, set_parity},
       {"stop", {serial}, set_stop},
       {"gap", {serial, rtu_over_tcp}, set_gap},
+      {"timeout", {tcp, serial, rtu_over_tcp, simulated}, set_timeout},
+      {"retries", {tcp, serial, rtu_over_tcp, simulated}, set_retries},
       {"rs485", {serial}, set_switching},
       {"echo", {serial, rtu_over_tcp}, set_echo}};
   return options;
@@ -339,7 +380,7 @@ Result<Endpoint> parse_endpoint(std::string_view url) {
       return tl::unexpected(applied.error());
     }
   }
-  return endpoint;
+  return check_unit(endpoint).map([&] { return endpoint; });
 }
 
 modbus::SerialSettings serial_settings(const Endpoint& endpoint,
@@ -357,6 +398,7 @@ std::string to_url(const Endpoint& endpoint) {
       fmt::format("{}://{}", scheme->name, bracketed ? "[" + endpoint.host + "]" : endpoint.host);
   if (endpoint.port) url += fmt::format(":{}", *endpoint.port);
   if (endpoint.unit) url += fmt::format("?unit={}", endpoint.unit->value);
+  if (endpoint.unit && endpoint.reserved_units) url += "&reserved=true";
   return url;
 }
 

@@ -13,12 +13,6 @@ constexpr std::size_t most_remembered = 32;
 // A line of many devices must not make this grow without end.
 constexpr std::size_t most_shapes = 64;
 
-bool writes(const modbus::Pdu& request) {
-  const auto function = static_cast<modbus::FunctionCode>(request.function);
-  return function == modbus::FunctionCode::write_single_register ||
-         function == modbus::FunctionCode::write_multiple_registers;
-}
-
 }  // namespace
 
 bool LineDoubt::find(Evidence evidence, TimePoint now) {
@@ -34,7 +28,7 @@ void LineDoubt::remember(const modbus::Pdu& request, const modbus::Pdu& answer, 
          (now - accepted_.front().at > longest_copy || accepted_.size() >= most_remembered)) {
     accepted_.pop_front();
   }
-  if (writes(request)) {
+  if (modbus::is_write(request.function)) {
     for (Accepted& accepted : accepted_) accepted.outdated = true;
   }
   accepted_.push_back({.at = now, .request = request, .answer = answer});

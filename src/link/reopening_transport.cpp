@@ -25,16 +25,7 @@ bool is_closed(const Error& error) {
 
 /// Whether sending it twice does no more than sending it once.
 bool changes_nothing(ByteView request) {
-  if (request.size() <= function_at) return false;
-  switch (static_cast<modbus::FunctionCode>(request[function_at])) {
-    case modbus::FunctionCode::read_holding_registers:
-    case modbus::FunctionCode::read_input_registers:
-    case modbus::FunctionCode::diagnostics:
-    case modbus::FunctionCode::report_server_id:
-      return true;
-    default:
-      return false;
-  }
+  return request.size() > function_at && modbus::is_read(request[function_at]);
 }
 
 }  // namespace

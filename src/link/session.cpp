@@ -48,19 +48,12 @@ constexpr int most_proofs = 4;
 
 using modbus::FunctionCode;
 
-bool is_write(const modbus::Pdu& request) {
-  const auto function = static_cast<modbus::FunctionCode>(request.function);
-  return function == FunctionCode::write_single_register ||
-         function == FunctionCode::write_multiple_registers;
-}
-
-/// The part of the answer to another read that the answer to this one would be.
-modbus::Pdu part_of(const modbus::Pdu& other, std::size_t skip, const modbus::Pdu& answer) {
-  const Registers registers = modbus::registers_of(other);
-  const std::size_t count = modbus::registers_of(answer).size();
-  modbus::Pdu part{.function = answer.function, .data = {answer.data.front()}};
-  for (std::size_t at = skip; at < skip + count; ++at) put_u16(part.data, registers.at(at));
-  return part;
+/// The part of the answer to another read that the answer to `request` would be.
+modbus::Pdu part_of(const OtherRead& other, const modbus::Pdu& answer, const modbus::Pdu& request) {
+  const Registers registers = modbus::registers_of(other.request, answer);
+  const auto asked = modbus::parse_request(request);
+  const auto& read = std::get<modbus::ReadRequest>(*asked);
+  return modbus::read_response(read.table, RegisterView(registers).subspan(other.skip, read.count));
 }
 
 /// A frame of any kind within bytes that no client expects.
@@ -86,7 +79,8 @@ std::string_view sentence_of(Evidence evidence) {
 /// Whether the answer is a copy of the request, so that only an echo can be mistaken for it.
 bool is_repeated_by_answer(const modbus::Pdu& request) {
   const auto function = static_cast<modbus::FunctionCode>(request.function);
-  return function == modbus::FunctionCode::write_single_register ||
+  return function == modbus::FunctionCode::write_single_coil ||
+         function == modbus::FunctionCode::write_single_register ||
          function == modbus::FunctionCode::diagnostics;
 }
 
@@ -100,16 +94,19 @@ Error everybody_error() {
 std::size_t whole_answer_size(const modbus::Pdu& request, ByteView begun) {
   constexpr std::size_t around_count = 5;  // unit, function, byte count, CRC; an exception likewise
   constexpr std::size_t two_words = 8;
+  constexpr std::size_t bits_per_byte = 8;
   if (begun.size() > 1 && (begun[1] & modbus::exception_bit) != 0) return around_count;
   switch (static_cast<modbus::FunctionCode>(request.function)) {
     case modbus::FunctionCode::read_holding_registers:
     case modbus::FunctionCode::read_input_registers:
       return around_count + std::size_t{get_u16(request.data, 2)} * 2;
+    case modbus::FunctionCode::read_coils:
+    case modbus::FunctionCode::read_discrete_inputs:
+      return around_count +
+             (std::size_t{get_u16(request.data, 2)} + bits_per_byte - 1) / bits_per_byte;
     case modbus::FunctionCode::report_server_id:
       return around_count + (begun.size() > 2 ? begun[2] : 1U);
-    case modbus::FunctionCode::write_single_register:
-    case modbus::FunctionCode::diagnostics:
-    case modbus::FunctionCode::write_multiple_registers:
+    default:
       break;
   }
   return two_words;
@@ -227,7 +224,7 @@ Result<modbus::Pdu> Session::ask(const modbus::Pdu& request, const Others& other
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
-  if (!is_rtu() || is_repeated_by_answer(request) || is_write(request)) {
+  if (!is_rtu() || is_repeated_by_answer(request) || modbus::is_write(request.function)) {
     if (auto passed = let_copies_pass(request); !passed) {
       return tl::unexpected(std::move(passed.error()));
     }
@@ -353,7 +350,7 @@ Result<std::optional<modbus::Pdu>> Session::prove_by_others(const modbus::Pdu& r
     auto again = exchange_contested(other.request, accepted);
     if (!again) return tl::unexpected(std::move(again.error()));
     if (modbus::exception_of(*again)) return std::nullopt;
-    modbus::Pdu part = part_of(*again, other.skip, answer);
+    modbus::Pdu part = part_of(other, *again, request);
     if (refutations_ == 0 && agrees(part)) return part;
     accepted = std::move(*again);
     parts.push_back(std::move(part));
@@ -410,8 +407,8 @@ bool Session::answers_come_in_order() const {
 
 /// The copy of the answer to an equal write is no answer to this one.
 Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
-  const bool careful =
-      is_rtu() && is_write(write) && doubt_.is_raised(clock_->now()) && proves_ == Proves::in_doubt;
+  const bool careful = is_rtu() && modbus::is_write(write.function) &&
+                       doubt_.is_raised(clock_->now()) && proves_ == Proves::in_doubt;
   if (!careful) return {};
   const modbus::Pdu answer{.function = write.function,
                            .data = Bytes(write.data.begin(), write.data.begin() + 4)};

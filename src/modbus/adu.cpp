@@ -97,11 +97,16 @@ constexpr std::size_t one_byte = rtu_head + 1 + crc_size;
 
 Length request_length(FunctionCode function, ByteView bytes) {
   switch (function) {
+    case FunctionCode::read_coils:
+    case FunctionCode::read_discrete_inputs:
     case FunctionCode::read_holding_registers:
     case FunctionCode::read_input_registers:
+    case FunctionCode::write_single_coil:
     case FunctionCode::write_single_register:
     case FunctionCode::diagnostics:
       return two_words;
+    case FunctionCode::write_multiple_coils:
+      return counted_length(bytes, count_behind_address);
     case FunctionCode::write_multiple_registers:
       return counted_words_length(bytes, count_behind_address);
     case FunctionCode::report_server_id:
@@ -115,10 +120,14 @@ Length response_length(FunctionCode function, ByteView bytes) {
     case FunctionCode::read_holding_registers:
     case FunctionCode::read_input_registers:
       return counted_words_length(bytes, count_behind_head);
+    case FunctionCode::write_single_coil:
     case FunctionCode::write_single_register:
     case FunctionCode::diagnostics:
+    case FunctionCode::write_multiple_coils:
     case FunctionCode::write_multiple_registers:
       return two_words;
+    case FunctionCode::read_coils:
+    case FunctionCode::read_discrete_inputs:
     case FunctionCode::report_server_id:
       return counted_length(bytes, count_behind_head);
   }

@@ -1,11 +1,13 @@
 #include "spindle/modbus/pdu.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <initializer_list>
 #include <utility>
+#include <vector>
 
 namespace spindle::modbus {
 namespace {
@@ -16,9 +18,32 @@ constexpr std::uint8_t code_of(FunctionCode function) {
   return static_cast<std::uint8_t>(function);
 }
 
+// What FC 05 sends for a coil that is on (1.1b3, 6.5).
+constexpr std::uint16_t coil_on = 0xFF00;
+
+constexpr unsigned bits_per_byte = 8;
+
 constexpr FunctionCode reader_of(RegisterTable table) {
-  return table == RegisterTable::holding ? FunctionCode::read_holding_registers
-                                         : FunctionCode::read_input_registers;
+  switch (table) {
+    case RegisterTable::coil:
+      return FunctionCode::read_coils;
+    case RegisterTable::discrete:
+      return FunctionCode::read_discrete_inputs;
+    case RegisterTable::input:
+      return FunctionCode::read_input_registers;
+    case RegisterTable::holding:
+      break;
+  }
+  return FunctionCode::read_holding_registers;
+}
+
+constexpr bool reads_bits(std::uint8_t function) {
+  return function == code_of(FunctionCode::read_coils) ||
+         function == code_of(FunctionCode::read_discrete_inputs);
+}
+
+constexpr std::size_t bytes_of_bits(std::size_t count) {
+  return (count + bits_per_byte - 1) / bits_per_byte;
 }
 
 Pdu words_pdu(FunctionCode function, std::initializer_list<std::uint16_t> words) {
@@ -31,6 +56,28 @@ Pdu words_pdu(FunctionCode function, std::initializer_list<std::uint16_t> words)
 void put_counted(Bytes& bytes, RegisterView registers) {
   bytes.push_back(static_cast<std::uint8_t>(registers.size() * 2));
   for (const std::uint16_t value : registers) put_u16(bytes, value);
+}
+
+// The same with bits, the first one in the lowest bit of the first byte.
+void put_counted_bits(Bytes& bytes, RegisterView bits) {
+  const std::size_t size = bytes_of_bits(bits.size());
+  bytes.push_back(static_cast<std::uint8_t>(size));
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + size);
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    if (bits[i] == 0) continue;
+    bytes[begin + i / bits_per_byte] |= static_cast<std::uint8_t>(1U << (i % bits_per_byte));
+  }
+}
+
+// Requires as many bytes as the bits need.
+Registers get_bits(ByteView bytes, std::size_t count) {
+  Registers bits(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const unsigned byte = bytes[i / bits_per_byte];
+    bits[i] = static_cast<std::uint16_t>((byte >> (i % bits_per_byte)) & 1U);
+  }
+  return bits;
 }
 
 Registers get_registers(ByteView bytes) {
@@ -47,13 +94,34 @@ Parsed refuse(ExceptionCode code) { return tl::unexpected(code); }
 Parsed parse_read(RegisterTable table, ByteView data) {
   if (data.size() != 4) return refuse(ExceptionCode::illegal_data_value);
   const std::uint16_t count = get_u16(data, 2);
-  if (count == 0 || count > max_read_count) return refuse(ExceptionCode::illegal_data_value);
+  if (count == 0 || count > most_in_read(table)) return refuse(ExceptionCode::illegal_data_value);
   return ReadRequest{.table = table, .first = {get_u16(data, 0)}, .count = count};
 }
 
 Parsed parse_write_single(ByteView data) {
   if (data.size() != 4) return refuse(ExceptionCode::illegal_data_value);
   return WriteSingleRequest{.address = {get_u16(data, 0)}, .value = get_u16(data, 2)};
+}
+
+Parsed parse_write_coil(ByteView data) {
+  if (data.size() != 4) return refuse(ExceptionCode::illegal_data_value);
+  const std::uint16_t value = get_u16(data, 2);
+  if (value != 0 && value != coil_on) return refuse(ExceptionCode::illegal_data_value);
+  return WriteSingleRequest{.address = {get_u16(data, 0)},
+                            .value = static_cast<std::uint16_t>(value == 0 ? 0 : 1),
+                            .table = RegisterTable::coil};
+}
+
+Parsed parse_write_coils(ByteView data) {
+  constexpr std::size_t head = 5;  // address, quantity, byte count
+  if (data.size() < head) return refuse(ExceptionCode::illegal_data_value);
+  const std::uint16_t count = get_u16(data, 2);
+  const bool count_allowed = count > 0 && count <= max_write_bits;
+  const bool lengths_agree = data[4] == bytes_of_bits(count) && data.size() == head + data[4];
+  if (!count_allowed || !lengths_agree) return refuse(ExceptionCode::illegal_data_value);
+  return WriteMultipleRequest{.first = {get_u16(data, 0)},
+                              .values = get_bits(data.subspan(head), count),
+                              .table = RegisterTable::coil};
 }
 
 Parsed parse_write_multiple(ByteView data) {
@@ -85,6 +153,12 @@ bool answers_read(ByteView request, ByteView response) {
   return response[0] == bytes && response.size() == 1 + bytes;
 }
 
+bool answers_read_bits(ByteView request, ByteView response) {
+  if (request.size() != 4 || response.empty()) return false;
+  const std::size_t bytes = bytes_of_bits(get_u16(request, 2));
+  return response[0] == bytes && response.size() == 1 + bytes;
+}
+
 bool answers_write_multiple(ByteView request, ByteView response) {
   return request.size() >= 4 && std::ranges::equal(request.first(4), response);
 }
@@ -99,9 +173,14 @@ bool answers(const Pdu& request, const Pdu& response) {
     case FunctionCode::read_holding_registers:
     case FunctionCode::read_input_registers:
       return answers_read(request.data, response.data);
+    case FunctionCode::read_coils:
+    case FunctionCode::read_discrete_inputs:
+      return answers_read_bits(request.data, response.data);
+    case FunctionCode::write_single_coil:
     case FunctionCode::write_single_register:
     case FunctionCode::diagnostics:
       return request.data == response.data;
+    case FunctionCode::write_multiple_coils:
     case FunctionCode::write_multiple_registers:
       return answers_write_multiple(request.data, response.data);
     case FunctionCode::report_server_id:
@@ -112,16 +191,34 @@ bool answers(const Pdu& request, const Pdu& response) {
 
 std::string_view plural(std::size_t count) { return count == 1 ? "" : "s"; }
 
+/// "register", "coil".
+std::string_view word_of(RegisterTable table) {
+  return table == RegisterTable::coil ? "coil" : "register";
+}
+
+/// "3 holding registers", "1 coil", "2 discrete inputs".
+std::string counted_in(RegisterTable table, std::size_t count) {
+  switch (table) {
+    case RegisterTable::coil:
+      return fmt::format("{} coil{}", count, plural(count));
+    case RegisterTable::discrete:
+      return fmt::format("{} discrete input{}", count, plural(count));
+    case RegisterTable::holding:
+    case RegisterTable::input:
+      break;
+  }
+  return fmt::format("{} {} register{}", count, to_text(table), plural(count));
+}
+
 struct Describe {
   std::string operator()(const ReadRequest& read) const {
-    return fmt::format("read {} {} register{} from {}", read.count, to_text(read.table),
-                       plural(read.count), read.first.value);
+    return fmt::format("read {} from {}", counted_in(read.table, read.count), read.first.value);
   }
   std::string operator()(const WriteSingleRequest& write) const {
-    return fmt::format("write register {}", write.address.value);
+    return fmt::format("write {} {}", word_of(write.table), write.address.value);
   }
   std::string operator()(const WriteMultipleRequest& write) const {
-    return fmt::format("write {} register{} from {}", write.values.size(),
+    return fmt::format("write {} {}{} from {}", write.values.size(), word_of(write.table),
                        plural(write.values.size()), write.first.value);
   }
   std::string operator()(const LoopbackRequest& /*loopback*/) const { return "loop-back"; }
@@ -134,11 +231,12 @@ struct Describe {
 struct Explain : Describe {
   using Describe::operator();
   std::string operator()(const WriteSingleRequest& write) const {
-    return fmt::format("write {} to register {}", write.value, write.address.value);
+    return fmt::format("write {} to {} {}", write.value, word_of(write.table), write.address.value);
   }
   std::string operator()(const WriteMultipleRequest& write) const {
-    return fmt::format("write {} to {} register{} from {}", fmt::join(write.values, " "),
-                       write.values.size(), plural(write.values.size()), write.first.value);
+    return fmt::format("write {} to {} {}{} from {}", fmt::join(write.values, " "),
+                       write.values.size(), word_of(write.table), plural(write.values.size()),
+                       write.first.value);
   }
   std::string operator()(const LoopbackRequest& loopback) const {
     return fmt::format("loop-back of {:04X}", loopback.word);
@@ -161,14 +259,27 @@ std::string explain_read(const Pdu& response) {
                      fmt::join(registers, " "));
 }
 
+/// "00000101 00000001": the last byte comes first, as the bits of a number do.
+std::string bits_in_words(ByteView bytes) {
+  std::vector<std::string> words;
+  for (auto byte = bytes.rbegin(); byte != bytes.rend(); ++byte) {
+    words.push_back(fmt::format("{:08b}", *byte));
+  }
+  return fmt::format("{}", fmt::join(words, " "));
+}
+
 /// Responses that are the echo of their request, or of its beginning.
 std::string explain_echo(const Pdu& response) {
   if (response.data.size() != 4) return explain_bytes(response);
   const std::uint16_t first = get_u16(response.data, 0);
   const std::uint16_t second = get_u16(response.data, 2);
   switch (static_cast<FunctionCode>(response.function)) {
+    case FunctionCode::write_single_coil:
+      return fmt::format("wrote {} to coil {}", second == 0 ? 0 : 1, first);
     case FunctionCode::write_single_register:
       return fmt::format("wrote {} to register {}", second, first);
+    case FunctionCode::write_multiple_coils:
+      return fmt::format("wrote {} coil{} from {}", second, plural(second), first);
     case FunctionCode::write_multiple_registers:
       return fmt::format("wrote {} register{} from {}", second, plural(second), first);
     default:
@@ -192,6 +303,18 @@ Pdu write_request(RegisterAddress first, RegisterView values) {
   return pdu;
 }
 
+Pdu write_coil_request(RegisterAddress address, std::uint16_t value) {
+  return words_pdu(FunctionCode::write_single_coil,
+                   {address.value, value == 0 ? std::uint16_t{0} : coil_on});
+}
+
+Pdu write_coils_request(RegisterAddress first, RegisterView values) {
+  Pdu pdu = write_multiple_response(first, static_cast<std::uint16_t>(values.size()),
+                                    RegisterTable::coil);
+  put_counted_bits(pdu.data, values);
+  return pdu;
+}
+
 Pdu loopback_request(std::uint16_t word) {
   return words_pdu(FunctionCode::diagnostics, {return_query_data, word});
 }
@@ -200,6 +323,14 @@ Pdu report_server_id_request() { return words_pdu(FunctionCode::report_server_id
 
 tl::expected<Request, ExceptionCode> parse_request(const Pdu& pdu) {
   switch (static_cast<FunctionCode>(pdu.function)) {
+    case FunctionCode::read_coils:
+      return parse_read(RegisterTable::coil, pdu.data);
+    case FunctionCode::read_discrete_inputs:
+      return parse_read(RegisterTable::discrete, pdu.data);
+    case FunctionCode::write_single_coil:
+      return parse_write_coil(pdu.data);
+    case FunctionCode::write_multiple_coils:
+      return parse_write_coils(pdu.data);
     case FunctionCode::read_holding_registers:
       return parse_read(RegisterTable::holding, pdu.data);
     case FunctionCode::read_input_registers:
@@ -218,12 +349,15 @@ tl::expected<Request, ExceptionCode> parse_request(const Pdu& pdu) {
 
 Pdu read_response(RegisterTable table, RegisterView registers) {
   Pdu pdu = words_pdu(reader_of(table), {});
-  put_counted(pdu.data, registers);
+  holds_bits(table) ? put_counted_bits(pdu.data, registers) : put_counted(pdu.data, registers);
   return pdu;
 }
 
-Pdu write_multiple_response(RegisterAddress first, std::uint16_t count) {
-  return words_pdu(FunctionCode::write_multiple_registers, {first.value, count});
+Pdu write_multiple_response(RegisterAddress first, std::uint16_t count, RegisterTable table) {
+  const bool is_coils = table == RegisterTable::coil;
+  return words_pdu(
+      is_coils ? FunctionCode::write_multiple_coils : FunctionCode::write_multiple_registers,
+      {first.value, count});
 }
 
 Pdu report_server_id_response(ByteView data) {
@@ -249,6 +383,11 @@ Fit fit(const Pdu& request, const Pdu& response) {
 Registers registers_of(const Pdu& response) {
   if (response.data.empty()) return {};
   return get_registers(ByteView(response.data).subspan(1));
+}
+
+Registers registers_of(const Pdu& request, const Pdu& response) {
+  if (!reads_bits(request.function)) return registers_of(response);
+  return get_bits(ByteView(response.data).subspan(1), get_u16(request.data, 2));
 }
 
 ByteView server_id_of(const Pdu& response) {
@@ -282,6 +421,15 @@ std::string explain_response(const Pdu& response) {
     case FunctionCode::read_holding_registers:
     case FunctionCode::read_input_registers:
       return explain_read(response);
+    case FunctionCode::read_coils:
+    case FunctionCode::read_discrete_inputs:
+      if (is_counted(response)) {
+        return fmt::format("bits, the first one on the right: {}",
+                           bits_in_words(ByteView(response.data).subspan(1)));
+      }
+      break;
+    case FunctionCode::write_single_coil:
+    case FunctionCode::write_multiple_coils:
     case FunctionCode::write_single_register:
     case FunctionCode::write_multiple_registers:
     case FunctionCode::diagnostics:

@@ -33,6 +33,11 @@ struct AppendCell {
       out.append(digits.data(), digits.size());
     });
   }
+  void operator()(const Numbers& numbers) const {
+    append_list(out, '[', ']', numbers, [this](const std::optional<Decimal>& one) {
+      out += one ? one->to_string() : "null";
+    });
+  }
   void operator()(const Texts& texts) const {
     append_list(out, '[', ']', texts,
                 [this](const std::string& text) { append_json_string(out, text); });

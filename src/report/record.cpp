@@ -19,6 +19,14 @@ struct CellText {
   std::string operator()(const Words& words) const {
     return fmt::format("{}", fmt::join(words, " "));
   }
+  std::string operator()(const Numbers& numbers) const {
+    std::string text;
+    for (const std::optional<Decimal>& one : numbers) {
+      if (!text.empty()) text += ' ';
+      text += one ? one->to_string() : "-";
+    }
+    return text;
+  }
   std::string operator()(const Texts& texts) const {
     return fmt::format("{}", fmt::join(texts, ", "));
   }

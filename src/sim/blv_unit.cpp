@@ -142,18 +142,16 @@ void BlvUnit::note_error(std::int64_t code) {
 }
 
 // In ascending order, value by value: what stands before a refused one has been written.
-BlvUnit::Outcome BlvUnit::write(ConnectionId /*connection*/, std::uint16_t first,
-                                RegisterView values, TimePoint now) {
-  if (!bank().has(RegisterTable::holding, first, values.size())) {
+BlvUnit::Outcome BlvUnit::write(ConnectionId /*connection*/,
+                                const modbus::WriteMultipleRequest& request, TimePoint now) {
+  const std::uint16_t first = request.first.value;
+  if (!bank().has(request.table, first, request.values.size())) {
     return refusal(ExceptionCode::illegal_data_address);
   }
   if (Outcome busy = check_busy(now)) return busy;
-  for (std::size_t i = 0; i < values.size();) {
-    const Cell* cell =
-        bank().cell_at(RegisterTable::holding, static_cast<std::uint16_t>(first + i));
-    if (cell == nullptr) return refusal(ExceptionCode::illegal_data_address);
-    const std::uint32_t raw = bank().with_words(*cell, first, values, i);
-    if (Outcome refused = write_value(*cell, raw, now)) return refused;
+  for (const Change& change : bank().changes(request.table, first, request.values)) {
+    if (change.cell == nullptr) return refusal(ExceptionCode::illegal_data_address);
+    if (Outcome refused = write_value(change, now)) return refused;
   }
   return std::nullopt;
 }
@@ -166,25 +164,28 @@ BlvUnit::Outcome BlvUnit::check_busy(TimePoint now) const {
 
 // While the driver configures itself it takes commands and operation data, and obeys when it is
 // done: the maker's own programs send both 30 ms behind Configuration. Everything else waits.
-BlvUnit::Outcome BlvUnit::write_value(const Cell& cell, std::uint32_t raw, TimePoint now) {
-  if (configured_at_ && !operation_.contains(cell.place.address)) {
+BlvUnit::Outcome BlvUnit::write_value(const Change& change, TimePoint now) {
+  const Place& place = change.cell->place;
+  if (configured_at_ && !operation_.contains(place.address)) {
     return refusal(ExceptionCode::server_device_failure, memory_busy);
   }
-  if (!cell.takes(raw)) return refusal(ExceptionCode::server_device_failure, outside_range);
+  const bool is_refused = bank().is_locked(*change.cell) || !change.cell->takes(change.registers);
+  if (is_refused) return refusal(ExceptionCode::server_device_failure, outside_range);
+  const std::int64_t raw = stored_in(place.encoding, change.registers);
   const auto command = std::find_if(commands_.begin(), commands_.end(), [&](const auto& each) {
-    return each.address == cell.place.address;
+    return place.table == RegisterTable::holding && each.address == place.address;
   });
-  const bool is_edge = command != commands_.end() && raw == command->value &&
-                       bank().raw(cell.place) != command->value;
+  const bool is_edge =
+      command != commands_.end() && raw == command->value && bank().stored(place) != command->value;
   if (is_edge) {
     if (Outcome refused = (this->*command->handler)(now)) return refused;
   }
-  bank().set_raw(cell.place, raw);
-  if (command == commands_.end()) on_write(cell.place, raw, now);
+  bank().put(place, change.registers);
+  if (command == commands_.end()) on_write(place, raw, now);
   return std::nullopt;
 }
 
-void BlvUnit::on_write(const Place& /*place*/, std::uint32_t /*raw*/, TimePoint now) { drive(now); }
+void BlvUnit::on_write(const Place& /*place*/, std::int64_t /*raw*/, TimePoint now) { drive(now); }
 
 // ---- maintenance commands ----
 

@@ -38,21 +38,21 @@ class BlvUnit final : public Unit {
   /// A command that acts when its register changes to its value.
   struct EdgeCommand {
     std::uint16_t address;
-    std::uint32_t value;
+    std::int64_t value;
     Handler handler;
   };
   /// What the bits of the command word ask of the motor.
   enum class Motion : std::uint8_t { forward, reverse, decelerate, brake };
 
-  Outcome write(ConnectionId connection, std::uint16_t first, RegisterView values,
+  Outcome write(ConnectionId connection, const modbus::WriteMultipleRequest& request,
                 TimePoint now) override;
-  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void on_write(const Place& place, std::int64_t raw, TimePoint now) override;
   void on_refusal(const Refusal& refused) override;
   void before_read(TimePoint now) override;
   [[nodiscard]] std::optional<TimePoint> next_step() const override;
   void step(TimePoint now) override;
 
-  Outcome write_value(const Cell& cell, std::uint32_t raw, TimePoint now);
+  Outcome write_value(const Change& change, TimePoint now);
   [[nodiscard]] Outcome check_busy(TimePoint now) const;
   void finish_configuration(TimePoint now);
 

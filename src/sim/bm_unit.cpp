@@ -60,10 +60,11 @@ BmUnit::BmUnit(const catalogue::Profile& profile, const catalogue::SimulationSpe
 
 // ---- remote inputs ----
 
-void BmUnit::on_write(const Place& place, std::uint32_t raw, TimePoint now) {
+void BmUnit::on_write(const Place& place, std::int64_t raw, TimePoint now) {
   const auto value = static_cast<std::uint16_t>(raw);
   for (const RemoteInput& input : inputs_) {
-    const bool is_meant = input.action.address.value == place.address;
+    const bool is_meant =
+        input.action.table == place.table && input.action.address.value == place.address;
     if (is_meant && accepts(input.action, value)) (this->*input.handler)(input.action, value, now);
   }
 }

@@ -49,7 +49,7 @@ class BmUnit final : public Unit {
   };
 
   void before_read(TimePoint now) override;
-  void on_write(const Place& place, std::uint32_t raw, TimePoint now) override;
+  void on_write(const Place& place, std::int64_t raw, TimePoint now) override;
   [[nodiscard]] std::optional<TimePoint> next_step() const override;
   void step(TimePoint now) override { finish_run(now); }
 

@@ -39,7 +39,8 @@ class Bus final : public SimulatedBus {
       unit->hear_good_frame();
       if (asked.value == unit->address() || is_network_) {
         response = unit->answer(connection, request, now);
-      } else if (asked.value == broadcast ? is_write(request) : follows(*unit, asked, request)) {
+      } else if (asked.value == broadcast ? modbus::is_write(request.function)
+                                          : follows(*unit, asked, request)) {
         unit->answer(connection, request, now);  // and no client hears what it says to it
       }
     }
@@ -149,11 +150,6 @@ class Bus final : public SimulatedBus {
     void (Unit::*raise)(std::int64_t code, TimePoint now);
   };
 
-  static bool is_write(const Pdu& request) {
-    const auto function = static_cast<modbus::FunctionCode>(request.function);
-    return function == modbus::FunctionCode::write_single_register ||
-           function == modbus::FunctionCode::write_multiple_registers;
-  }
   // A group send reaches children by function 10h only.
   static bool follows(const Unit& child, modbus::UnitId parent, const Pdu& request) {
     return child.group() == parent.value &&

@@ -27,14 +27,7 @@ void EventBlock::emit(catalogue::EventKind kind, const Values& values, TimePoint
   }
 }
 
-void EventBlock::note_read(const modbus::ReadRequest& wanted) {
-  if (!facts_ || facts_->flag.empty()) return;
-  const auto flag = bank_->find(facts_->flag);
-  if (!flag || flag->table != wanted.table || flag->address < wanted.first.value) return;
-  if (flag->address - wanted.first.value < wanted.count) bank_->set(facts_->flag, 0);
-}
-
-void EventBlock::arm(ConnectionId connection, std::uint32_t value, TimePoint now) {
+void EventBlock::arm(ConnectionId connection, std::int64_t value, TimePoint now) {
   const catalogue::Arming& arming = *facts_->arm;
   if (value == arming.value) {
     const bool expires = arming.expires > Duration::zero();

@@ -32,15 +32,13 @@ class EventBlock {
   /// Something happens: it is counted, stands in the block, and is sent to those who are armed.
   void emit(catalogue::EventKind kind, const Values& values, TimePoint now);
 
-  /// These registers were read: a flag among them is cleared.
-  void note_read(const modbus::ReadRequest& wanted);
-
-  /// Whether this holding register arms the output.
-  [[nodiscard]] bool is_arming(std::uint16_t address) const {
-    return facts_ && facts_->arm && facts_->arm->address == address;
+  /// Whether this value arms the output.
+  [[nodiscard]] bool is_arming(const Place& place) const {
+    return facts_ && facts_->arm && place.table == modbus::RegisterTable::holding &&
+           facts_->arm->address == place.address;
   }
   /// Requires a register that arms. Other values than those for on and off do nothing.
-  void arm(ConnectionId connection, std::uint32_t value, TimePoint now);
+  void arm(ConnectionId connection, std::int64_t value, TimePoint now);
 
   /// The last event as a frame; empty when the product sends none.
   [[nodiscard]] std::optional<modbus::Pdu> frame() const;

@@ -9,9 +9,11 @@ bool FaultyStore::accept() {
   return struck(FaultKind::ignore_write) == nullptr;
 }
 
-void FaultyStore::store(const Place& place, std::uint32_t raw, RegisterBank& bank) const {
-  const Fault* other = struck(FaultKind::store_other);
-  bank.set_raw(place, raw + (other == nullptr ? 0U : number_of(*other)));
+void FaultyStore::store(const Place& place, RegisterView registers, RegisterBank& bank) const {
+  bank.put(place, registers);
+  if (const Fault* other = struck(FaultKind::store_other)) {
+    bank.set_stored(place, bank.stored(place) + number_of(*other));
+  }
   if (const Fault* reset = struck(FaultKind::reset_neighbour)) {
     bank.put(place.table, static_cast<std::uint16_t>(place.address + number_of(*reset)), 0);
   }

@@ -16,7 +16,7 @@ class FaultyStore {
   /// A write was accepted. Whether the device does what it says.
   [[nodiscard]] bool accept();
   /// Stores the value of the last accepted write.
-  void store(const Place& place, std::uint32_t raw, RegisterBank& bank) const;
+  void store(const Place& place, RegisterView registers, RegisterBank& bank) const;
 
  private:
   [[nodiscard]] const Fault* struck(FaultKind kind) const;

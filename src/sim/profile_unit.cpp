@@ -1,21 +1,28 @@
 #include "profile_unit.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
+#include <cstdlib>
 
 namespace spindle::sim {
 namespace {
 
-using catalogue::Parameter;
+using catalogue::Encoding;
+using catalogue::EventKind;
 
 /// Between standstill and any speed.
 constexpr Duration ramp = std::chrono::seconds(1);
 /// In steps of its own monitor, of a motor that has no set-point.
 constexpr std::int64_t fixed_speed = 1000;
+/// Of a run that an action starts.
+constexpr Duration run_time = std::chrono::seconds(2);
 
-long double worth_of(const Decimal& number) {
-  return static_cast<long double>(number.mantissa()) * std::pow(10.0L, number.exponent());
+/// The steps of a value; a floating-point number has none of its own.
+Encoding steps_of(const Encoding& encoding) {
+  return encoding.is_float() ? Encoding{.kind = catalogue::Kind::i64, .scale = Decimal(1, -3)}
+                             : encoding;
+}
+
+std::int64_t plain(const catalogue::Integer& integer) {
+  return Decimal(integer.sign, integer.magnitude, 0).mantissa();
 }
 
 /// The parameter that shows the present alarm.
@@ -32,16 +39,23 @@ ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::Sim
                          std::uint8_t address, const DeviceOptions& options)
     : Unit(profile, start, address, options),
       actions_(profile.actions),
+      busy_codes_(profile.link.busy),
       alarm_reset_(profile.alarm_reset),
       alarm_(present_alarm(profile)) {
-  const auto* facts = profile.run ? profile.run->command_register() : nullptr;
-  if (facts != nullptr) {
+  const bool is_started = profile.run && !profile.run->is_derived;
+  if (const auto* facts = is_started ? profile.run->action() : nullptr) {
+    start_action_ = facts->start;
+    if (!facts->alarm.empty()) alarm_ = facts->alarm;
+  }
+  if (const auto* facts = profile.run ? profile.run->command_register() : nullptr) {
     run_ = *facts;
     alarm_ = run_->monitor.alarm;
-    for (const catalogue::Text* name :
-         {&run_->command, &run_->stop_register, &run_->enable.parameter, &run_->set_point,
-          &run_->monitor.command_speed, &run_->monitor.feedback_speed}) {
-      if (auto parameter = profile.find(*name)) parameters_.push_back(std::move(*parameter));
+    const auto& monitor = run_->monitor;
+    for (const auto& name : {run_->set_point, monitor.feedback_speed, monitor.command_speed}) {
+      const auto place = bank().find(name);
+      if (!place) continue;
+      step_ = steps_of(place->encoding);
+      break;
     }
     // Where nothing else was said of the command.
     if (run_->stop && number(run_->command) == 0) bank().set(run_->command, *run_->stop);
@@ -49,37 +63,59 @@ ProfileUnit::ProfileUnit(const catalogue::Profile& profile, const catalogue::Sim
   start_ = bank().tables();
 }
 
-const Parameter* ProfileUnit::find(const std::string& name) const {
-  const auto found = std::find_if(parameters_.begin(), parameters_.end(),
-                                  [&](const Parameter& each) { return each.name == name; });
-  return found == parameters_.end() ? nullptr : &*found;
-}
-
 // ---- commands ----
 
-void ProfileUnit::on_write(const Place& place, std::uint32_t raw, TimePoint now) {
+Unit::Outcome ProfileUnit::write(ConnectionId connection,
+                                 const modbus::WriteMultipleRequest& request, TimePoint now) {
+  if (now < busy_until_) return Refusal{busy_codes_.front()};
+  return Unit::write(connection, request, now);
+}
+
+void ProfileUnit::on_write(const Place& place, std::int64_t raw, TimePoint now) {
   for (const catalogue::Action& action : actions_) {
-    if (place.covers(action.address.value)) act(action, raw);
+    const bool is_meant = place.covers(action.table, action.address.value) &&
+                          place.encoding.slice == action.encoding.slice;
+    if (is_meant) act(action, raw, now);
   }
   if (!run_) return;
   const auto is_at = [&](const std::string& name) {
-    const Parameter* parameter = find(name);
-    return parameter != nullptr && parameter->address.value == place.address;
+    const auto named = bank().find(name);
+    return named && named->table == place.table && named->address == place.address &&
+           named->encoding.slice == place.encoding.slice;
   };
   if (is_at(run_->command)) stopped_ = false;
-  if (is_at(run_->stop_register) && raw == run_->stop_value) stopped_ = true;
+  if (is_at(run_->stop_register) && number(run_->stop_register) == run_->stop_value) {
+    stopped_ = true;
+  }
   drive(now);
 }
 
 /// What an action does is what its confirming parameter shows.
-void ProfileUnit::act(const catalogue::Action& action, std::uint32_t raw) {
-  if (raw == action.stop_value) bank().set(action.confirm, 0);
+void ProfileUnit::act(const catalogue::Action& action, std::int64_t raw, TimePoint now) {
+  const bool is_start = !start_action_.empty() && action.name == start_action_;
+  if (raw == action.stop_value) {
+    bank().set(action.confirm, 0);
+    if (is_start && run_end_) end_run(EventKind::fastening_ng, now);
+  }
   if (action.value && raw != *action.value) return;
+  if (is_start) {
+    if (run_end_ || bank().get(alarm_) != 0) return;
+    run_end_ = now + run_time;
+  }
   if (action.name == alarm_reset_) {
     if (is_permanent(bank().get(alarm_))) return;
     bank().set(alarm_, 0);
   }
   bank().set(action.confirm, action.confirm_value.value_or(raw));
+  if (!busy_codes_.empty()) busy_until_ = now + action.busy;
+}
+
+void ProfileUnit::end_run(EventKind result, TimePoint now) {
+  run_end_.reset();
+  for (const catalogue::Action& action : actions_) {
+    if (action.name == start_action_) bank().set(action.confirm, 0);
+  }
+  happen(result, now);
 }
 
 // ---- the motor, in steps of its set-point ----
@@ -102,7 +138,11 @@ ProfileUnit::Motion ProfileUnit::commanded() const {
 }
 
 std::int64_t ProfileUnit::wanted_speed() const {
-  return run_->set_point.empty() ? fixed_speed : bank().get(run_->set_point);
+  const auto set_point = bank().find(run_->set_point);
+  const auto wanted = set_point ? bank().number(*set_point) : std::nullopt;
+  const auto steps = wanted ? catalogue::nearest_step(step_, *wanted) : std::nullopt;
+  if (steps) return plain(*steps);
+  return set_point ? 0 : fixed_speed;
 }
 
 /// What is not enabled is acknowledged, and nothing turns.
@@ -143,14 +183,13 @@ std::int64_t ProfileUnit::status(TimePoint now) const {
 
 /// In the scale of the monitor; one that is not signed does not tell the direction.
 void ProfileUnit::show_speed(const std::string& name, TimePoint now) {
-  const Parameter* monitor = find(name);
-  if (monitor == nullptr) return;
-  const Parameter* set_point = find(run_->set_point);
-  const Decimal step = set_point == nullptr ? monitor->encoding.scale : set_point->encoding.scale;
-  const long double speed = static_cast<long double>(motor_.speed(now)) * worth_of(step) /
-                            worth_of(monitor->encoding.scale);
-  const bool is_signed = catalogue::lowest(monitor->encoding.kind) < 0;
-  bank().set(name, std::llround(is_signed ? speed : std::fabs(speed)));
+  const auto monitor = bank().find(name);
+  if (!monitor) return;
+  const Encoding& shown = monitor->encoding;
+  const bool is_signed = shown.is_float() || catalogue::lowest(shown) < Decimal(0);
+  const std::int64_t speed = motor_.speed(now);
+  const auto number = catalogue::scaled(step_, Decimal(is_signed ? speed : std::abs(speed)));
+  if (number) bank().set_number(*monitor, *number);
 }
 
 void ProfileUnit::before_read(TimePoint now) {
@@ -165,7 +204,8 @@ void ProfileUnit::before_read(TimePoint now) {
 void ProfileUnit::raise_alarm(std::int64_t code, TimePoint now) {
   bank().set(alarm_, code);
   if (run_) motor_.coast(now);
-  happen(catalogue::EventKind::error, now);
+  if (run_end_) end_run(EventKind::fastening_ng, now);
+  happen(EventKind::error, now);
 }
 
 void ProfileUnit::raise_warning(std::int64_t code, TimePoint /*now*/) {
@@ -179,6 +219,8 @@ void ProfileUnit::power_cycle(TimePoint now) {
   events().restart();
   motor_.brake(now);
   stopped_ = false;
+  run_end_.reset();
+  busy_until_ = TimePoint::min();
 }
 
 }  // namespace spindle::sim

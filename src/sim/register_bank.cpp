@@ -4,56 +4,105 @@
 #include <iterator>
 
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/value.hpp"
 
 namespace spindle::sim {
 namespace {
 
 using catalogue::Access;
+using catalogue::Content;
+using catalogue::Encoding;
 using catalogue::Kind;
+using catalogue::Parameter;
+using catalogue::Value;
 using modbus::RegisterTable;
 
 constexpr std::string_view commands_prefix = "command.";
 constexpr std::string_view pattern_characters = "*?[";
 constexpr Duration longest = std::chrono::hours(24);
+/// What clocks show at first: 2026-01-01 00:00:00, whenever that is.
+constexpr std::int64_t first_second = 1'767'225'600;
 
-std::int64_t number_in(std::uint32_t raw, Kind kind) {
-  switch (kind) {
-    case Kind::i16:
-      return static_cast<std::int16_t>(raw & 0xFFFFU);
-    case Kind::i32:
-      return static_cast<std::int32_t>(raw);
-    case Kind::u16:
-      return raw & 0xFFFFU;
-    case Kind::u32:
-      break;
-  }
-  return raw;
+Parameter as_parameter(const Encoding& encoding) {
+  Parameter parameter;
+  parameter.encoding = encoding;
+  return parameter;
 }
 
-std::uint16_t low_word(std::int64_t number) { return static_cast<std::uint16_t>(number & 0xFFFF); }
-
-std::optional<std::int64_t> steps_of(const std::optional<Decimal>& value, const Decimal& scale) {
-  return value ? value->divided_by(scale) : std::nullopt;
+Encoding element_of(Encoding encoding) {
+  encoding.count = 1;
+  return encoding;
 }
 
-/// The range of a parameter, or of its labels where it has none.
-void limit_to_range(const catalogue::Parameter& parameter, Cell& cell) {
-  const Decimal& scale = parameter.encoding.scale;
-  cell.minimum = steps_of(parameter.range.minimum, scale);
-  cell.maximum = steps_of(parameter.range.maximum, scale);
-  if (parameter.except) {
-    cell.except = {steps_of(parameter.except->minimum, scale).value_or(0),
-                   steps_of(parameter.except->maximum, scale).value_or(0)};
+/// One element without scale and offset.
+Encoding stored_as(const Encoding& encoding) {
+  Encoding plain = element_of(encoding);
+  plain.scale = Decimal(1);
+  plain.divisor = 1;
+  plain.offset = Decimal(0);
+  return plain;
+}
+
+Decimal to_decimal(const catalogue::Integer& integer) {
+  return {integer.sign, integer.magnitude, 0};
+}
+
+std::optional<Decimal> number_in(const Encoding& encoding, RegisterView registers) {
+  const Parameter one = as_parameter(element_of(encoding));
+  const auto value = decode(one, registers.first(catalogue::register_count(one.encoding)));
+  if (!value || !value->is_number()) return std::nullopt;
+  return value->number;
+}
+
+Registers date_of(const Encoding& encoding, const Decimal& seconds, const Registers& same) {
+  const Encoding unix_time = {.kind = Kind::date, .date = catalogue::DateLayout::unix_time};
+  return decode(as_parameter(unix_time), catalogue::to_registers(unix_time, seconds.magnitude()))
+      .and_then([&](const Value& date) { return encode(as_parameter(encoding), date); })
+      .value_or(same);
+}
+
+/// One element that is the nearest to a number, or stays as it is where none is near.
+Registers with_number(const Encoding& encoding, const Decimal& number, const Registers& same) {
+  if (encoding.kind == Kind::date) return date_of(encoding, number, same);
+  if (encoding.kind == Kind::text) {
+    return encode(as_parameter(encoding), {.content = Content::text}).value_or(same);
   }
-  if (parameter.labels.empty() || cell.minimum || cell.maximum) return;
+  if (encoding.is_float()) return encode(as_parameter(encoding), {number}).value_or(same);
+  const auto step = catalogue::nearest_step(encoding, number);
+  if (!step) return same;
+  const Decimal fitting =
+      std::clamp(to_decimal(*step), catalogue::lowest(encoding), catalogue::highest(encoding));
+  if (encoding.kind == Kind::bcd) {
+    return encode(as_parameter(stored_as(encoding)), {fitting}).value_or(same);
+  }
+  return catalogue::to_registers(
+      encoding, catalogue::to_pattern(encoding, {fitting.sign(), fitting.magnitude()}),
+      catalogue::to_pattern(encoding, same));
+}
+
+/// The smallest range that has all of both.
+catalogue::Range hull(const catalogue::Range& a, const catalogue::Range& b) {
+  catalogue::Range all;
+  if (a.minimum && b.minimum) all.minimum = std::min(*a.minimum, *b.minimum);
+  if (a.maximum && b.maximum) all.maximum = std::max(*a.maximum, *b.maximum);
+  return all;
+}
+
+/// The range of a parameter, or of its labels where it has none. One whose steps are worth
+/// something else each time has no range here.
+void limit_to_range(const Parameter& parameter, Cell& cell) {
+  if (!parameter.scale_by.empty()) return;
+  cell.range = parameter.range;
+  cell.except = parameter.except;
+  if (parameter.labels.empty() || cell.range.minimum || cell.range.maximum) return;
   const auto [low, high] =
       std::minmax_element(parameter.labels.begin(), parameter.labels.end(),
                           [](const auto& a, const auto& b) { return a.number < b.number; });
-  cell.minimum = low->number;
-  cell.maximum = high->number;
+  cell.range = {catalogue::scaled(parameter.encoding, Decimal(low->number)),
+                catalogue::scaled(parameter.encoding, Decimal(high->number))};
 }
 
-void limit_to_values(const catalogue::Action& action, Cell& cell) {
+catalogue::Range values_of(const catalogue::Action& action) {
   std::int64_t low = action.value.value_or(action.minimum);
   std::int64_t high = action.value.value_or(action.maximum);
   const auto widen = [&](std::int64_t value) {
@@ -63,20 +112,41 @@ void limit_to_values(const catalogue::Action& action, Cell& cell) {
   if (action.rest) widen(*action.rest);
   if (action.stop_value) widen(*action.stop_value);
   for (const catalogue::Label& label : action.labels) widen(label.number);
-  cell.minimum = low;
-  cell.maximum = high;
+  return {Decimal(low), Decimal(high)};
 }
 
-void put_raw(Words& words, const Place& place, std::uint32_t raw) {
+/// Whether the device tells its own limits of it.
+bool is_mirrored(const Cell& cell, const catalogue::LimitSpec& facts) {
+  return cell.place.table == RegisterTable::holding && cell.writable &&
+         cell.place.address >= facts.from && cell.place.address <= facts.to;
+}
+
+bool needs_unlock(const std::optional<catalogue::UnlockSpec>& unlock, std::string_view name) {
+  if (!unlock || unlock->parameter == name) return false;
+  const auto& needed = unlock->needed_by;
+  return needed.empty() || std::any_of(needed.begin(), needed.end(), [&](const auto& pattern) {
+           return glob_match(pattern, name);
+         });
+}
+
+Registers words_at(const Words& words, const Place& place) {
+  Registers registers;
+  for (unsigned i = 0; i < place.size(); ++i) {
+    registers.push_back(words.at(static_cast<std::uint16_t>(place.address + i)));
+  }
+  return registers;
+}
+
+void put_words(Words& words, const Place& place, RegisterView registers) {
   auto address = place.address;
-  if (catalogue::register_count(place.kind) == 2) words.put(address++, low_word(raw >> 16U));
-  words.put(address, low_word(raw));
+  for (const std::uint16_t word : registers) words.put(address++, word);
 }
 
-std::uint32_t raw_in(const Words& words, const Place& place) {
-  if (catalogue::register_count(place.kind) == 1) return words.at(place.address);
-  const auto next = static_cast<std::uint16_t>(place.address + 1U);
-  return (std::uint32_t{words.at(place.address)} << 16U) | words.at(next);
+/// The bits of `registers` that are the value's, and the others of `present`.
+Registers merged(const Encoding& encoding, Registers registers, RegisterView present) {
+  if (!encoding.is_part() || encoding.count > 1) return registers;
+  return catalogue::to_registers(encoding, catalogue::to_pattern(encoding, registers),
+                                 catalogue::to_pattern(encoding, present));
 }
 
 }  // namespace
@@ -93,16 +163,31 @@ void Words::add(std::uint16_t address) {
   there_[address] = true;
 }
 
-bool Cell::takes(std::uint32_t raw) const {
-  const std::int64_t number = number_in(raw, place.kind);
-  if (except && number >= except->first && number <= except->second) return false;
-  return !(minimum && number < *minimum) && !(maximum && number > *maximum);
+std::int64_t stored_in(const Encoding& encoding, RegisterView registers) {
+  const auto number = number_in(stored_as(encoding), registers);
+  const auto nearest =
+      number ? catalogue::nearest_step({.kind = Kind::i64}, *number) : std::nullopt;
+  return nearest ? to_decimal(*nearest).mantissa() : 0;
+}
+
+bool Cell::takes(RegisterView registers) const {
+  const Kind kind = place.encoding.kind;
+  const bool is_limited = range.minimum || range.maximum || except;
+  if (kind == Kind::date || (!is_limited && kind != Kind::bcd)) return true;
+  Parameter parameter = as_parameter(place.encoding);
+  parameter.range = range;
+  parameter.except = except;
+  const auto value = decode(parameter, registers);
+  if (!value) return false;
+  const auto fits = [&](const Value& one) { return check_range(parameter, one).has_value(); };
+  return fits(*value) && std::all_of(value->elements.begin(), value->elements.end(), fits);
 }
 
 // ---- layout ----
 
 RegisterBank::RegisterBank(const catalogue::Profile& profile,
-                           const catalogue::SimulationSpec& start, Commands commands) {
+                           const catalogue::SimulationSpec& start, Commands commands)
+    : unlock_(profile.unlock) {
   named_.reserve(profile.parameters.size());
   for (const catalogue::Parameter& parameter : profile.parameters) {
     add_parameter(parameter, profile.commands_motion(parameter));
@@ -116,7 +201,7 @@ RegisterBank::RegisterBank(const catalogue::Profile& profile,
   if (profile.events) add_events(*profile.events);
   for (const auto& value : start.values) {
     for (const Place& place : matching(value.pattern)) {
-      set_raw(place, static_cast<std::uint32_t>(value.raw));
+      set_stored(place, value.raw);
     }
   }
   for (const auto& limits : start.limits) {
@@ -134,21 +219,44 @@ void RegisterBank::add_registers(const Place& place) {
   }
 }
 
-void RegisterBank::add_parameter(const catalogue::Parameter& parameter, bool is_command) {
-  const catalogue::Encoding& encoding = parameter.encoding;
-  const Place place{parameter.table, parameter.address.value, encoding.kind, encoding.scale};
+void RegisterBank::add(const Cell& cell) {
+  cells_.insert({{cell.place.table, cell.place.written_at()}, cell});
+  longest_ = std::max(longest_, cell.place.size());
+}
+
+void RegisterBank::add_parameter(const Parameter& parameter, bool is_command) {
+  Place place{parameter.table, parameter.address.value, parameter.encoding};
+  if (parameter.write_address) place.write_address = parameter.write_address->value;
   named_.push_back({parameter.name, place});
   add_registers(place);
+  if (parameter.reading == catalogue::Reading::consumes) consumed_.push_back(place);
   Cell cell{.place = place, .writable = parameter.access == Access::read_write};
   cell.is_parameter = cell.writable && !is_command && !parameter.name.starts_with(commands_prefix);
+  cell.needs_unlock = needs_unlock(unlock_, parameter.name);
   limit_to_range(parameter, cell);
-  // No command is given at first, and what a device measures begins at 0.
-  const auto least = cell.is_parameter ? cell.minimum.value_or(0) : 0;
-  const auto value = steps_of(parameter.default_value, encoding.scale);
-  if (!cell.writable || cell.is_parameter) {
-    set_raw(place, static_cast<std::uint32_t>(value.value_or(least)));
-  }
+  if (!cell.writable || cell.is_parameter) begin(parameter, cell);
   add(cell);
+}
+
+// No command is given at first, and what a device measures begins at 0.
+void RegisterBank::begin(const Parameter& parameter, const Cell& cell) {
+  const Place& place = cell.place;
+  const Decimal least = cell.is_parameter ? cell.range.minimum.value_or(Decimal(0)) : Decimal(0);
+  if (place.encoding.kind == Kind::date) {
+    set_stored(place, first_second);
+  } else {
+    set_number(place, parameter.default_value.value_or(least));
+  }
+  if (parameter.nulls.empty()) return;
+  Parameter one = parameter;
+  one.encoding.count = 1;
+  for (std::size_t i = 0; i < parameter.nulls.size(); ++i) {
+    const Registers all = registers(place);
+    const auto value =
+        decode(one, RegisterView(all).first(catalogue::register_count(one.encoding)));
+    if (!value || value->content != Content::none) return;
+    set_stored(place, stored(place) + 1);
+  }
 }
 
 // A register that has a name already keeps what its name says of it.
@@ -158,26 +266,46 @@ void RegisterBank::add_numbered(const catalogue::NumberedSpec& facts) {
     const Place place{facts.table, static_cast<std::uint16_t>(number)};
     tables_.of(facts.table).add(place.address);
     const bool is_writable = facts.access == Access::read_write;
-    if (known_at(place) != nullptr) continue;
-    add({.place = place, .writable = is_writable, .is_parameter = is_writable});
+    if (!cells_at(place.table, place.address).empty()) continue;
+    Cell cell{.place = place, .writable = is_writable, .is_parameter = is_writable};
+    if (unlock_) {
+      cell.needs_unlock = needs_unlock(unlock_, facts.prefix.to_string() + std::to_string(number));
+    }
+    add(cell);
   }
 }
 
 // Where values are pairs, the register of an action is the lower of its pair, or it is a pair by
-// itself.
+// itself. A value of the same registers may be what it was, or what the action says; where others
+// share them, it may be anything.
 void RegisterBank::add_command(const catalogue::Action& action, bool even_pairs,
                                Commands commands) {
   if (action.motion != catalogue::Motion::none) return;
-  Cell cell{.place = {.address = action.address.value, .kind = action.kind}, .writable = true};
-  if (even_pairs && catalogue::register_count(action.kind) == 1) {
+  Cell cell{.place = {action.table, action.address.value, action.encoding}, .writable = true};
+  const bool is_half = even_pairs && action.table == RegisterTable::holding &&
+                       cell.place.size() == 1 && !action.encoding.is_part();
+  if (is_half) {
     cell.place.address = static_cast<std::uint16_t>(action.address.value & ~1U);
-    cell.place.kind = Kind::u32;
+    cell.place.encoding.kind = Kind::u32;
   }
-  if (const Cell* known = known_at(cell.place)) cell.is_parameter = known->is_parameter;
   if (commands == Commands::readable) {
     add_registers(cell.place);
-    limit_to_values(action, cell);
+    cell.range = values_of(action);
   }
+  const auto [from, to] = cells_.equal_range({cell.place.table, cell.place.address});
+  for (auto known = from; known != to;) {
+    const Cell& other = known->second;
+    const bool is_same = other.place.address == cell.place.address &&
+                         other.place.encoding.slice == cell.place.encoding.slice &&
+                         other.place.size() <= cell.place.size();
+    if (is_same && other.writable) {
+      cell.is_parameter |= other.is_parameter;
+      cell.needs_unlock |= other.needs_unlock;
+      cell.range = hull(cell.range, other.range);
+    }
+    known = is_same ? cells_.erase(known) : std::next(known);
+  }
+  if (cell_at(cell.place.table, cell.place.address) != nullptr) cell.range = {};
   add(cell);
 }
 
@@ -187,7 +315,7 @@ void RegisterBank::add_events(const catalogue::EventSpec& facts) {
   }
   if (!facts.arm) return;
   const Place arm{.address = facts.arm->address};
-  if (known_at(arm) == nullptr) add({.place = arm, .writable = true});
+  if (cells_at(arm.table, arm.address).empty()) add({.place = arm, .writable = true});
 }
 
 void RegisterBank::fill(const catalogue::Area& area) {
@@ -197,25 +325,35 @@ void RegisterBank::fill(const catalogue::Area& area) {
 }
 
 void RegisterBank::limit(const Place& place, std::int64_t minimum, std::int64_t maximum) {
-  const auto found = cells_.find({place.table, place.address});
-  if (found == cells_.end()) return;
-  found->second.minimum = minimum;
-  found->second.maximum = maximum;
+  const auto [from, to] = cells_.equal_range({place.table, place.written_at()});
+  for (auto at = from; at != to; ++at) {
+    Cell& cell = at->second;
+    if (cell.place.encoding.slice != place.encoding.slice) continue;
+    cell.range = {catalogue::scaled(cell.place.encoding, Decimal(minimum)),
+                  catalogue::scaled(cell.place.encoding, Decimal(maximum))};
+  }
 }
 
 void RegisterBank::add_mirrors(const catalogue::LimitSpec& facts) {
-  const auto add = [this](std::uint32_t address, std::int64_t limit) {
-    Words& words = tables_.of(RegisterTable::holding);
-    words.add(static_cast<std::uint16_t>(address));
-    words.put(static_cast<std::uint16_t>(address), low_word(limit));
+  constexpr unsigned addresses = 0x10000;
+  const auto show = [this](Place mirror, std::uint16_t offset,
+                           const std::optional<Decimal>& limit) {
+    if (!limit || mirror.end() + offset > addresses) return;
+    mirror.address = static_cast<std::uint16_t>(mirror.address + offset);
+    add_registers(mirror);
+    set_number(mirror, *limit);
   };
   for (const auto& [key, cell] : cells_) {
-    const auto [table, number, kind, scale] = cell.place;
-    const bool is_mirrored = table == RegisterTable::holding && cell.writable &&
-                             number >= facts.from && number <= facts.to;
-    if (!is_mirrored) continue;
-    add(number + facts.minimum_offset, cell.minimum.value_or(catalogue::lowest(kind)));
-    add(number + facts.maximum_offset, cell.maximum.value_or(catalogue::highest(kind)));
+    const Place& place = cell.place;
+    if (!is_mirrored(cell, facts)) continue;
+    catalogue::Range range = cell.range;
+    if (place.encoding.is_integer()) {
+      const Encoding& encoding = place.encoding;
+      if (!range.minimum) range.minimum = catalogue::scaled(encoding, catalogue::lowest(encoding));
+      if (!range.maximum) range.maximum = catalogue::scaled(encoding, catalogue::highest(encoding));
+    }
+    show(place, facts.minimum_offset, range.minimum);
+    show(place, facts.maximum_offset, range.maximum);
   }
 }
 
@@ -223,18 +361,22 @@ void RegisterBank::add_mirrors(const catalogue::LimitSpec& facts) {
 void RegisterBank::remove(const catalogue::Area& area,
                           const std::optional<catalogue::LimitSpec>& limits) {
   for (std::uint32_t number = area.from; number <= area.to; ++number) {
-    const auto address = static_cast<std::uint16_t>(number);
-    tables_.of(area.table).erase(address);
-    const Cell* cell = known_at(area.table, address);
-    if (cell == nullptr) continue;
-    const bool is_mirrored = limits && area.table == RegisterTable::holding && cell->writable &&
-                             address >= limits->from && address <= limits->to;
-    cells_.erase({area.table, cell->place.address});
-    if (!is_mirrored) continue;
-    Words& words = tables_.of(RegisterTable::holding);
-    words.erase(static_cast<std::uint16_t>(number + limits->minimum_offset));
-    words.erase(static_cast<std::uint16_t>(number + limits->maximum_offset));
+    tables_.of(area.table).erase(static_cast<std::uint16_t>(number));
   }
+  std::erase_if(cells_, [&](const auto& entry) {
+    const auto& [key, cell] = entry;
+    const Place& place = cell.place;
+    if (place.table != area.table || place.address > area.to || place.end() <= area.from) {
+      return false;
+    }
+    if (!limits || !is_mirrored(cell, *limits)) return true;
+    for (unsigned number = place.address; number < place.end(); ++number) {
+      Words& words = tables_.of(RegisterTable::holding);
+      words.erase(static_cast<std::uint16_t>(number + limits->minimum_offset));
+      words.erase(static_cast<std::uint16_t>(number + limits->maximum_offset));
+    }
+    return true;
+  });
 }
 
 // ---- registers ----
@@ -257,35 +399,113 @@ std::optional<Registers> RegisterBank::read(RegisterTable table, std::uint16_t f
   return registers;
 }
 
-const Cell* RegisterBank::known_at(RegisterTable table, std::uint16_t address) const {
-  const auto next = cells_.upper_bound({table, address});
-  if (next == cells_.begin()) return nullptr;
-  const Cell& cell = std::prev(next)->second;
-  return cell.place.table == table && cell.place.covers(address) ? &cell : nullptr;
+void RegisterBank::note_read(RegisterTable table, std::uint16_t first, std::size_t count) {
+  for (const Place& place : consumed_) {
+    const bool is_read =
+        place.table == table && place.address < first + count && place.end() > first;
+    if (is_read) set_stored(place, 0);
+  }
+}
+
+bool RegisterBank::has_cells(RegisterTable table) const {
+  const auto first = cells_.lower_bound({table, std::uint16_t{0}});
+  return first != cells_.end() && first->first.first == table;
+}
+
+std::vector<const Cell*> RegisterBank::cells_at(RegisterTable table, std::uint16_t address) const {
+  std::vector<const Cell*> found;
+  const unsigned back = std::min<unsigned>(address, longest_ - 1);
+  auto at = cells_.lower_bound({table, static_cast<std::uint16_t>(address - back)});
+  for (; at != cells_.end() && at->first <= Key{table, address}; ++at) {
+    const Place& place = at->second.place;
+    if (address < place.written_at() + place.size()) found.push_back(&at->second);
+  }
+  return found;
 }
 
 const Cell* RegisterBank::cell_at(RegisterTable table, std::uint16_t address) const {
-  const Cell* cell = known_at(table, address);
-  return cell != nullptr && cell->writable ? cell : nullptr;
+  const auto cells = cells_at(table, address);
+  const auto found =
+      std::find_if(cells.begin(), cells.end(), [](const Cell* cell) { return cell->writable; });
+  return found == cells.end() ? nullptr : *found;
 }
 
-std::uint32_t RegisterBank::with_words(const Cell& cell, std::uint16_t first, RegisterView values,
-                                       std::size_t& next) const {
-  std::uint32_t raw = this->raw(cell.place);
-  const unsigned end = cell.place.end();
-  for (; next < values.size() && first + next < end; ++next) {
-    const auto shift = static_cast<unsigned>(16U * (end - 1U - (first + next)));
-    raw = (raw & ~(0xFFFFU << shift)) | (std::uint32_t{values[next]} << shift);
+Change RegisterBank::change_of(const Cell& cell, std::uint16_t first, RegisterView values) const {
+  Change change{&cell, registers(cell.place)};
+  for (std::size_t i = 0; i < change.registers.size(); ++i) {
+    const std::size_t address = cell.place.written_at() + i;
+    const bool is_written = address >= first && address - first < values.size();
+    if (is_written) change.registers[i] = values[address - first];
   }
-  return raw;
+  return change;
 }
 
-std::uint32_t RegisterBank::raw(const Place& place) const {
-  return raw_in(tables_.of(place.table), place);
+// A part of a register whose bits stay is not written.
+std::vector<Change> RegisterBank::changes(RegisterTable table, std::uint16_t first,
+                                          RegisterView values) const {
+  std::vector<Change> changes;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto address = static_cast<std::uint16_t>(first + i);
+    bool is_writable = false;
+    for (const Cell* cell : cells_at(table, address)) {
+      if (!cell->writable) continue;
+      is_writable = true;
+      if (i > 0 && cell->place.written_at() != address) continue;
+      Change change = change_of(*cell, first, values);
+      const Registers present = registers(cell->place);
+      const bool stays = cell->place.encoding.is_part() &&
+                         merged(cell->place.encoding, change.registers, present) == present;
+      if (!stays) changes.push_back(std::move(change));
+    }
+    if (!is_writable) changes.emplace_back();
+  }
+  return changes;
 }
 
-void RegisterBank::set_raw(const Place& place, std::uint32_t raw) {
-  put_raw(tables_.of(place.table), place, raw);
+bool RegisterBank::is_locked(const Cell& cell) const {
+  if (!cell.needs_unlock) return false;
+  const auto lock = find(unlock_->parameter);
+  return lock && number(*lock) != Decimal(unlock_->value);
+}
+
+Registers RegisterBank::registers(const Place& place) const {
+  return words_at(tables_.of(place.table), place);
+}
+
+void RegisterBank::put(const Place& place, RegisterView registers) {
+  put_words(tables_.of(place.table), place, registers);
+}
+
+std::optional<Decimal> RegisterBank::number(const Place& place) const {
+  return number_in(place.encoding, registers(place));
+}
+
+void RegisterBank::set_number(const Place& place, const Decimal& number) {
+  const Registers present = registers(place);
+  if (place.encoding.count == 1) return put(place, with_number(place.encoding, number, present));
+  const Encoding one = element_of(place.encoding);
+  const auto size = static_cast<std::ptrdiff_t>(catalogue::register_count(one));
+  Registers all;
+  while (all.size() < present.size()) {
+    const auto own = present.begin() + static_cast<std::ptrdiff_t>(all.size());
+    const Registers next = with_number(one, number, Registers(own, own + size));
+    all.insert(all.end(), next.begin(), next.end());
+  }
+  put(place, all);
+}
+
+// A counter begins anew behind its last number.
+void RegisterBank::set_stored(const Place& place, std::int64_t stored) {
+  Place plain = place;
+  plain.encoding = stored_as(place.encoding);
+  Decimal number(stored);
+  if (plain.encoding.is_integer() && plain.encoding.kind != Kind::bcd) {
+    const std::uint64_t pattern =
+        catalogue::to_pattern(plain.encoding, {number.sign(), number.magnitude()});
+    number = to_decimal(catalogue::to_integer(plain.encoding, pattern));
+  }
+  plain.encoding.count = place.encoding.count;
+  set_number(plain, number);
 }
 
 // ---- names ----
@@ -340,11 +560,11 @@ void RegisterBank::add_numbered_matching(std::string_view pattern,
 
 std::int64_t RegisterBank::get(std::string_view name) const {
   const auto place = find(name);
-  return place ? number_in(raw(*place), place->kind) : 0;
+  return place ? stored(*place) : 0;
 }
 
 void RegisterBank::set(std::string_view name, std::int64_t value) {
-  if (const auto place = find(name)) set_raw(*place, static_cast<std::uint32_t>(value));
+  if (const auto place = find(name)) set_stored(*place, value);
 }
 
 Duration RegisterBank::time(std::string_view name, Duration unit) const {
@@ -352,8 +572,8 @@ Duration RegisterBank::time(std::string_view name, Duration unit) const {
   if (!place) return {};
   // What is no whole number of millionths, or too large for this, is longer than any day.
   const Decimal millionth(1, -6);
-  const auto scaled = Decimal(number_in(raw(*place), place->kind)).times(place->scale);
-  const auto steps = scaled ? scaled->divided_by(millionth) : std::nullopt;
+  const auto value = number(*place);
+  const auto steps = value ? value->divided_by(millionth) : std::nullopt;
   constexpr std::int64_t parts = 1'000'000;
   const Duration step = unit / parts;
   if (!steps || *steps > longest / step) return longest;
@@ -365,13 +585,16 @@ void RegisterBank::copy_parameters(const Tables& from, Tables& into,
   const auto is_spared = [&](const Place& place) {
     return std::any_of(but.begin(), but.end(), [&](std::string_view name) {
       const auto spared = find(name);
-      return spared && spared->table == place.table && spared->address == place.address;
+      return spared && spared->table == place.table && spared->address == place.address &&
+             spared->encoding.slice == place.encoding.slice;
     });
   };
   for (const auto& [key, cell] : cells_) {
     if (!cell.is_parameter || is_spared(cell.place)) continue;
     const RegisterTable table = cell.place.table;
-    put_raw(into.of(table), cell.place, raw_in(from.of(table), cell.place));
+    put_words(into.of(table), cell.place,
+              merged(cell.place.encoding, words_at(from.of(table), cell.place),
+                     words_at(into.of(table), cell.place)));
   }
 }
 

@@ -42,9 +42,9 @@ class Words {
   std::vector<bool> there_ = {};
 };
 
-/// By modbus::RegisterTable.
+/// By modbus::RegisterTable. A coil or a discrete input is a register that holds 0 or 1.
 struct Tables {
-  std::array<Words, 2> all = {};
+  std::array<Words, 4> all = {};
   [[nodiscard]] const Words& of(modbus::RegisterTable table) const {
     return all.at(static_cast<std::size_t>(table));
   }
@@ -57,34 +57,48 @@ struct Tables {
 struct Place {
   modbus::RegisterTable table = modbus::RegisterTable::holding;
   std::uint16_t address = 0;  ///< of its first register
-  catalogue::Kind kind = catalogue::Kind::u16;
-  Decimal scale = Decimal(1);
+  catalogue::Encoding encoding = {};
+  /// Where it is written; empty: where it stands.
+  std::optional<std::uint16_t> write_address = std::nullopt;
 
-  /// Whether this register of its table is one of the value's.
-  [[nodiscard]] bool covers(std::uint16_t register_address) const {
-    return register_address >= address && register_address < end();
-  }
+  [[nodiscard]] std::uint16_t written_at() const { return write_address.value_or(address); }
+  [[nodiscard]] unsigned size() const { return catalogue::register_count(encoding); }
   /// Behind its last register.
-  [[nodiscard]] unsigned end() const { return unsigned{address} + catalogue::register_count(kind); }
+  [[nodiscard]] unsigned end() const { return address + size(); }
+  /// Whether this register is one of the value's.
+  [[nodiscard]] bool covers(modbus::RegisterTable of, std::uint16_t register_address) const {
+    return of == table && register_address >= address && register_address < end();
+  }
 };
 
-/// A value that clients may write, of one register or two.
+/// What is stored, without scale and offset, as the nearest integer; of several, the first. 0 where
+/// it is no number.
+std::int64_t stored_in(const catalogue::Encoding& encoding, RegisterView registers);
+
+/// A value that the profile names.
 struct Cell {
   Place place = {};
   bool writable = false;
   bool is_parameter = false;  ///< a value that stays, as opposed to a command
-  std::optional<std::int64_t> minimum = std::nullopt;
-  std::optional<std::int64_t> maximum = std::nullopt;
-  std::optional<std::pair<std::int64_t, std::int64_t>> except = std::nullopt;
+  bool needs_unlock = false;
+  catalogue::Range range = {};  ///< as people read it
+  std::optional<catalogue::Range> except = std::nullopt;
 
-  /// Whether the value may be this number.
-  [[nodiscard]] bool takes(std::uint32_t raw) const;
+  /// Whether the value may be this. A date always may, as it is also written piece by piece.
+  [[nodiscard]] bool takes(RegisterView registers) const;
+};
+
+/// What a write makes of one value.
+struct Change {
+  const Cell* cell = nullptr;  ///< null: there is none that can be written
+  Registers registers = {};    ///< all of the value's, with those that are not written
 };
 
 /// The registers of a simulated device, laid out by its profile: named and numbered parameters,
 /// commands, the device's own limits, the event block. Values begin at those of the start state,
-/// else at their default, their least value or 0; limits and holes are those of the start state,
-/// too. Keeps no reference to the profile.
+/// else at their default, their least value or 0, texts empty, dates always at the same one; never
+/// at what says that there is no value. Limits and holes are those of the start state, too. Values
+/// may share registers. Keeps no reference to the profile.
 class RegisterBank {
  public:
   /// Whether a register that only an action names can be read.
@@ -106,14 +120,30 @@ class RegisterBank {
     tables_.of(table).put(address, word);
   }
 
-  /// The value that can be written and that this register belongs to; null when there is none.
+  /// Reading these registers clears what says so.
+  void note_read(modbus::RegisterTable table, std::uint16_t first, std::size_t count);
+
+  /// Whether there is any value in this table.
+  [[nodiscard]] bool has_cells(modbus::RegisterTable table) const;
+  /// A value that can be written by this register; null when there is none.
   [[nodiscard]] const Cell* cell_at(modbus::RegisterTable table, std::uint16_t address) const;
-  /// The value with those of its registers that are written from `first` on, beginning with
-  /// values[next]; `next` is then that of the next value.
-  [[nodiscard]] std::uint32_t with_words(const Cell& cell, std::uint16_t first, RegisterView values,
-                                         std::size_t& next) const;
-  [[nodiscard]] std::uint32_t raw(const Place& place) const;
-  void set_raw(const Place& place, std::uint32_t raw);
+  /// What writing these registers means, in the order of their addresses.
+  [[nodiscard]] std::vector<Change> changes(modbus::RegisterTable table, std::uint16_t first,
+                                            RegisterView values) const;
+  /// Whether another register has to hold something else before this is written.
+  [[nodiscard]] bool is_locked(const Cell& cell) const;
+
+  [[nodiscard]] Registers registers(const Place& place) const;
+  void put(const Place& place, RegisterView registers);
+  /// The value as people read it; of several, the first. Empty where it is no number.
+  [[nodiscard]] std::optional<Decimal> number(const Place& place) const;
+  /// The nearest that it can be; of several, all. A text becomes empty.
+  void set_number(const Place& place, const Decimal& number);
+  /// What is stored, see stored_in(). A date is set by its seconds since 1970.
+  [[nodiscard]] std::int64_t stored(const Place& place) const {
+    return stored_in(place.encoding, registers(place));
+  }
+  void set_stored(const Place& place, std::int64_t stored);
 
   /// Empty when the profile does not name it.
   [[nodiscard]] std::optional<Place> find(std::string_view name) const;
@@ -142,13 +172,13 @@ class RegisterBank {
 
   using Key = std::pair<modbus::RegisterTable, std::uint16_t>;
 
-  [[nodiscard]] const Cell* known_at(const Place& place) const {
-    return known_at(place.table, place.address);
-  }
-  [[nodiscard]] const Cell* known_at(modbus::RegisterTable table, std::uint16_t address) const;
-  void add(const Cell& cell) { cells_[{cell.place.table, cell.place.address}] = cell; }
+  [[nodiscard]] std::vector<const Cell*> cells_at(modbus::RegisterTable table,
+                                                  std::uint16_t address) const;
+  [[nodiscard]] Change change_of(const Cell& cell, std::uint16_t first, RegisterView values) const;
+  void add(const Cell& cell);
   void add_registers(const Place& place);
   void add_parameter(const catalogue::Parameter& parameter, bool is_command);
+  void begin(const catalogue::Parameter& parameter, const Cell& cell);
   void add_numbered(const catalogue::NumberedSpec& facts);
   void add_command(const catalogue::Action& action, bool even_pairs, Commands commands);
   void add_events(const catalogue::EventSpec& facts);
@@ -160,8 +190,11 @@ class RegisterBank {
 
   std::vector<Named> named_ = {};  ///< by name
   std::optional<catalogue::NumberedSpec> numbered_ = std::nullopt;
+  std::optional<catalogue::UnlockSpec> unlock_ = std::nullopt;
   Tables tables_ = {};
-  std::map<Key, Cell> cells_ = {};  ///< by their first register
+  std::multimap<Key, Cell> cells_ = {};  ///< by the first register that writes them
+  unsigned longest_ = 1;                 ///< registers of the longest of them
+  std::vector<Place> consumed_ = {};     ///< what reading clears
 };
 
 }  // namespace spindle::sim

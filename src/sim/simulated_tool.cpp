@@ -30,6 +30,8 @@ bool is_screwdriver(const Profile& profile) {
 }
 
 bool shows_alarm(const Profile& profile) {
+  const auto* start = profile.run ? profile.run->action() : nullptr;
+  if (start != nullptr && !start->alarm.empty()) return true;
   return std::any_of(profile.alarm_lists.begin(), profile.alarm_lists.end(),
                      [](const catalogue::AlarmList& list) { return list.name == "present"; });
 }

@@ -11,6 +11,7 @@ namespace spindle::sim {
 
 using catalogue::EventKind;
 using modbus::ExceptionCode;
+using modbus::FunctionCode;
 using modbus::Pdu;
 using modbus::RegisterTable;
 
@@ -51,25 +52,25 @@ Unit::Answer Unit::respond(const Query& query) {
 
 Unit::Answer Unit::serve(const modbus::ReadRequest& request, const Query& query) {
   if (!bank_.has(request.table)) return tl::unexpected(refusal(ExceptionCode::illegal_function));
-  if (request.count > link_.max_read) {
+  const bool is_bits = modbus::holds_bits(request.table);
+  if (request.count > (is_bits ? link_.max_read_bits : link_.max_read)) {
     return tl::unexpected(refusal(ExceptionCode::illegal_data_value));
   }
   before_read(query.now);
   const auto registers = bank_.read(request.table, request.first.value, request.count);
   if (!registers) return tl::unexpected(refusal(ExceptionCode::illegal_data_address));
-  events_.note_read(request);
+  bank_.note_read(request.table, request.first.value, request.count);
   return modbus::read_response(request.table, *registers);
 }
 
 Unit::Answer Unit::serve(const modbus::WriteSingleRequest& request, const Query& query) {
-  return serve_write(request.address.value, Registers{request.value}, query.pdu, query);
+  return serve_write({request.address, {request.value}, request.table}, query.pdu, query);
 }
 
 Unit::Answer Unit::serve(const modbus::WriteMultipleRequest& request, const Query& query) {
-  if (link_.max_write <= 1) return tl::unexpected(refusal(ExceptionCode::illegal_function));
   const auto count = static_cast<std::uint16_t>(request.values.size());
-  return serve_write(request.first.value, request.values,
-                     modbus::write_multiple_response(request.first, count), query);
+  return serve_write(request, modbus::write_multiple_response(request.first, count, request.table),
+                     query);
 }
 
 Unit::Answer Unit::serve(const modbus::LoopbackRequest& /*request*/, const Query& query) const {
@@ -83,36 +84,55 @@ Unit::Answer Unit::serve(const modbus::ReportServerIdRequest& /*request*/,
   return modbus::report_server_id_response(identity_);
 }
 
-Unit::Answer Unit::serve_write(std::uint16_t first, RegisterView values, Pdu response,
+Unit::Answer Unit::serve_write(const modbus::WriteMultipleRequest& request, Pdu response,
                                const Query& query) {
-  Outcome refused = check_write(first, values.size());
-  if (!refused) refused = write(query.connection, first, values, query.now);
+  Outcome refused = check_write(query.pdu.function, request);
+  if (!refused) refused = write(query.connection, request, query.now);
   if (refused) return tl::unexpected(*refused);
   return response;
 }
 
-Unit::Outcome Unit::check_write(std::uint16_t first, std::size_t count) const {
+/// Whether the product writes holding registers with this function at all.
+bool Unit::writes_with(std::uint8_t function) const {
+  const auto single = static_cast<std::uint8_t>(FunctionCode::write_single_register);
+  if (link_.write_function) return function == *link_.write_function;
+  return function == single || link_.max_write > 1;
+}
+
+Unit::Outcome Unit::check_write(std::uint8_t function,
+                                const modbus::WriteMultipleRequest& request) const {
   constexpr std::size_t addresses = 0x10000;
-  if (count > link_.max_write) return refusal(ExceptionCode::illegal_data_value);
-  if (first + count > addresses) return refusal(ExceptionCode::illegal_data_address);
+  const bool is_holding = request.table == RegisterTable::holding;
+  const bool is_known = bank_.has_cells(request.table) && (!is_holding || writes_with(function));
+  if (!is_known) return refusal(ExceptionCode::illegal_function);
+  const std::size_t most =
+      is_holding ? std::max<std::size_t>(link_.max_write, 1) : modbus::max_write_bits;
+  if (request.values.size() > most) return refusal(ExceptionCode::illegal_data_value);
+  if (request.first.value + request.values.size() > addresses) {
+    return refusal(ExceptionCode::illegal_data_address);
+  }
   return std::nullopt;
 }
 
-Unit::Outcome Unit::write(ConnectionId connection, std::uint16_t first, RegisterView values,
+Unit::Outcome Unit::check(const Change& change) const {
+  if (change.cell == nullptr) return refusal(ExceptionCode::illegal_data_address);
+  if (bank_.is_locked(*change.cell)) return refusal(ExceptionCode::illegal_data_value);
+  if (!change.cell->takes(change.registers)) return Refusal{limit_exception_};
+  return std::nullopt;
+}
+
+Unit::Outcome Unit::write(ConnectionId connection, const modbus::WriteMultipleRequest& request,
                           TimePoint now) {
-  std::vector<std::pair<Place, std::uint32_t>> changes;
-  for (std::size_t i = 0; i < values.size();) {
-    const Cell* cell = bank_.cell_at(RegisterTable::holding, static_cast<std::uint16_t>(first + i));
-    if (cell == nullptr) return refusal(ExceptionCode::illegal_data_address);
-    const std::uint32_t raw = bank_.with_words(*cell, first, values, i);
-    if (!cell->takes(raw)) return Refusal{limit_exception_};
-    changes.emplace_back(cell->place, raw);
+  const auto changes = bank_.changes(request.table, request.first.value, request.values);
+  for (const Change& change : changes) {
+    if (Outcome refused = check(change)) return refused;
   }
   if (!store_.accept()) return std::nullopt;
-  for (const auto& [place, raw] : changes) {
-    store_.store(place, raw, bank_);
-    if (events_.is_arming(place.address)) events_.arm(connection, raw, now);
-    on_write(place, raw, now);
+  for (const auto& [cell, registers] : changes) store_.store(cell->place, registers, bank_);
+  for (const auto& [cell, registers] : changes) {
+    const std::int64_t raw = stored_in(cell->place.encoding, registers);
+    if (events_.is_arming(cell->place)) events_.arm(connection, raw, now);
+    on_write(cell->place, raw, now);
   }
   return std::nullopt;
 }

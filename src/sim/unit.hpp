@@ -71,10 +71,10 @@ class Unit {
   virtual void before_read(TimePoint now) { static_cast<void>(now); }
   /// Some values are written, as many as the device takes. All of them or none, each one whole: a
   /// register alone changes one half of its value.
-  virtual Outcome write(ConnectionId connection, std::uint16_t first, RegisterView values,
+  virtual Outcome write(ConnectionId connection, const modbus::WriteMultipleRequest& request,
                         TimePoint now);
-  /// A value was written and stored.
-  virtual void on_write(const Place& place, std::uint32_t raw, TimePoint now) = 0;
+  /// A value was written and stored; `raw` as stored_in() gives it.
+  virtual void on_write(const Place& place, std::int64_t raw, TimePoint now) = 0;
   /// A request is about to be refused.
   virtual void on_refusal(const Refusal& refused) { static_cast<void>(refused); }
   /// When something will happen by itself, beside what the operator does; and its moment has come.
@@ -102,9 +102,12 @@ class Unit {
   [[nodiscard]] Answer serve(const modbus::LoopbackRequest& request, const Query& query) const;
   [[nodiscard]] Answer serve(const modbus::ReportServerIdRequest& request,
                              const Query& query) const;
-  Answer serve_write(std::uint16_t first, RegisterView values, modbus::Pdu response,
+  Answer serve_write(const modbus::WriteMultipleRequest& request, modbus::Pdu response,
                      const Query& query);
-  [[nodiscard]] Outcome check_write(std::uint16_t first, std::size_t count) const;
+  [[nodiscard]] bool writes_with(std::uint8_t function) const;
+  [[nodiscard]] Outcome check_write(std::uint8_t function,
+                                    const modbus::WriteMultipleRequest& request) const;
+  [[nodiscard]] Outcome check(const Change& change) const;
   void run_down(TimePoint now);
 
   std::uint8_t address_;

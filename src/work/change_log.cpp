@@ -8,14 +8,25 @@
 
 namespace spindle::work {
 
+namespace {
+
+/// Of what is no number its text; nothing where there is no value.
+std::optional<files::LoggedValue> logged_value(const catalogue::Value& value) {
+  if (value.is_number()) return value.number;
+  if (value.content == catalogue::Content::none) return std::nullopt;
+  return value.exact();
+}
+
+}  // namespace
+
 LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
                     const catalogue::Value& after, std::string_view result) {
   LoggedChange change{.name = parameter.name,
                       .register_address = parameter.address.value,
                       .result = std::string(result)};
   if (parameter.secrecy == catalogue::Secrecy::secret) return change;
-  change.old_value = before.number;
-  change.new_value = after.number;
+  change.old_value = logged_value(before);
+  change.new_value = logged_value(after);
   return change;
 }
 

@@ -30,7 +30,7 @@ Parameter low_half(Parameter parameter) {
 
 /// Whether the upper half of a pair is 0 with this value.
 bool is_small(const Parameter& parameter, const Value& value) {
-  const auto registers = catalogue::encode(parameter, value.number);
+  const auto registers = catalogue::encode(parameter, value);
   return registers && registers->size() == 2 && registers->front() == 0;
 }
 

@@ -23,11 +23,17 @@ std::vector<link::SpontaneousShape> unasked_shapes(const Environment& environmen
   return shapes;
 }
 
+/// What the command line says goes before what is said of the tool.
+template <typename T>
+std::optional<T> first_of(const std::optional<T>& one, const std::optional<T>& other) {
+  return one ? one : other;
+}
+
 device::LinkOptions link_options(const Target& target, const catalogue::Profile& profile,
                                  const Environment& environment) {
-  return {.answer_timeout = environment.common.timeout,
+  return {.answer_timeout = first_of(environment.common.timeout, target.endpoint.timeout),
           .connect_timeout = environment.common.connect_timeout,
-          .retries = environment.common.retries,
+          .retries = first_of(environment.common.retries, target.endpoint.retries),
           .trace = make_trace(target.shown, device::framing_of(target.endpoint, profile.link),
                               environment),
           .shown = target.shown,

@@ -34,7 +34,7 @@ Result<Setting> parse_setting(std::string_view option, const Parameter& paramete
   if (!unit.empty() && text.size() > unit.size() && text.ends_with(unit)) {
     text.remove_suffix(unit.size());
   }
-  auto value = catalogue::parse_value(parameter, text);
+  auto value = catalogue::parse_exact_value(parameter, text);
   if (!value) {
     value.error().name = option;
     return tl::unexpected(std::move(value.error()));

@@ -13,16 +13,6 @@ using catalogue::Missing;
 /// Longer names are cut; file systems end at 255 bytes.
 constexpr std::size_t longest_name = 100;
 
-std::optional<catalogue::SnapshotIdentity> identity_of(const device::Device& device) {
-  const auto& identity = device.identity();
-  if (!identity) return std::nullopt;
-  return catalogue::SnapshotIdentity{.model = identity->tool_model,
-                                     .model_code = identity->tool_model_code,
-                                     .serial = identity->serial,
-                                     .firmware = identity->firmware,
-                                     .raw = identity->raw};
-}
-
 std::optional<Decimal> number_of(const std::optional<catalogue::Value>& value) {
   return value ? std::optional(value->number) : std::nullopt;
 }
@@ -31,9 +21,19 @@ bool is_absent(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
 
-/// Sorts one reading into values, holes and troubles.
-void add(const device::Reading& reading, const Target& target, Secrets secrets,
-         ToolSnapshot& taken) {
+/// What a value counts in where its scale stands in another register: another tool may have
+/// another scale there.
+constexpr std::string_view steps = "steps";
+
+/// Sorts one reading into values, holes and troubles. A value whose scale stands in another
+/// register is kept as it is stored.
+void add(device::Reading reading, const catalogue::Parameter& stored, const Target& target,
+         Secrets secrets, ToolSnapshot& taken) {
+  if (!stored.scale_by.empty() && reading.registers) {
+    reading.parameter = stored;
+    reading.parameter.unit = steps;
+    reading.value = decode(stored, *reading.registers);
+  }
   const bool is_secret = reading.parameter.secrecy == catalogue::Secrecy::secret;
   if (is_secret && secrets == Secrets::leave_out) {
     taken.snapshot.missing.push_back({reading.parameter, Missing::left_out});
@@ -56,6 +56,16 @@ void add(const device::Reading& reading, const Target& target, Secrets secrets,
 
 }  // namespace
 
+std::optional<catalogue::SnapshotIdentity> identity_of(const device::Device& device) {
+  const auto& identity = device.identity();
+  if (!identity) return std::nullopt;
+  return catalogue::SnapshotIdentity{.model = identity->tool_model,
+                                     .model_code = identity->tool_model_code,
+                                     .serial = identity->serial,
+                                     .firmware = identity->firmware,
+                                     .raw = identity->raw};
+}
+
 std::string unit_of(const catalogue::Parameter& parameter, const Target& target) {
   return parameter.unit == catalogue::torque_unit ? target.torque_unit : parameter.unit.to_string();
 }
@@ -73,7 +83,9 @@ Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Enviro
                                   .fingerprint = catalogue::fingerprint(stored),
                                   .identity = identity_of(tool.device)}};
   taken.snapshot.entries.reserve(readings->size());
-  for (const device::Reading& reading : *readings) add(reading, tool.target, secrets, taken);
+  for (std::size_t i = 0; i < readings->size(); ++i) {
+    add((*readings)[i], stored[i], tool.target, secrets, taken);
+  }
   return taken;
 }
 

@@ -50,6 +50,9 @@ Result<Target> target_of_tool(const files::Tool& tool, const Environment& enviro
     return target;
   }
   target->shown = tool.name;
+  if (tool.timeout) target->endpoint.timeout = tool.timeout;
+  if (tool.gap) target->endpoint.gap = tool.gap;
+  if (tool.retries) target->endpoint.retries = tool.retries;
   if (environment.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
   target->torque_unit = tool.torque_unit;
   target->verified = tool.verified;

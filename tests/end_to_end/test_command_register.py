@@ -68,7 +68,12 @@ class Line(support.SimulatedLine):
         return ["remote-start", self.url, "--profile", str(self.profile), "--yes", *self.drive.speed, *options]
 
     def values(self, *names):
-        finished = support.run("get", self.url, "--profile", str(self.profile), *names, "--json")
+        """Read as soon as the guardian has left the line."""
+        def read():
+            finished = support.run("get", self.url, "--profile", str(self.profile), *names, "--json")
+            return None if "in use by guardian" in finished.stderr else finished
+
+        finished = support.wait_until(read, "the guardian leaves the line")
         if finished.status != 0:
             raise AssertionError(finished)
         return {record["name"]: record["label"] or record["value"] for record in finished.records("value")}

@@ -42,5 +42,5 @@ TEST_CASE("what an action writes over a secret is not recorded") {
   CHECK_FALSE(work::logged(*secret).new_value.has_value());
   const auto open = work::parse_action("select=3", secretive());
   REQUIRE(open);
-  CHECK(work::logged(*open).new_value == Decimal(3));
+  CHECK(work::logged(*open).new_value == files::LoggedValue(Decimal(3)));
 }

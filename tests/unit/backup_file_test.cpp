@@ -314,7 +314,7 @@ TEST_CASE("every fault has its place and its words") {
        "b.yaml:12:56: preset.1.target-torque: 999999 is above 655.35, the "
        "most that u16 can hold"},
       {value, "raw: 65536", "b.yaml:12:54: '65536' is not a whole number from 0 to 65535"},
-      {value, "raw: []", "b.yaml:12:54: a value has one or 2 registers"},
+      {value, "raw: []", "b.yaml:12:54: a value has 1 to 125 registers"},
       {value, "raw: [1, 2]", "b.yaml:12:54: preset.1.target-torque: 2 registers, but u16 has 1"},
       {"raw: 7, value: 7", "unit: rpm", "b.yaml:13:5: neither 'value' nor 'raw' is given"},
       {"name: p300", "name: p999",

@@ -66,7 +66,7 @@ TEST_CASE("blv: histories end where the notes say") {
 TEST_CASE("blv: every value is a pair at an even address, inside the map") {
   for (const Parameter& parameter : blv().parameters) {
     CAPTURE(parameter.name);
-    CHECK(catalogue::register_count(parameter.encoding.kind) == 2);
+    CHECK(catalogue::register_count(parameter.encoding) == 2);
     CHECK(parameter.address.value % 2 == 0);
     CHECK(parameter.address.value < 0x2000);
     CHECK_FALSE(parameter.source.empty());
@@ -76,10 +76,12 @@ TEST_CASE("blv: every value is a pair at an even address, inside the map") {
 TEST_CASE("blv: speeds from 1 to 79 do not exist") {
   const auto speed = blv().find("operation.2.speed").value();
   for (const char* good : {"0", "80", "4000"}) CHECK(catalogue::parse_value(speed, good));
-  for (const char* bad : {"-1", "1", "79", "4001", "100.5"}) {
+  for (const char* bad : {"-1", "1", "79", "4001"}) {
     CHECK_FALSE(catalogue::parse_value(speed, bad));
   }
-  CHECK(catalogue::encode(speed, Decimal(1000)) == Registers{0, 1000});
+  CHECK(catalogue::parse_value(speed, "100.5")->number == Decimal(101));
+  CHECK_FALSE(catalogue::parse_exact_value(speed, "100.5"));
+  CHECK(catalogue::encode(speed, {Decimal(1000)}) == Registers{0, 1000});
 }
 
 TEST_CASE("blv: when values take effect") {
@@ -221,7 +223,7 @@ TEST_CASE("blv: maintenance commands are edges on their odd registers") {
   }
   CHECK(profile.find_action("alarm-reset")->prepare->clear == 0x18);
   CHECK(profile.find_action("initialize-all")->hazard == catalogue::Hazard::link);
-  CHECK(profile.find_action("group")->kind == catalogue::Kind::i32);
+  CHECK(profile.find_action("group")->encoding.kind == catalogue::Kind::i32);
 }
 
 TEST_CASE("blv: codes have texts, and alarms say whether they can be reset") {

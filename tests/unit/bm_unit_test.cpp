@@ -542,7 +542,7 @@ TEST_CASE("the shipped profiles make tools that answer for all they name") {
     for (const catalogue::Parameter& parameter : profile->parameters) {
       CAPTURE(parameter.name);
       const Pdu request = modbus::read_request(parameter.table, parameter.address,
-                                               catalogue::register_count(parameter.encoding.kind));
+                                               catalogue::register_count(parameter.encoding));
       CHECK(modbus::fit(request, ask(request, start_time)) == modbus::Fit::answer);
     }
     const catalogue::Action begin = profile->find_action("start").value();

@@ -221,6 +221,14 @@ TEST_CASE("the fewest requests") {
        singles(holding, 8, 13) + Ranges{{holding, 14, 2}},
        {.max_read = 10, .absent = {{holding, 9, 2}, {holding, 11, 2}, {holding, 15, 2}}},
        {{holding, 8, 1}, {holding, 9, 2}, {holding, 11, 2}, {holding, 13, 1}, {holding, 14, 2}}},
+      {"a gap that is short enough",
+       {{holding, 1, 1}, {holding, 6, 1}, {holding, 12, 1}},
+       {.max_read = 20, .max_gap = 4},
+       {{holding, 1, 6}, {holding, 12, 1}}},
+      {"a gap that is short enough, with a hole",
+       {{holding, 1, 1}, {holding, 6, 1}},
+       {.max_read = 20, .max_gap = 4, .absent = {{holding, 3, 1}, {input, 2, 9}}},
+       {{holding, 1, 1}, {holding, 6, 1}}},
       {"pieces of the forbidden shape",
        {{input, 0, 28}},
        {.max_read = 14, .forbidden_shapes = {RegisterRange{input, 0, 14}}},
@@ -498,8 +506,28 @@ TEST_CASE("a block that is refused because of what it reads along is read withou
   check_values(*image, {holding, 9, 1});
 }
 
+TEST_CASE("a block that is refused with 03 or 04 is asked for in parts") {
+  for (const std::uint8_t code : hex("03 04")) {
+    CAPTURE(code);
+    Bench bench({.max_read = 10});
+    bench.server.trouble = {{15, code}};
+    const auto image = bench.client.read_each(singles(holding, 0, 29));
+    REQUIRE(image);
+    CHECK(bench.server.reads.size() == 9);
+    for (std::uint16_t at = 0; at < 30; ++at) {
+      CAPTURE(at);
+      const auto value = image->get({holding, at, 1});
+      CHECK(value.has_value() == (at != 15));
+      if (!value) CHECK(value.error().exception == code);
+    }
+    // Only what does not exist (02) is remembered.
+    bench.server.trouble.clear();
+    CHECK(bench.client.read_each({{holding, 15, 1}})->get({holding, 15, 1}).has_value());
+  }
+}
+
 TEST_CASE("other exceptions stand at the registers of their request, with the code as received") {
-  for (const std::uint8_t code : hex("01 03 04 06 07 0C 0E FF")) {
+  for (const std::uint8_t code : hex("01 06 07 0C 0E FF")) {
     CAPTURE(code);
     Bench bench({.max_read = 10});
     bench.server.trouble = {{15, code}};
@@ -685,9 +713,10 @@ TEST_CASE("a write is sent once, whatever comes of it") {
     CAPTURE(row.what);
     Bench bench({}, 5);
     bench.script.on_request(row.reaction);
-    const auto written = row.what == "refused, ten registers"
-                             ? bench.client.write({0x0480}, RegisterView(Registers(10)))
-                             : bench.client.write({2}, std::uint16_t{271});
+    const auto written =
+        row.what == "refused, ten registers"
+            ? bench.client.write(modbus::write_request({0x0480}, RegisterView(Registers(10))))
+            : bench.client.write(modbus::write_request({2}, std::uint16_t{271}));
     REQUIRE_FALSE(written);
     CHECK(written.error().code == row.code);
     CHECK(bench.script.sent.size() == 1);
@@ -696,11 +725,11 @@ TEST_CASE("a write is sent once, whatever comes of it") {
 
 TEST_CASE("writes go out as FC 06 and FC 10h") {
   Bench bench;
-  CHECK(bench.client.write({4002}, std::uint16_t{1}));
+  CHECK(bench.client.write(modbus::write_request({4002}, std::uint16_t{1})));
   bench.script.on_request(
       test::answer(Framing::tcp, 1ms, modbus::write_multiple_response({0x0480}, 2)));
   const Registers two{0, 100};
-  CHECK(bench.client.write({0x0480}, RegisterView(two)));
+  CHECK(bench.client.write(modbus::write_request({0x0480}, RegisterView(two))));
   CHECK(bench.script.sent[0].bytes == hex("8000 0000 0006 00 06 0FA2 0001"));
   CHECK(bench.script.sent[1].bytes == hex("8001 0000 000B 00 10 0480 0002 04 0000 0064"));
 }

@@ -118,10 +118,16 @@ TEST_CASE("complete: a group is offered where several tools make sense") {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@line1", "@single"});
   }
-  for (const char* command : {"list", "remote-start", "scan"}) {
+  for (const char* command : {"list", "remote-start", "scan", "dump"}) {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@single"});
   }
+}
+
+TEST_CASE("complete: tables of registers, and how they are numbered") {
+  CHECK(texts({"scan", "station3", "--table", ""}) == modbus::table_words.words());
+  CHECK(texts({"profile", "new", "x", "--numbering", ""}) == Words{"address", "modicon"});
+  CHECK(texts({"profile", "new", ""}).empty());
 }
 
 TEST_CASE("complete: many names are offered head by head") {

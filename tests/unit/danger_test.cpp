@@ -2,6 +2,7 @@
 
 #include <doctest/doctest.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -164,14 +165,54 @@ TEST_CASE("a motion without an end") {
   CHECK_FALSE(moves_without_end(stop));
 }
 
-TEST_CASE("of the shipped profiles, only the word that runs a motor is left out of backups") {
+TEST_CASE("of the shipped profiles, only the words that run a motor are left out of backups") {
+  const std::set<std::string> commands = {"command.driver-input", "command.input", "command",
+                                          "command.stop-operation"};
   const files::ProfileStore store({SPINDLE_SOURCE_DIR "/profiles"}, posix::source_disk());
   for (const files::ProfileEntry& entry : store.list()) {
     const Profile profile = store.load(entry.id).value();
     for (const Parameter& one : profile.parameters) {
       if (one.access == Access::read_only) continue;
       CAPTURE(one.name);
-      CHECK(danger_of(one, profile).has_value() == (one.name == "command.driver-input"));
+      CHECK(danger_of(one, profile).has_value() == commands.contains(one.name));
     }
+  }
+}
+
+TEST_CASE("a write elsewhere is as dangerous as what stands there") {
+  Profile profile;
+  profile.actions = {action("go", 20, Hazard::moves)};
+  Parameter around = parameter("around", 3);
+  around.write_address = modbus::RegisterAddress{20};
+  Parameter eraser = parameter("eraser", 7);
+  eraser.write_address = modbus::RegisterAddress{32};
+  eraser.hazard = Hazard::erases;
+  profile.parameters = {around, eraser, parameter("harmless", 8)};
+  CHECK(danger_of(around, profile)->hazard == Hazard::moves);
+  CHECK(danger_of(parameter("@holding:32", 32), profile)->hazard == Hazard::erases);
+  CHECK(danger_of(parameter("@holding:7", 7), profile)->hazard == Hazard::erases);
+  CHECK(names_of(stored_parameters(profile)) == std::vector<std::string>{"harmless"});
+}
+
+TEST_CASE("parts of one long value are all stored, each once") {
+  Profile profile;
+  const auto part = [](std::string name, std::uint8_t first, std::uint8_t width) {
+    Parameter made = parameter(std::move(name), 10, Kind::u32);
+    made.encoding.slice = {first, width};
+    return made;
+  };
+  profile.parameters = {part("low", 0, 8), part("high", 16, 8), part("middle", 8, 8),
+                        part("again", 20, 2), part("end", 24, 8)};
+  CHECK(names_of(stored_parameters(profile)) ==
+        std::vector<std::string>{"low", "high", "middle", "end"});
+}
+
+TEST_CASE("a secret is stored under no other name in the open") {
+  Profile profile;
+  Parameter pin = parameter("pin", 41);
+  pin.secrecy = Secrecy::secret;
+  profile.parameters = {parameter("wide", 40, Kind::u32), pin};
+  for (const Parameter& stored : stored_parameters(profile)) {
+    CHECK(stored.secrecy == Secrecy::secret);
   }
 }

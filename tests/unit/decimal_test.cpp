@@ -37,6 +37,8 @@ TEST_CASE("decimals are read exactly and keep their number of decimals") {
            Case{"000000000000000000001", 1, 0, "1"},
            Case{"999999999999999999", 999999999999999999, 0, "999999999999999999"},
            Case{"0.000000000000000001", 1, -18, "0.000000000000000001"},
+           Case{"100000000000000000000", 1, 20, "100000000000000000000"},
+           Case{"0.0000000000000000000001", 1, -22, "0.0000000000000000000001"},
        }) {
     const auto& [text, mantissa, exponent, shown] = row;
     CAPTURE(row.text);
@@ -51,7 +53,7 @@ TEST_CASE("decimals are read exactly and keep their number of decimals") {
 TEST_CASE("what is not a plain decimal number is rejected") {
   for (const std::string_view text :
        {"", "-", "+", ".", "-.", "1.", "+-1", "--1", "1e3", "0x1", "1,5", " 1", "1 ", "1.2.3", "1-",
-        "nan", "1000000000000000000", "1.000000000000000000", "0.0000000000000000001"}) {
+        "nan", "18446744073709551616", "-18446744073709551616", "1844674407370955161.60"}) {
     CAPTURE(text);
     CHECK_FALSE(Decimal::parse(text));
   }
@@ -128,8 +130,10 @@ TEST_CASE("products are exact or absent") {
   REQUIRE(product);
   CHECK(product->to_string() == "2.71");
   CHECK(Decimal(-3, 2).times(Decimal(25, -1)) == Decimal(-750));
-  CHECK_FALSE(Decimal(largest).times(Decimal(2)));
-  CHECK_FALSE(Decimal(smallest).times(Decimal(-1)));
+  CHECK(Decimal(largest).times(Decimal(2))->to_string() == "18446744073709551614");
+  CHECK_FALSE(Decimal(largest).times(Decimal(3)));
+  CHECK(Decimal(smallest).times(Decimal(-1))->to_string() == "9223372036854775808");
+  CHECK_FALSE(Decimal(smallest).times(Decimal(-2)));
   CHECK_FALSE(Decimal(1, steepest).times(Decimal(1, 1)));
 }
 
@@ -170,5 +174,48 @@ TEST_CASE("a quotient is the whole number of steps, or absent") {
     CAPTURE(row.value.mantissa());
     CAPTURE(row.unit.mantissa());
     CHECK(value.divided_by(unit) == steps);
+  }
+}
+
+TEST_CASE("unsigned numbers of 64 bits are read, compared and shown whole") {
+  const auto most = Decimal::parse("18446744073709551615");
+  REQUIRE(most);
+  CHECK(most->magnitude() == std::numeric_limits<std::uint64_t>::max());
+  CHECK(most->to_string() == "18446744073709551615");
+  CHECK(most->mantissa() == largest);
+  CHECK(most->negated().to_string() == "-18446744073709551615");
+  CHECK(most->negated().mantissa() == smallest);
+  CHECK(Decimal(largest) < *most);
+  CHECK(most->negated() < Decimal(smallest));
+  CHECK(Decimal(1844674407370955161, 1) < *most);
+  CHECK(Decimal(1844674407370955162, 1) > *most);
+  CHECK_FALSE(most->plus(Decimal(1)));
+  CHECK(most->plus(Decimal(-1))->to_string() == "18446744073709551614");
+}
+
+TEST_CASE("sums are exact") {
+  CHECK(Decimal(271, -2).plus(Decimal(-4, 1))->to_string() == "-37.29");
+  CHECK(Decimal(5, -1).plus(Decimal(5, -1))->to_string() == "1.0");
+  CHECK(Decimal(-5, -1).plus(Decimal(5, -1))->to_string() == "0.0");
+  CHECK(Decimal(7).plus(Decimal(0, 3))->to_string() == "7");
+  CHECK(Decimal(7).plus(Decimal(0, -2))->to_string() == "7.00");
+  CHECK_FALSE(Decimal(1, 30).plus(Decimal(1)));
+}
+
+TEST_CASE("rounding keeps the nearest number, and takes a half away from zero") {
+  struct Case {
+    Decimal number;
+    int decimals;
+    std::string_view shown;
+  };
+  for (const Case& row :
+       {Case{Decimal(2715, -3), 2, "2.72"}, Case{Decimal(-2715, -3), 2, "-2.72"},
+        Case{Decimal(2714, -3), 2, "2.71"}, Case{Decimal(4, -1), 0, "0"},
+        Case{Decimal(5, -1), 0, "1"}, Case{Decimal(-4, -1), 0, "0"},
+        Case{Decimal(5, -30), 2, "0.00"},
+        Case{Decimal(99, -30), 29, "0.00000000000000000000000000010"}, Case{Decimal(2), 2, "2.00"},
+        Case{Decimal(2, 3), 1, "2000.0"}, Case{Decimal(1, 25), 1, "10000000000000000000000000"}}) {
+    CAPTURE(row.shown);
+    CHECK(row.number.with_decimals(row.decimals).to_string() == row.shown);
   }
 }

@@ -540,3 +540,28 @@ TEST_CASE("how a line is talked on follows the address, and the profile where it
   CHECK(unknown.gap == 5250us);
   CHECK(options_for("rtu:///d", Profile()).gap == 3 * 4010416ns);
 }
+
+TEST_CASE("a broadcast goes where a write goes, by the same functions") {
+  test::ScriptedDevice peer;
+  Profile profile = drive();
+  profile.link.write_function = 16;
+  auto device = peer.open("rtu:///d?unit=0", profile).value();
+  device.use(profile, {});
+  catalogue::Parameter lamp;
+  lamp.name = "lamp";
+  lamp.table = modbus::RegisterTable::coil;
+  lamp.address = {5};
+  lamp.encoding.kind = catalogue::Kind::bit;
+  catalogue::Parameter speed;
+  speed.name = "speed";
+  speed.address = {92};
+  speed.write_address = modbus::RegisterAddress{93};
+  REQUIRE(device.broadcast(lamp, {Decimal(1)}));
+  REQUIRE(device.broadcast(speed, {Decimal(7)}));
+  REQUIRE(peer.script.sent.size() == 2);
+  const auto without_checksum = [](const Bytes& bytes) {
+    return Bytes(bytes.begin(), bytes.end() - 2);
+  };
+  CHECK(without_checksum(peer.script.sent[0].bytes) == Bytes{0, 0x05, 0, 5, 0xFF, 0});
+  CHECK(without_checksum(peer.script.sent[1].bytes) == Bytes{0, 0x10, 0, 93, 0, 1, 2, 0, 7});
+}

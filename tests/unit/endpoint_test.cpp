@@ -142,18 +142,23 @@ std::vector<Bad> bad_urls() {
       {"tcp://h?unit=", "unit=: unit is a number from 0 to 255"},
       {"tcp://h?unit=-1", "unit=-1: unit is a number from 0 to 255"},
       {"tcp://h?unit=1?unit=2", "unit=1?unit=2: unit is a number from 0 to 255"},
-      {"rtu:///d?unit=248", "unit=248: unit is a number from 0 to 247"},
-      {"rtu+tcp://h:1?unit=248", "unit=248: unit is a number from 0 to 247"},
+      {"rtu:///d?unit=248", "unit=248: unit is a number from 0 to 247",
+       "units from 248 are reserved; with &reserved=true they are asked"},
+      {"rtu+tcp://h:1?unit=255&reserved=false", "unit=255: unit is a number from 0 to 247",
+       "units from 248 are reserved; with &reserved=true they are asked"},
+      {"tcp://h?unit=250&reserved=true", "unknown option 'reserved'"},
       {"tcp://h?unit", "'unit' has no value"},
       {"tcp://h?unit=1&unit=1", "'unit' is given twice"},
       {"rtu:///d?baud=9600&unit=1&baud=9600", "'baud' is given twice"},
       {"tcp://h?unti=1", "unknown option 'unti'", "did you mean 'unit'?"},
-      {"tcp://h?speed=1", "unknown option 'speed'", "here there is unit"},
-      {"tcp://h?baud=9600", "unknown option 'baud'", "here there is unit"},
-      {"sim:doga-bm?parity=even", "unknown option 'parity'", "here there is unit, baud"},
+      {"tcp://h?speed=1", "unknown option 'speed'", "here there is unit, timeout, retries"},
+      {"tcp://h?baud=9600", "unknown option 'baud'", "here there is unit, timeout, retries"},
+      {"sim:doga-bm?parity=even", "unknown option 'parity'",
+       "here there is unit, baud, timeout, retries"},
       {"rtu+tcp://h:1?stop=1", "unknown option 'stop'"},
-      {"rtu+tcp://h:1?rs485=true", "unknown option 'rs485'", "here there is unit, baud, gap, echo"},
-      {"tcp://h?gap=5ms", "unknown option 'gap'", "here there is unit"},
+      {"rtu+tcp://h:1?rs485=true", "unknown option 'rs485'",
+       "here there is unit, reserved, baud, gap, timeout, retries, echo"},
+      {"tcp://h?gap=5ms", "unknown option 'gap'", "here there is unit, timeout, retries"},
       {"sim:doga-bm?echo=true", "unknown option 'echo'"},
       {"rtu:///d?gap=5", "gap=5: gap is a time up to 1s"},
       {"rtu:///d?gap=", "gap=: gap is a time up to 1s"},
@@ -165,7 +170,7 @@ std::vector<Bad> bad_urls() {
       {"rtu:///d?echo=on", "echo=on: echo is true, false or auto"},
       {"rtu:///d?ehco=true", "unknown option 'ehco'", "did you mean 'echo'?"},
       {"rtu:///d?rate=9600", "unknown option 'rate'",
-       "here there is unit, baud, parity, stop, gap, rs485, echo"},
+       "here there is unit, reserved, baud, parity, stop, gap, timeout, retries, rs485, echo"},
       {"tcp://h?unit=1&", "unknown option ''"},
       {"tcp://h?&", "unknown option ''"},
       {"tcp://h?=1", "unknown option ''"},
@@ -266,7 +271,8 @@ TEST_CASE("a URL is told from a name") {
 TEST_CASE("a network endpoint becomes a URL again") {
   for (const std::string_view url :
        {"tcp://station3:5000", "tcp://[::1]:5000", "tcp://10.0.0.7:502?unit=3", "tcp://station3",
-        "rtu+tcp://gateway:4001", "rtu+tcp://[fe80::1%eth0]:4001?unit=31"}) {
+        "rtu+tcp://gateway:4001", "rtu+tcp://[fe80::1%eth0]:4001?unit=31",
+        "rtu+tcp://gateway:4001?unit=250&reserved=true"}) {
     CAPTURE(url);
     CHECK(to_url(parse_endpoint(url).value()) == url);
   }

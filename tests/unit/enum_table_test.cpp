@@ -62,7 +62,7 @@ TEST_CASE("the words of the catalogue are those of profiles and records") {
   using namespace catalogue;
   CHECK(to_text(EventKind::fastening_ng) == "fastening-ng");
   CHECK(event_kind_words.find("Error") == std::nullopt);
-  CHECK(kind_words.find("f32") == std::nullopt);
+  CHECK(kind_words.find("f16") == std::nullopt);
   CHECK(evidence_words.find("rumour") == std::nullopt);
   CHECK(to_text(Access::read_write) == "rw");
   CHECK(to_text(modbus::RegisterTable::input) == "input");

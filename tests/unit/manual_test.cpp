@@ -57,6 +57,7 @@ std::vector<test::Placeholder> all_placeholders() {
   placeholders.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
   placeholders.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
   placeholders.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
+  placeholders.push_back(example("EXAMPLE_ENCODINGS", "any-device.yaml"));
   return placeholders;
 }
 
@@ -217,7 +218,8 @@ TEST_CASE("manual: every key of every kind of file is explained") {
   const std::pair<std::vector<files::KeyList>, const char*> kinds[] = {
       {files::profile_keys(), "spindle-profile.5"},
       {files::tools_keys(), "spindle-tools.5"},
-      {files::backup_keys(), "spindle-backup.5"}};
+      {files::backup_keys(), "spindle-backup.5"},
+      {files::dump_keys(), "spindle-backup.5"}};
   for (const auto& [lists, name] : kinds) {
     // Of the list of keys itself there is no more than the keys.
     const std::string page = read(manual / (std::string(name) + ".in"));
@@ -252,7 +254,7 @@ TEST_CASE("manual: the words of a profile are explained") {
 
 TEST_CASE("manual: the examples of files are valid") {
   const files::ProfileStore store({(root / "profiles").string()}, posix::source_disk());
-  for (const char* name : {"my-driver.yaml", "bm-line1.yaml"}) {
+  for (const char* name : {"my-driver.yaml", "any-device.yaml", "bm-line1.yaml"}) {
     CAPTURE(name);
     const auto findings = store.check((manual / "examples" / name).string());
     REQUIRE(findings.has_value());

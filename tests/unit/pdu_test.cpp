@@ -86,7 +86,7 @@ TEST_CASE("a server refuses what it does not understand") {
   const auto function = ExceptionCode::illegal_function;
   const auto value = ExceptionCode::illegal_data_value;
   for (const auto& row : {
-           Case{"01 0000 0001", function},
+           Case{"07 0000 0001", function},
            Case{"17 0000 0001 0000 0001 02 0000", function},
            Case{"83 02", function},
            Case{"00", function},
@@ -256,4 +256,63 @@ TEST_CASE("a frame is explained with all that is in it") {
     CHECK(explain_response(pdu) ==
           fmt::format("function {:02X}, data {}", pdu.function, to_hex(pdu.data)));
   }
+}
+
+TEST_CASE("coils and discrete inputs have the bytes of the standard") {
+  // 1.1b3, sections 6.1, 6.2, 6.5 and 6.11
+  CHECK(read_request(RegisterTable::coil, {0x0013}, 0x13) == pdu("01 0013 0013"));
+  CHECK(read_request(RegisterTable::discrete, {0x00C4}, 0x16) == pdu("02 00C4 0016"));
+  CHECK(write_coil_request({0x00AC}, 1) == pdu("05 00AC FF00"));
+  CHECK(write_coil_request({0x00AC}, 0) == pdu("05 00AC 0000"));
+  CHECK(write_coils_request({0x0013}, Registers{1, 0, 1, 1, 0, 0, 1, 1, 1, 0}) ==
+        pdu("0F 0013 000A 02 CD01"));
+  CHECK(write_multiple_response({0x0013}, 10, RegisterTable::coil) == pdu("0F 0013 000A"));
+
+  const Pdu request = read_request(RegisterTable::coil, {0x0013}, 0x13);
+  const Pdu response = pdu("01 03 CD6B05");
+  CHECK(fit(request, response) == Fit::answer);
+  const Registers coils = registers_of(request, response);
+  CHECK(coils == Registers{1, 0, 1, 1, 0, 0, 1, 1, 1, 1, 0, 1, 0, 1, 1, 0, 1, 0, 1});
+  CHECK(read_response(RegisterTable::coil, coils) == response);
+  for (const char* other : {"01 02 CD6B", "01 04 CD6B0500", "01 03 CD6B", "01", "02 03 CD6B05"}) {
+    CAPTURE(std::string(other));
+    CHECK(fit(request, pdu(other)) != Fit::answer);
+  }
+  CHECK(describe_request(request) == "read 19 coils from 19");
+  CHECK(describe_request(read_request(RegisterTable::discrete, {7}, 1)) ==
+        "read 1 discrete input from 7");
+  CHECK(explain_request(write_coil_request({5}, 1)) == "write 1 to coil 5");
+  CHECK(explain_request(write_coils_request({5}, Registers{1, 0})) ==
+        "write 1 0 to 2 coils from 5");
+  CHECK(explain_response(pdu("05 0005 FF00")) == "wrote 1 to coil 5");
+  CHECK(explain_response(response) ==
+        "bits, the first one on the right: 00000101 01101011 11001101");
+}
+
+TEST_CASE("a server refuses requests for coils that the standard does not have") {
+  struct Case {
+    const char* request;
+    ExceptionCode code;
+  };
+  for (const Case& row : {Case{"01 0000 0000", ExceptionCode::illegal_data_value},
+                          Case{"01 0000 07D1", ExceptionCode::illegal_data_value},
+                          Case{"01 0000", ExceptionCode::illegal_data_value},
+                          Case{"05 0000 0001", ExceptionCode::illegal_data_value},
+                          Case{"05 0000 FF", ExceptionCode::illegal_data_value},
+                          Case{"0F 0000 000A 01 FF", ExceptionCode::illegal_data_value},
+                          Case{"0F 0000 000A 02 FF", ExceptionCode::illegal_data_value},
+                          Case{"0F 0000 0000 00", ExceptionCode::illegal_data_value},
+                          Case{"0F 0000 07B1 00", ExceptionCode::illegal_data_value}}) {
+    CAPTURE(std::string(row.request));
+    const auto parsed = parse_request(pdu(row.request));
+    REQUIRE_FALSE(parsed);
+    CHECK(parsed.error() == row.code);
+  }
+  const auto most = parse_request(read_request(RegisterTable::discrete, {0}, 2000));
+  REQUIRE(most);
+  CHECK(std::get<ReadRequest>(*most).table == RegisterTable::discrete);
+  const auto coil = parse_request(write_coil_request({9}, 1));
+  REQUIRE(coil);
+  CHECK(std::get<WriteSingleRequest>(*coil).table == RegisterTable::coil);
+  CHECK(std::get<WriteSingleRequest>(*coil).value == 1);
 }

@@ -189,7 +189,8 @@ TEST_CASE("several faults are all reported, in the order of the file") {
                      "7:5: key 'access' is missing",
                      "7:5: key 'evidence' is missing",
                      "7:5: key 'source' is missing",
-                     "7:38: unknown encoding 'u17'; known: u16, i16, u32, i32",
+                     "7:38: unknown encoding 'u17'; known: u16, i16, u32, i32, u64, i64, u8, i8, "
+                     "f32, f64, bcd, text, bit, date",
                  });
   const auto profile = shipped().load(path);
   REQUIRE_FALSE(profile.has_value());
@@ -235,7 +236,8 @@ TEST_CASE("rules are checked too where other entries could not be read, and find
         std::vector<std::string>{
             "2:5: id 'other' differs from the file name 'many'",
             "4:32: max-read must be 1 to 125",
-            "6:38: unknown encoding 'u17'; known: u16, i16, u32, i32",
+            "6:38: unknown encoding 'u17'; known: u16, i16, u32, i32, u64, i64, u8, i8, f32, f64, "
+            "bcd, text, bit, date",
             "8:25: c shares register 1 with b; write 'overlaps: true' if this is meant",
             "9:5: key 'register' is missing",
             "12:56: go: it moves, and no 'run' of this profile guards it",
@@ -534,7 +536,8 @@ TEST_CASE("doga-bm: actions weaker than the manual say how to verify them") {
     CHECK(action->evidence == row.evidence);
     CHECK(action->confirm == row.confirm);
     CHECK(action->check.empty() == (row.evidence == Evidence::manual));
-    CHECK_FALSE(profile.writable(action->address));  // raw writes stay away
+    CHECK_FALSE(
+        profile.writable(modbus::RegisterTable::holding, action->address));  // raw writes stay away
   }
   CHECK(profile.find_action("alarm-reset")->confirm_value == 0);
   CHECK(profile.find_action("start")->stop_value == 0);

@@ -137,8 +137,9 @@ TEST_CASE("parse_raw_register: what is none") {
   CHECK_FALSE(parse_raw_register("holding:2").has_value());
   CHECK_FALSE(parse_raw_register("").has_value());
   for (const char* text :
-       {"@", "@holding", "@holding:", "@coil:1", "@holding:65536", "@holding:-1", "@holding:2/",
-        "@holding:2/f32", "@holding:2/i16/u16", "@:2", "@holding: 2", "@input:65535/u32"}) {
+       {"@", "@holding", "@holding:", "@coils:1", "@coil:1/u16", "@holding:65536", "@holding:-1",
+        "@holding:2/", "@holding:2/f16", "@holding:2/text", "@holding:2/bcd9", "@holding:2/i16/u16",
+        "@:2", "@holding: 2", "@input:65535/u32"}) {
     CAPTURE(text);
     const auto raw = parse_raw_register(text);
     REQUIRE(raw.has_value());
@@ -191,18 +192,19 @@ TEST_CASE("writable: parameters only, both halves of a pair") {
   const Profile profile = example();
   for (const std::uint16_t address : std::vector<std::uint16_t>{1, 564, 725, 1152, 1153}) {
     CAPTURE(address);
-    CHECK(profile.writable({address}));
+    CHECK(profile.writable(modbus::RegisterTable::holding, {address}));
   }
   for (const std::uint16_t address :
        std::vector<std::uint16_t>{0, 726, 1001, 1151, 1154, 3308, 4002, 4500, 65535}) {
     CAPTURE(address);
-    CHECK_FALSE(profile.writable({address}));
+    CHECK_FALSE(profile.writable(modbus::RegisterTable::holding, {address}));
   }
   Profile nothing_numbered = example();
   nothing_numbered.numbered.reset();
-  CHECK_FALSE(nothing_numbered.writable({126}));  // named, but read-only
-  CHECK_FALSE(nothing_numbered.writable({3}));
-  CHECK(nothing_numbered.writable({2}));
+  CHECK_FALSE(
+      nothing_numbered.writable(modbus::RegisterTable::holding, {126}));  // named, but read-only
+  CHECK_FALSE(nothing_numbered.writable(modbus::RegisterTable::holding, {3}));
+  CHECK(nothing_numbered.writable(modbus::RegisterTable::holding, {2}));
 }
 
 TEST_CASE("limit_registers: parameter n at n + offset (DOGA 60427 §3.1: 1001-1724, 2001-2724)") {
@@ -221,10 +223,10 @@ TEST_CASE("limit_registers: parameter n at n + offset (DOGA 60427 §3.1: 1001-17
 }
 
 TEST_CASE("kinds: sizes, bounds and names") {
-  CHECK(register_count(Kind::i16) == 1);
-  CHECK(register_count(Kind::u32) == 2);
-  CHECK(lowest(Kind::i32) == -2147483648LL);
-  CHECK(highest(Kind::u32) == 4294967295LL);
+  CHECK(register_count({.kind = Kind::i16}) == 1);
+  CHECK(register_count({.kind = Kind::u32}) == 2);
+  CHECK(lowest({.kind = Kind::i32}) == Decimal(-2147483648LL));
+  CHECK(highest({.kind = Kind::u32}) == Decimal(4294967295LL));
 }
 
 TEST_CASE("a secret is one by whatever name or number its registers are asked for") {
@@ -249,10 +251,35 @@ TEST_CASE("a secret is one by whatever name or number its registers are asked fo
   CHECK(profile.select({"p30?"}).value().at(1).secrecy == Secrecy::secret);
 }
 
+TEST_CASE("what reading clears is read by its own name only") {
+  Profile profile;
+  Parameter pulses = named("pulses", RegisterTable::input, 10, Kind::u32, Access::read_only);
+  pulses.reading = catalogue::Reading::consumes;
+  profile.parameters = {named("before", RegisterTable::input, 9, Kind::u16, Access::read_only),
+                        pulses};
+  CHECK(profile.find("pulses").has_value());
+  CHECK(profile.select({"pulses"})->size() == 1);
+  for (const std::vector<std::string>& names :
+       {std::vector<std::string>{}, {"*"}, {"pul*"}, {"before"}}) {
+    const auto selected = profile.select(names);
+    if (!selected) continue;
+    for (const Parameter& parameter : *selected) CHECK(parameter.name == "before");
+  }
+  for (const char* name : {"@input:10", "@input:11", "@input:9/u32", "@input:0..31"}) {
+    CAPTURE(name);
+    const auto selected = profile.select({name});
+    REQUIRE(!selected.has_value());
+    CHECK(selected.error().code == Errc::usage);
+    CHECK(selected.error().hint == "'pulses' is read when it is named");
+  }
+}
+
 TEST_CASE("what reading clears is read by nothing but the source of events") {
   Profile profile;
   Parameter flag = named("result.new", RegisterTable::input, 294, Kind::u16, Access::read_only);
   flag.reading = catalogue::Reading::consumes;
+  profile.events.emplace();
+  profile.events->flag = "result.new";
   const Parameter other =
       named("result.ok", RegisterTable::input, 303, Kind::u16, Access::read_only);
   profile.parameters = {flag, other};
@@ -277,4 +304,26 @@ TEST_CASE("what reading clears is read by nothing but the source of events") {
   CHECK(only_it.error().code == Errc::unknown_name);
   CHECK(profile.describe({})->size() == 2);
   CHECK(profile.describe({"result.new"})->front().name == "result.new");
+}
+
+TEST_CASE("a bit by name is where its field is") {
+  Profile profile;
+  Parameter wide = named("long", RegisterTable::holding, 80, Kind::u64, Access::read_write);
+  wide.bits = {{0, "x", std::nullopt, 1}, {40, "y", std::nullopt, 1}};
+  Parameter half = named("half", RegisterTable::holding, 90, Kind::u8, Access::read_write);
+  half.encoding.slice = {8, 8};
+  half.bits = {{0, "a", std::nullopt, 1}, {4, "mode", std::nullopt, 3}};
+  Parameter moving = named("moving", RegisterTable::holding, 91, Kind::u16, Access::read_write);
+  moving.bits = {{3, "go", 0, 1}, {5, "go", 1, 1}};
+  moving.bits_by = "mode";
+  profile.parameters = {wide, half, moving};
+  const auto y = profile.find("long.y").value();
+  CHECK(y.encoding.kind == Kind::u64);
+  CHECK(y.encoding.slice.first == 40);
+  const auto mode = profile.find("half.mode").value();
+  CHECK(mode.encoding.kind == Kind::u16);
+  CHECK(mode.encoding.slice.first == 12);
+  const auto go = profile.find("moving.go");
+  REQUIRE(!go.has_value());
+  CHECK(go.error().message == "which bit it is depends on mode");
 }

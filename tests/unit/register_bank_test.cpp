@@ -17,10 +17,8 @@ constexpr RegisterTable holding = RegisterTable::holding;
 RegisterBank bank_of(const test::Product& product) { return {product.profile, product.start}; }
 
 /// What the value at this register would be with one word written to it.
-std::uint32_t with_word(const RegisterBank& bank, std::uint16_t address, std::uint16_t word) {
-  std::size_t next = 0;
-  const Registers words = {word};
-  return bank.with_words(*bank.cell_at(holding, address), address, words, next);
+Registers with_word(const RegisterBank& bank, std::uint16_t address, std::uint16_t word) {
+  return bank.changes(holding, address, Registers{word}).front().registers;
 }
 
 }  // namespace
@@ -54,20 +52,22 @@ TEST_CASE("register bank: a value of two registers is changed by either of them"
   RegisterBank bank = bank_of(test::product("servo-press"));
   const Cell* depth = bank.cell_at(holding, 3);
   REQUIRE(depth == bank.cell_at(holding, 2));
-  CHECK(with_word(bank, 3, 1) == 0xFFFF0001U);
-  CHECK(with_word(bank, 2, 0) == 0x0000FB50U);
+  CHECK(with_word(bank, 3, 1) == Registers{0xFFFF, 1});
+  CHECK(with_word(bank, 2, 0) == Registers{0, 0xFB50});
   CHECK_FALSE(depth->takes(with_word(bank, 2, 0)));
-  bank.set_raw(depth->place, 50'000);
+  bank.set_stored(depth->place, 50'000);
   CHECK(bank.get("depth") == 50'000);
-  CHECK(depth->takes(50'000));
-  CHECK_FALSE(depth->takes(50'001));
+  CHECK(depth->takes(Registers{0, 50'000}));
+  CHECK_FALSE(depth->takes(Registers{0, 50'001}));
 }
 
 TEST_CASE("register bank: limits are signed, and leave out what is excepted") {
   const RegisterBank bank = bank_of(test::product("servo-press"));
   const Cell* zone = bank.cell_at(holding, 4);
   REQUIRE(zone != nullptr);
-  const auto takes = [zone](int number) { return zone->takes(static_cast<std::uint32_t>(number)); };
+  const auto takes = [zone](int number) {
+    return zone->takes(Registers{static_cast<std::uint16_t>(number)});
+  };
   for (const int number : {-5, -2, 2, 5}) CHECK(takes(number));
   for (const int number : {-6, -1, 0, 1, 6}) CHECK_FALSE(takes(number));
 }

@@ -13,6 +13,9 @@ namespace spindle {
 /// `[!x]`. A malformed bracket matches itself literally. Linear in practice, never exponential.
 bool glob_match(std::string_view pattern, std::string_view text);
 
+/// Whether both are the same but for the case of their ASCII letters.
+bool same_ignoring_case(std::string_view a, std::string_view b);
+
 /// Whether the text has a character that glob_match() treats as special.
 bool is_pattern(std::string_view text);
 

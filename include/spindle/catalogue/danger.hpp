@@ -38,7 +38,8 @@ class Dangers {
     unsigned end;
     Danger danger;
   };
-  void add(modbus::RegisterTable table, modbus::RegisterAddress address, Kind kind, Danger danger);
+  void add(modbus::RegisterTable table, modbus::RegisterAddress address, const Encoding& encoding,
+           Danger danger);
 
   std::vector<Source> sources_ = {};
 };

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "spindle/modbus/types.hpp"
 
 namespace spindle::catalogue {
 
@@ -13,5 +16,15 @@ std::string hint_for_document_number(std::uint64_t number);
 
 /// The same for what a user typed: "40001", "@40001", "@holding:40001/i16".
 std::string hint_for_document_number(std::string_view typed);
+
+/// A place in one of the four tables.
+struct NumberedPlace {
+  modbus::RegisterTable table;
+  modbus::RegisterAddress address;
+};
+
+/// What "40001", "400001", "30001", "10001" or "00001" (the first coil) means in such a document;
+/// empty where it is no such number.
+std::optional<NumberedPlace> parse_document_number(std::string_view text);
 
 }  // namespace spindle::catalogue

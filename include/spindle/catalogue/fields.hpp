@@ -16,9 +16,16 @@ auto fields(const Entry<First, Second>& entry) {
 
 inline auto fields(const modbus::RegisterAddress& address) { return std::tie(address.value); }
 
+inline auto fields(const BitSlice& v) {
+  const auto& [first, width] = v;
+  return std::tie(first, width);
+}
+
 inline auto fields(const Encoding& v) {
-  const auto& [kind, scale] = v;
-  return std::tie(kind, scale);
+  const auto& [kind, scale, divisor, offset, decimals, length, count, slice, word_order, byte_order,
+               padding, packing, date] = v;
+  return std::tie(kind, scale, divisor, offset, decimals, length, count, slice, word_order,
+                  byte_order, padding, packing, date);
 }
 
 inline auto fields(const Label& v) {
@@ -32,17 +39,18 @@ inline auto fields(const Range& v) {
 }
 
 inline auto fields(const BitName& v) {
-  const auto& [bit, text, when] = v;
-  return std::tie(bit, text, when);
+  const auto& [bit, text, when, width] = v;
+  return std::tie(bit, text, when, width);
 }
 
 inline auto fields(const Parameter& v) {
   const auto& [name, title, table, address, encoding, unit, range, except, default_value, labels,
                bits, bits_by, notation, access, cloning, secrecy, reading, evidence, source, note,
-               effect, risk, settle, hazard] = v;
+               effect, risk, settle, hazard, nulls, scale_by, write_address, before, after] = v;
   return std::tie(name, title, table, address, encoding, unit, range, except, default_value, labels,
                   bits, bits_by, notation, access, cloning, secrecy, reading, evidence, source,
-                  note, effect, risk, settle, hazard);
+                  note, effect, risk, settle, hazard, nulls, scale_by, write_address, before,
+                  after);
 }
 
 inline auto fields(const Slice& v) {
@@ -84,10 +92,14 @@ inline auto fields(const UnitRange& v) {
 }
 
 inline auto fields(const LinkSpec& v) {
-  const auto& [framing, port, unit, units, max_read, max_write, keep_alive, answer, connect,
-               retries, settle, loopback, any_unit, even_pairs, serial, contiguous, absent] = v;
-  return std::tie(framing, port, unit, units, max_read, max_write, keep_alive, answer, connect,
-                  retries, settle, loopback, any_unit, even_pairs, serial, contiguous, absent);
+  const auto& [framing, port, unit, units, max_read, max_write, max_read_bits, write_function,
+               max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect, retries, settle,
+               loopback, any_unit, word_order, byte_order, even_pairs, serial, contiguous, absent] =
+      v;
+  return std::tie(framing, port, unit, units, max_read, max_write, max_read_bits, write_function,
+                  max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect, retries,
+                  settle, loopback, any_unit, word_order, byte_order, even_pairs, serial,
+                  contiguous, absent);
 }
 
 inline auto fields(const Arming& v) {
@@ -123,12 +135,12 @@ inline auto fields(const Preparation& v) {
 }
 
 inline auto fields(const Action& v) {
-  const auto& [name, title, address, kind, value, stop_value, minimum, maximum, has_range, labels,
-               motion, rest, prepare, busy, hazard, evidence, source, note, tells, effects, check,
-               confirm, confirm_value] = v;
-  return std::tie(name, title, address, kind, value, stop_value, minimum, maximum, has_range,
-                  labels, motion, rest, prepare, busy, hazard, evidence, source, note, tells,
-                  effects, check, confirm, confirm_value);
+  const auto& [name, title, table, address, encoding, value, stop_value, minimum, maximum,
+               has_range, labels, motion, rest, prepare, busy, hazard, evidence, source, note,
+               tells, effects, check, confirm, confirm_value] = v;
+  return std::tie(name, title, table, address, encoding, value, stop_value, minimum, maximum,
+                  has_range, labels, motion, rest, prepare, busy, hazard, evidence, source, note,
+                  tells, effects, check, confirm, confirm_value);
 }
 
 inline auto fields(const CodeText& v) {
@@ -231,13 +243,18 @@ inline auto fields(const RunSpec& v) {
   return std::tie(model, still_runs, evidence, source, is_derived);
 }
 
+inline auto fields(const UnlockSpec& v) {
+  const auto& [parameter, value, needed_by] = v;
+  return std::tie(parameter, value, needed_by);
+}
+
 inline auto fields(const Profile& v) {
   const auto& [id, title, maker, series, path, bases, link, identity, events, limits, numbered,
-               parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched] =
-      v;
+               parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
+               unlock] = v;
   return std::tie(id, title, maker, series, path, bases, link, identity, events, limits, numbered,
-                  parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset,
-                  watched);
+                  parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
+                  unlock);
 }
 
 template <typename T>

@@ -9,6 +9,7 @@
 #include "spindle/base/clock.hpp"
 #include "spindle/base/decimal.hpp"
 #include "spindle/base/enum_table.hpp"
+#include "spindle/catalogue/encoding.hpp"
 #include "spindle/catalogue/list.hpp"
 #include "spindle/catalogue/text.hpp"
 #include "spindle/modbus/types.hpp"
@@ -35,24 +36,6 @@ enum class Reading : std::uint8_t {
 };
 /// Whether backups hold a value without being told to.
 enum class Secrecy : std::uint8_t { open, secret };
-enum class Kind : std::uint8_t { u16, i16, u32, i32 };
-/// As written in profiles and raw registers.
-inline constexpr auto kind_words = enum_table<Kind>(
-    {{"u16", Kind::u16}, {"i16", Kind::i16}, {"u32", Kind::u32}, {"i32", Kind::i32}});
-
-/// How registers become a number: an integer of `kind` (32-bit kinds: high word first) times
-/// `scale`.
-struct Encoding {
-  Kind kind = Kind::u16;
-  Decimal scale = Decimal(1);
-};
-
-/// Number of 16-bit registers of one value: 1 or 2.
-std::uint16_t register_count(Kind kind);
-/// Smallest and largest integer of the kind.
-std::int64_t lowest(Kind kind);
-std::int64_t highest(Kind kind);
-
 /// What a write may do beyond storing a value.
 enum class Hazard : std::uint8_t {
   none,
@@ -105,12 +88,13 @@ enum class Notation : std::uint8_t {
   hexadecimal,  ///< codes that documents print as "30h"; shown so beside the number
 };
 
-/// Name of one bit of a bit field.
+/// Name of one bit of a bit field, or of some that stand together.
 struct BitName {
   std::uint8_t bit = 0;  ///< 0: the lowest
   Text text;
   /// The name counts only while `Parameter::bits_by` has this value; empty: always.
   std::optional<std::int64_t> when = std::nullopt;
+  std::uint8_t width = 1;  ///< bits from `bit` on that are one number
 };
 
 /// One entry of the catalogue.
@@ -140,6 +124,15 @@ struct Parameter {
   /// How long a written value may take until it reads back; empty: as `LinkSpec::settle` says.
   std::optional<Duration> settle = std::nullopt;
   Hazard hazard = Hazard::none;  ///< declared; danger_of() says what counts
+  /// Patterns that say that there is no value, as to_pattern() gives them.
+  List<std::uint64_t> nulls = {};
+  /// Parameter whose value is a power of ten that the scale is multiplied with; may be empty.
+  Text scale_by = {};
+  /// Where it is written, when that is not where it is read.
+  std::optional<modbus::RegisterAddress> write_address = std::nullopt;
+  /// Parameters that are written before and behind this one, where they are written together.
+  List<Text> before = {};
+  List<Text> after = {};
 };
 
 /// The same texts, where strings are asked for.
@@ -148,6 +141,13 @@ std::vector<std::string> to_strings(const List<Text>& texts);
 /// The bit field with only the names that count while `bits_by` has this value; empty: not known,
 /// so only names that always count.
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value);
+
+/// The bits of a bit field that have this name, as a parameter of their own: "control.start". Its
+/// other bits stay as they are when it is written.
+Parameter part_of(const Parameter& parameter, const BitName& bit);
+
+/// The parameter with the scale that counts while `scale_by` has this value.
+Parameter with_power(Parameter parameter, std::int64_t power);
 
 // As written in profiles and records.
 constexpr std::string_view to_text(Kind kind) { return kind_words.text(kind); }

@@ -58,24 +58,36 @@ struct LinkSpec {
   /// Those that the product can have; another one is asked all the same. Empty: not known.
   std::optional<UnitRange> units = std::nullopt;
   std::uint16_t max_read = 125;
-  std::uint16_t max_write = 1;  ///< registers per write; 1: only FC 06
-  Duration keep_alive = {};     ///< zero: none needed
+  std::uint16_t max_write = 1;                          ///< registers per write; 1: only FC 06
+  std::uint16_t max_read_bits = modbus::max_read_bits;  ///< coils and discrete inputs per read
+  /// The one function that writes holding registers; empty: 06 for one, 10h for more.
+  std::optional<std::uint8_t> write_function = std::nullopt;
+  /// So many registers that were not asked for may be read along.
+  std::uint16_t max_gap = 0;
+  /// Exception codes of a server that only has to be waited for, and for how long.
+  List<std::uint8_t> busy = {};
+  Duration busy_every = std::chrono::milliseconds(100);
+  Duration busy_limit = std::chrono::seconds(2);
+  Duration keep_alive = {};  ///< zero: none needed
   Duration answer = std::chrono::seconds(1);
   Duration connect = std::chrono::seconds(5);
   unsigned retries = 1;  ///< repetitions of a read that got no answer
   /// How long a written value may take until it reads back, unless its parameter says otherwise.
   Duration settle = std::chrono::milliseconds(500);
-  bool loopback = false;    ///< FC 08 00 is answered
-  bool any_unit = false;    ///< TCP: answers may carry another unit identifier than was asked
+  bool loopback = false;  ///< FC 08 00 is answered
+  bool any_unit = false;  ///< TCP: answers may carry another unit identifier than was asked
+  /// Of values that do not say it themselves.
+  WordOrder word_order = WordOrder::big;
+  ByteOrder byte_order = ByteOrder::big;
   bool even_pairs = false;  ///< 32-bit values begin at an even address and are never split
   SerialSpec serial = {};
   List<Area> contiguous = {};  ///< registers may be read along here
   List<Area> absent = {};      ///< registers said not to exist
 };
 
-/// Whether a value of this kind can be written. Error `usage`: values of 32 bits are never split
-/// (`even_pairs`), and a request takes only one register (`max_write`).
-Result<void> check_pair(Kind kind, const LinkSpec& link);
+/// Whether a value of this encoding can be written. Error `usage`: values of several registers are
+/// never split (`even_pairs`), and a request takes only one register (`max_write`).
+Result<void> check_pair(const Encoding& encoding, const LinkSpec& link);
 
 /// What an event says, as the contract names it.
 enum class EventKind : std::uint8_t {
@@ -179,8 +191,9 @@ struct Preparation {
 struct Action {
   Text name;
   Text title;
+  modbus::RegisterTable table = modbus::RegisterTable::holding;  ///< or `coil`
   modbus::RegisterAddress address = {};
-  Kind kind = Kind::u16;                              ///< of the value; a pair is sent whole
+  Encoding encoding = {};                             ///< of the value; a pair is sent whole
   std::optional<std::uint16_t> value = std::nullopt;  ///< fixed value; empty: the user gives one
   std::optional<std::uint16_t> stop_value = std::nullopt;  ///< ends what the action began
   std::uint16_t minimum = 0;                               ///< of a given value
@@ -282,6 +295,13 @@ struct SimulationSpec {
   List<Area> absent = {};  ///< registers that answer exception 02
 };
 
+/// A register that has to hold a value before others can be written. It is put back afterwards.
+struct UnlockSpec {
+  Text parameter = {};
+  std::int64_t value = 0;
+  List<Text> needed_by = {};  ///< names or patterns of parameters; empty: all
+};
+
 /// The catalogue of one product: how to talk to it and what its registers mean.
 class Profile {
  public:
@@ -304,21 +324,27 @@ class Profile {
   List<AlarmList> alarm_lists = {};
   Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named
+  std::optional<UnlockSpec> unlock = std::nullopt;
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
-  /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; `usage` for one
-  /// of whose registers reading clears one.
+  /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; those
+  /// of may_read().
   [[nodiscard]] Result<Parameter> find(std::string_view name) const;
 
   /// All parameters meant, in the order asked for, each once; a pattern gives catalogue order. No
-  /// names: every named parameter. What reading clears is in none of these. Errors: those of
-  /// find(); `unknown_name` for a pattern that matches nothing.
+  /// names: every named parameter. What reading clears is meant by its full name only. Errors:
+  /// those of find(); `unknown_name` for a pattern that matches nothing.
   [[nodiscard]] Result<std::vector<Parameter>> select(const std::vector<std::string>& names) const;
 
   /// The same for those who show the catalogue and read nothing of a tool: with what reading
   /// clears.
   [[nodiscard]] Result<std::vector<Parameter>> describe(
       const std::vector<std::string>& names) const;
+
+  /// Whether reading these registers takes nothing that was not asked for. What reading clears may
+  /// be read by its own name, alone. Error `usage`: another register would be cleared; it is the
+  /// flag of the events, which only their source reads.
+  [[nodiscard]] Result<void> may_read(const Parameter& parameter) const;
 
   /// Whether reading these registers clears one of them.
   [[nodiscard]] bool consumes(const Parameter& parameter) const;
@@ -329,9 +355,9 @@ class Profile {
   /// Error `unknown_name` with a suggestion.
   [[nodiscard]] Result<Action> find_action(std::string_view name) const;
 
-  /// Whether a raw write to this holding register is allowed: it belongs to a writable parameter,
+  /// Whether a raw write to this register, or coil, is allowed: it belongs to a writable parameter,
   /// named or numbered.
-  [[nodiscard]] bool writable(modbus::RegisterAddress address) const;
+  [[nodiscard]] bool writable(modbus::RegisterTable table, modbus::RegisterAddress address) const;
 
   /// Whether a write to this parameter is a command to the motor of `run`.
   [[nodiscard]] bool commands_motion(const Parameter& parameter) const {

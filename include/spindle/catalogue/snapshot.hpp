@@ -133,6 +133,7 @@ enum class Skip : std::uint8_t {
   read_only,   ///< it cannot be written
   not_cloned,  ///< it belongs to one tool (`clone: never`)
   absent,      ///< the tool has no such register
+  no_value,    ///< the backup says that there was none
   dangerous,   ///< a write to it may do more than store a value
 };
 

@@ -7,7 +7,9 @@
 
 #include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
+#include "spindle/files/register_map.hpp"
 #include "spindle/work/action.hpp"
+#include "spindle/work/register_survey.hpp"
 #include "spindle/work/run.hpp"
 #include "spindle/work/simulated_tool.hpp"
 #include "spindle/work/snapshot.hpp"
@@ -42,12 +44,16 @@ enum class Execution : std::uint8_t { real, dry_run };
 /// Whether a tool stores what was written once more, where it would forget it at power-off.
 enum class Storing : std::uint8_t { no, yes };
 
+/// Whether registers may be written that the profile does not say can be.
+enum class RawWrites : std::uint8_t { refuse, ask };
+
 struct SetOptions {
   std::string target;                    ///< or a group
   std::vector<std::string> assignments;  ///< NAME=VALUE
   Execution execution = Execution::real;
   Storing storing = Storing::no;
   Addressing addressing = Addressing::unicast;
+  RawWrites raw = RawWrites::refuse;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
@@ -72,9 +78,13 @@ Result<Outcome> ping(const PingOptions& options, Context& context);
 struct ScanOptions {
   std::string bus;
   std::vector<modbus::UnitId> units;
+  std::optional<RegisterSpan> registers;  ///< to be found on the one tool that `bus` then is
+  Duration pause = usual_pause;           ///< between two requests for registers
 };
 /// Which units of a serial line answer a loop-back, at the line's settings and no others.
 Result<Outcome> scan(const ScanOptions& options, Context& context);
+/// Which registers of a tool can be read. Requires `registers`.
+Result<Outcome> scan_registers(const ScanOptions& options, Context& context);
 
 struct WatchOptions {
   std::vector<std::string> targets;
@@ -124,8 +134,20 @@ struct BackupOptions {
 };
 Result<Outcome> backup(const BackupOptions& options, Context& context);
 
+struct DumpOptions {
+  std::string target;
+  std::string file;                            ///< "-": standard output
+  std::optional<RegisterSpan> registers;       ///< empty: all that the profile knows, of `table`
+  std::optional<modbus::RegisterTable> table;  ///< empty: every table
+  Duration pause = usual_pause;
+  Overwrite overwrite = Overwrite::refuse;
+  Secrets secrets = Secrets::leave_out;
+};
+/// Raw registers into a file.
+Result<Outcome> dump(const DumpOptions& options, Context& context);
+
 struct DiffOptions {
-  std::string a;  ///< target, group of one, backup file, or "defaults"; with a folder any group
+  std::string a;  ///< target, group of one, backup or dump, or "defaults"; with a folder any group
   std::string b;  ///< not with a folder
   std::vector<std::string> patterns;
   std::vector<std::string> ignored;
@@ -176,5 +198,13 @@ struct ProfileNameOptions {
 Result<Outcome> profile_list(Context& context);
 Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context);
 Result<Outcome> profile_check(const ProfileNameOptions& options, Context& context);
+
+struct ProfileNewOptions {
+  std::string name;  ///< its id; the file is NAME.yaml in the present folder
+  std::string map;   ///< CSV file of registers; empty: none
+  files::Numbering numbering = files::Numbering::address;
+};
+/// Writes the file of a profile that is to be completed.
+Result<Outcome> profile_new(const ProfileNewOptions& options, Context& context);
 
 }  // namespace spindle::commands

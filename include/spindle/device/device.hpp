@@ -178,11 +178,19 @@ class Device {
   Result<std::vector<Reading>> read_each(const std::vector<catalogue::Parameter>& parameters,
                                          Limits limits, const link::Progress& progress = {});
 
+  /// One request for registers of which nothing need be known. Error `usage` where reading clears
+  /// one of them.
+  Result<Registers> read_block(const link::RegisterRange& range);
+
+  /// What the server allows of reads.
+  [[nodiscard]] const link::ReadLimits& limits() const { return limits_; }
+
   /// Writes and reads back, again and again with growing pauses until the value reads right or its
   /// settling time is over. A busy tool (exception 06) is asked again for one answer time; a write
   /// that was acknowledged (05) is never repeated; one without an answer is repeated once, and only
-  /// after reading back has shown that it did not take. Does not check ranges. `before` is the
-  /// value read before.
+  /// after reading back has shown that it did not take. Of a register of which only some bits are
+  /// the value's the others are kept as they are read just before. What the profile says has to be
+  /// unlocked first is, and is put back. Does not check ranges. `before` is the value read before.
   Written write(const catalogue::Parameter& parameter, const catalogue::Value& before,
                 const catalogue::Value& value, Proof proof = Proof::first_right);
 
@@ -209,7 +217,7 @@ class Device {
   /// a preparation is not sent when its effect is there already. Not for motions.
   Result<ActionResult> perform(const catalogue::Action& action, std::int64_t value);
 
-  /// FC 06 to one register, once, without reading back or waiting for a busy tool.
+  /// To one register, once, without reading back or waiting for a busy tool.
   Result<void> write_word(modbus::RegisterAddress address, std::uint16_t word);
 
   /// To everybody on a serial line: sent is all that is known.
@@ -257,16 +265,32 @@ class Device {
   Error located(Error error) const;
   Error with_exception_text(Error error) const;
   Error with_device_code(Error error) const;
-  [[nodiscard]] catalogue::Parameter meant_by(const catalogue::Parameter& parameter,
-                                              const link::RegisterImage& image) const;
+  [[nodiscard]] Result<catalogue::Parameter> meant_by(const catalogue::Parameter& parameter,
+                                                      const link::RegisterImage& image) const;
   Reading reading_of(const catalogue::Parameter& parameter, Limits limits,
                      const link::RegisterImage& values,
                      const link::RegisterImage& limit_values) const;
   std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
                                                 const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
-  Result<void> write_registers(modbus::RegisterAddress first, const Registers& registers);
-  Result<void> send_while_busy(const catalogue::Parameter& parameter, const Registers& registers);
+  Result<void> write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
+                               const Registers& registers);
+  Result<Registers> registers_for(const catalogue::Parameter& parameter,
+                                  const catalogue::Value& value);
+  /// A register that was written to so that others can be.
+  struct Lock {
+    catalogue::Parameter parameter;
+    catalogue::Value before;
+  };
+  Result<std::optional<Lock>> unlock_for(const catalogue::Parameter& parameter);
+  Result<void> lock_again(const Lock& lock);
+  [[nodiscard]] std::string not_put_back(std::string_view what, const Error& why) const;
+  Result<void> broadcast_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
+                                   const Registers& registers);
+  Written write_unlocked(const catalogue::Parameter& parameter, const catalogue::Value& before,
+                         const catalogue::Value& value, Proof proof);
+  Result<void> send_while_busy(const catalogue::Parameter& parameter, const catalogue::Value& value,
+                               Registers registers);
   Written refused(Error error, const catalogue::Parameter& parameter,
                   const catalogue::Value& before, const catalogue::Value& value);
   Written judged(const catalogue::Parameter& parameter, const catalogue::Value& before,
@@ -286,7 +310,7 @@ class Device {
   Result<ActionResult> confirm(const catalogue::Action& action,
                                const catalogue::Parameter& confirming,
                                const catalogue::Value& expected);
-  [[nodiscard]] std::optional<catalogue::Parameter> decider_of(
+  [[nodiscard]] std::vector<catalogue::Parameter> deciders_of(
       const catalogue::Parameter& parameter) const;
   Error about(Error error, const std::string& name, modbus::RegisterAddress address) const;
   Result<catalogue::Value> read_value(const catalogue::Parameter& parameter);

@@ -4,10 +4,14 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 
 #include "spindle/base/decimal.hpp"
 
 namespace spindle::files {
+
+/// What is recorded of a value: its number, or its text.
+using LoggedValue = std::variant<Decimal, std::string>;
 
 /// One change that a command made, or tried to make (contract, section 5, Record of changes).
 struct Change {
@@ -18,8 +22,8 @@ struct Change {
   std::string serial;   ///< empty: not known
   std::string name;     ///< parameter or action
   std::optional<std::uint16_t> register_address = std::nullopt;
-  std::optional<Decimal> old_value = std::nullopt;
-  std::optional<Decimal> new_value = std::nullopt;
+  std::optional<LoggedValue> old_value = std::nullopt;
+  std::optional<LoggedValue> new_value = std::nullopt;
   std::string result;
   std::string id = {};  ///< the same in the records of what is begun and how it ended; empty: none
 };

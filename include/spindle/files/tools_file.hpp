@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
@@ -19,8 +20,11 @@ struct Tool {
   /// Empty: not given. A file whose path is relative is meant in the folder of the tools file, and
   /// stands here with that folder.
   std::string profile = {};
-  std::string torque_unit = {};            ///< empty: unknown
-  std::vector<std::string> verified = {};  ///< actions that were checked on this tool
+  std::string torque_unit = {};                         ///< empty: unknown
+  std::optional<Duration> timeout = std::nullopt;       ///< for one answer; else as the URL says
+  std::optional<Duration> gap = std::nullopt;           ///< silence before a request; likewise
+  std::optional<std::uint32_t> retries = std::nullopt;  ///< of reads; likewise
+  std::vector<std::string> verified = {};               ///< actions that were checked on this tool
   SourceLocation url_at = {};
   SourceLocation profile_at = {};
   SourceLocation verified_at = {};

@@ -33,17 +33,25 @@ bool is_lost_answer(const Error& error);
 /// What a server allows, from the profile.
 struct ReadLimits {
   std::uint16_t max_read = modbus::max_read_count;
+  std::uint16_t max_read_bits = modbus::max_read_bits;  ///< of coils and discrete inputs
   /// Areas in which registers that were not asked for may be read along to save a request.
   std::vector<RegisterRange> contiguous = {};
+  /// So many registers that were not asked for may be read along anywhere.
+  std::uint16_t max_gap = 0;
   Neighbours neighbours = Neighbours::contiguous;
-  /// Areas that are said not to exist. What is wanted there shares a request with nothing but its
-  /// own hole, so that no other answer is spoilt. A hole that is answered is there all the same;
-  /// one that is refused with exception 02 is taken to be as was said.
+  /// Areas that are said not to exist, or that reading clears. What is wanted there shares a
+  /// request with nothing but its own area, so that no other answer is spoilt and nothing is
+  /// cleared unasked. A hole that is answered is there all the same; one that is refused with
+  /// exception 02 is taken to be as was said.
   std::vector<RegisterRange> absent = {};
   /// Reads whose answers would look like a spontaneous frame; never issued.
   std::vector<RegisterRange> forbidden_shapes = {};  // table and count; `first` is ignored
   /// Where the server says, in a code of its own, why it sent its last exception response.
   std::optional<RegisterRange> refusal = std::nullopt;
+
+  [[nodiscard]] std::uint16_t most_in_read(modbus::RegisterTable table) const {
+    return modbus::holds_bits(table) ? max_read_bits : max_read;
+  }
 };
 
 /// One request of a plan, and the wanted ranges whose registers its answer brings.
@@ -66,7 +74,8 @@ std::vector<OtherRead> other_reads(const RegisterRange& range, const ReadLimits&
 
 /// Key of one register in sets and maps.
 constexpr std::uint32_t register_key(modbus::RegisterTable table, std::uint16_t address) {
-  return (table == modbus::RegisterTable::input ? 0x10000U : 0U) | address;
+  constexpr unsigned address_bits = 16;
+  return (static_cast<std::uint32_t>(table) << address_bits) | address;
 }
 
 /// What reading many registers gave: a value, "absent" or an error for each.
@@ -92,25 +101,23 @@ class Client {
  public:
   Client(Session& session, ReadLimits limits, unsigned retries);
 
-  /// One request (FC 03/04). An exception response becomes `exception_response` with its code, and
-  /// with the device's own where the limits say where it stands: it is read right after it.
+  /// One request (FC 01 to 04). An exception response becomes `exception_response` with its code,
+  /// and with the device's own where the limits say where it stands: it is read right after it.
   Result<Registers> read(const RegisterRange& range);
 
   /// One request for what reading clears: never repeated, not even where no answer came. TCP only.
   Result<Registers> read_once_ever(const RegisterRange& range);
 
-  /// All wanted ranges in the fewest requests. A block that is refused with exception 02 is
-  /// bisected, and what does not exist is remembered and not asked for again. Other exception
+  /// All wanted ranges in the fewest requests. A block that is refused with exception 02, 03 or 04
+  /// is bisected, and what does not exist (02) is remembered and not asked for again. Exception
   /// responses stand in the image at the registers concerned; anything else ends it at once and is
   /// the result. `progress` hears how many of the wanted pieces are known by now, or known to be
   /// absent.
   Result<RegisterImage> read_each(const std::vector<RegisterRange>& wanted,
                                   const Progress& progress = {});
 
-  /// FC 06, sent once. Its answer is the echo, which proves nothing about the device's state.
-  Result<void> write(modbus::RegisterAddress address, std::uint16_t value);
-  /// FC 10h, sent once.
-  Result<void> write(modbus::RegisterAddress first, RegisterView values);
+  /// A request that writes, sent once. Its answer proves nothing about the device's state.
+  Result<void> write(const modbus::Pdu& request);
 
   /// FC 11h; the device-specific bytes.
   Result<Bytes> report_server_id();

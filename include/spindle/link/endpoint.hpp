@@ -33,10 +33,13 @@ struct Endpoint {
   std::string device = {};   ///< path of the serial line (rtu)
   std::string profile = {};  ///< profile of a simulated tool (sim)
   std::optional<modbus::UnitId> unit = std::nullopt;
+  bool reserved_units = false;  ///< rtu, rtu+tcp: units from 248 to 255 may be asked, too
   std::optional<unsigned> baud = std::nullopt;
   std::optional<modbus::Parity> parity = std::nullopt;
   std::optional<unsigned> stop_bits = std::nullopt;
-  std::optional<Duration> gap = std::nullopt;  ///< silence before a request; else the profile's
+  std::optional<Duration> gap = std::nullopt;      ///< silence before a request; else the profile's
+  std::optional<Duration> timeout = std::nullopt;  ///< for one answer; else the profile's
+  std::optional<unsigned> retries = std::nullopt;  ///< of reads; else the profile's
   LineSwitching switching = LineSwitching::adapter;
   LocalEcho echo = LocalEcho::automatic;
   Claim claim = Claim::alone;
@@ -45,12 +48,20 @@ struct Endpoint {
 /// Whether the text can only be meant as a URL: it begins with "WORD:".
 bool looks_like_url(std::string_view text);
 
-/// Parses tcp://HOST[:PORT][?unit=N], rtu:///PATH[?unit=&baud=&parity=&stop=&gap=&rs485=&echo=],
-/// rtu+tcp://HOST:PORT[?unit=&baud=&gap=&echo=] and sim:PROFILE[?unit=&baud=]. IPv6 addresses stand
-/// in brackets. Error `bad_target` names the part that is wrong: unknown scheme (with a
-/// suggestion), empty host, port outside 1…65535, unit outside 0…255 (0…247 on rtu and rtu+tcp),
-/// unknown or repeated option. The `baud` of rtu+tcp is that of the line behind the device server;
-/// it only says how long bytes and gaps take there.
+/// Longest time for one answer, most repetitions of a read, and longest silence, which a URL, a
+/// tools file or an option may ask for.
+inline constexpr Duration longest_timeout = std::chrono::minutes(10);
+inline constexpr unsigned most_retries = 100;
+inline constexpr Duration longest_gap = std::chrono::seconds(1);
+
+/// Parses tcp://HOST[:PORT][?unit=N],
+/// rtu:///PATH[?unit=&reserved=&baud=&parity=&stop=&gap=&rs485=&echo=],
+/// rtu+tcp://HOST:PORT[?unit=&reserved=&baud=&gap=&echo=] and sim:PROFILE[?unit=&baud=], each also
+/// with timeout= and retries=. IPv6 addresses stand in brackets. Error `bad_target` names the part
+/// that is wrong: unknown scheme (with a suggestion), empty host, port outside 1…65535, unit
+/// outside 0…255 (0…247 on rtu and rtu+tcp, where the others are reserved: Modbus over Serial
+/// Line 1.02, section 2.2), unknown or repeated option. The `baud` of rtu+tcp is that of the line
+/// behind the device server; it only says how long bytes and gaps take there.
 Result<Endpoint> parse_endpoint(std::string_view url);
 
 /// How the line of the endpoint is set: as its URL says, and where that says nothing as `usual`.

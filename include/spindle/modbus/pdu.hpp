@@ -12,12 +12,16 @@ namespace spindle::modbus {
 
 // ---- requests, as a client builds them (1.1b3, section 6) ----
 
-/// FC 03 or FC 04. Requires 1 <= count <= 125 and first + count <= 65536.
+/// FC 01, 02, 03 or 04. Requires 1 <= count <= most_in_read(table) and first + count <= 65536.
 Pdu read_request(RegisterTable table, RegisterAddress first, std::uint16_t count);
 /// FC 06.
 Pdu write_request(RegisterAddress address, std::uint16_t value);
 /// FC 10h. Requires 1 to 123 values.
 Pdu write_request(RegisterAddress first, RegisterView values);
+/// FC 05; a coil is on when `value` is not 0.
+Pdu write_coil_request(RegisterAddress address, std::uint16_t value);
+/// FC 0Fh. Requires 1 to 1968 values.
+Pdu write_coils_request(RegisterAddress first, RegisterView values);
 /// FC 08 sub-function 0000h, return query data.
 Pdu loopback_request(std::uint16_t word);
 /// FC 11h.
@@ -30,13 +34,17 @@ struct ReadRequest {
   RegisterAddress first;
   std::uint16_t count;
 };
+/// Of a holding register, or of a coil, whose value is 0 or 1.
 struct WriteSingleRequest {
   RegisterAddress address;
   std::uint16_t value;
+  RegisterTable table = RegisterTable::holding;
 };
+/// Likewise.
 struct WriteMultipleRequest {
   RegisterAddress first;
   Registers values;
+  RegisterTable table = RegisterTable::holding;
 };
 struct LoopbackRequest {
   std::uint16_t word;
@@ -52,10 +60,11 @@ tl::expected<Request, ExceptionCode> parse_request(const Pdu& pdu);
 
 // ---- responses, as a server builds them ----
 
-/// Response to FC 03/04: byte count and registers.
+/// Response to FC 01 to 04: byte count and registers, or coils packed into bytes.
 Pdu read_response(RegisterTable table, RegisterView registers);
-/// Response to FC 10h: address and quantity.
-Pdu write_multiple_response(RegisterAddress first, std::uint16_t count);
+/// Response to FC 10h, or to FC 0Fh: address and quantity.
+Pdu write_multiple_response(RegisterAddress first, std::uint16_t count,
+                            RegisterTable table = RegisterTable::holding);
 /// Response to FC 11h: byte count and device-specific data.
 Pdu report_server_id_response(ByteView data);
 Pdu exception_response(std::uint8_t function, std::uint8_t code);
@@ -69,13 +78,15 @@ enum class Fit : std::uint8_t {
   foreign,      ///< another function
 };
 
-/// Judges a response by the request alone: byte count == 2 × quantity, the echo of a write equals
-/// what was sent (address and value, address and quantity, loop-back word), FC 11h's byte count
-/// fits.
+/// Judges a response by the request alone: the byte count fits the quantity, the echo of a write
+/// equals what was sent (address and value, address and quantity, loop-back word), FC 11h's byte
+/// count fits.
 Fit fit(const Pdu& request, const Pdu& response);
 
-/// The registers of a response to FC 03/04 that fits its request.
+/// The registers of a response to FC 03/04.
 Registers registers_of(const Pdu& response);
+/// The registers of a response to FC 01 to 04 that fits its request; each coil as 0 or 1.
+Registers registers_of(const Pdu& request, const Pdu& response);
 /// The device-specific data of a fitting response to FC 11h.
 ByteView server_id_of(const Pdu& response);
 /// The exception code when `response` is an exception response of one byte.

@@ -11,13 +11,46 @@ namespace spindle::modbus {
 
 /// Function codes spoken here (Modbus Application Protocol 1.1b3, section 6).
 enum class FunctionCode : std::uint8_t {
+  read_coils = 0x01,
+  read_discrete_inputs = 0x02,
   read_holding_registers = 0x03,
   read_input_registers = 0x04,
+  write_single_coil = 0x05,
   write_single_register = 0x06,
   diagnostics = 0x08,
+  write_multiple_coils = 0x0F,
   write_multiple_registers = 0x10,
   report_server_id = 0x11,
 };
+
+/// Whether a request of this function changes the server: sending it twice may do more than sending
+/// it once.
+constexpr bool is_write(std::uint8_t function) {
+  switch (static_cast<FunctionCode>(function)) {
+    case FunctionCode::write_single_coil:
+    case FunctionCode::write_single_register:
+    case FunctionCode::write_multiple_coils:
+    case FunctionCode::write_multiple_registers:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Whether a request of this function only asks.
+constexpr bool is_read(std::uint8_t function) {
+  switch (static_cast<FunctionCode>(function)) {
+    case FunctionCode::read_coils:
+    case FunctionCode::read_discrete_inputs:
+    case FunctionCode::read_holding_registers:
+    case FunctionCode::read_input_registers:
+    case FunctionCode::diagnostics:
+    case FunctionCode::report_server_id:
+      return true;
+    default:
+      return false;
+  }
+}
 
 /// Set in the function code of an exception response (1.1b3, section 7).
 inline constexpr std::uint8_t exception_bit = 0x80;
@@ -34,14 +67,30 @@ enum class ExceptionCode : std::uint8_t {
   gateway_target_failed_to_respond = 0x0B,
 };
 
-/// Limits of 1.1b3: a PDU has at most 253 bytes, which gives these register counts (6.1, 6.12).
+/// Limits of 1.1b3: a PDU has at most 253 bytes, which gives these counts (6.1, 6.3, 6.11, 6.12).
 inline constexpr std::size_t max_pdu_size = 253;
 inline constexpr std::uint16_t max_read_count = 125;
 inline constexpr std::uint16_t max_write_count = 123;
+inline constexpr std::uint16_t max_read_bits = 2000;
+inline constexpr std::uint16_t max_write_bits = 1968;
 
-enum class RegisterTable : std::uint8_t { holding, input };
-inline constexpr auto table_words = enum_table<RegisterTable>(
-    {{"holding", RegisterTable::holding}, {"input", RegisterTable::input}});
+/// The four tables of a server (1.1b3, 4.3). Coils and discrete inputs are single bits, which stand
+/// for registers that hold 0 or 1.
+enum class RegisterTable : std::uint8_t { holding, input, coil, discrete };
+inline constexpr auto table_words =
+    enum_table<RegisterTable>({{"holding", RegisterTable::holding},
+                               {"input", RegisterTable::input},
+                               {"coil", RegisterTable::coil},
+                               {"discrete", RegisterTable::discrete}});
+constexpr bool holds_bits(RegisterTable table) {
+  return table == RegisterTable::coil || table == RegisterTable::discrete;
+}
+constexpr bool is_writable(RegisterTable table) {
+  return table == RegisterTable::coil || table == RegisterTable::holding;
+}
+constexpr std::uint16_t most_in_read(RegisterTable table) {
+  return holds_bits(table) ? max_read_bits : max_read_count;
+}
 constexpr std::string_view to_text(RegisterTable table) { return table_words.text(table); }
 
 struct UnitId {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,7 @@
 namespace spindle::report {
 
 using Words = std::vector<std::uint16_t>;
+using Numbers = std::vector<std::optional<Decimal>>;  ///< empty: null
 using Texts = std::vector<std::string>;
 using Pairs = std::vector<std::pair<std::string, std::string>>;
 
@@ -24,8 +26,8 @@ enum class Audience : std::uint8_t { everyone, columns };
 /// What colour says beside the words, where there is colour.
 enum class Tone : std::uint8_t { plain, good, bad };
 
-/// One fact of a record: null, number, text, truth, words, texts, or an object of texts.
-using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Texts, Pairs>;
+/// One fact of a record: null, number, text, truth, words, numbers, texts, or an object of texts.
+using Cell = std::variant<std::monostate, Decimal, std::string, bool, Words, Numbers, Texts, Pairs>;
 
 /// Null where the text is empty.
 Cell text_or_null(std::string text);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +24,43 @@ Error changed_meanwhile(std::string_view what);
 /// The result of an action that failed: "refused" by the tool, or "unknown" where it cannot be
 /// said whether it was done.
 std::string_view result_of_failure(const Error& error);
+
+/// How one write of several went, for write_in_passes().
+enum class Step : std::uint8_t {
+  unchanged,  ///< there was nothing to write
+  done,       ///< the tool holds what it should
+  refused,    ///< it refused, and holds what it held
+  ended,      ///< nothing more is to be written
+};
+
+/// Whether a step that is refused may be tried again.
+enum class Attempt : std::uint8_t { first, last };
+
+/// Calls `write(item, attempt)` for each item in turn. Where values bound each other, what is
+/// refused may be taken behind the others: it is tried once more, if something else was written
+/// meanwhile. `refuse(item)` is told of what is refused for good.
+template <typename Items, typename Write, typename Refuse>
+void write_in_passes(const Items& items, Write write, Refuse refuse) {
+  struct Refused {
+    const typename Items::value_type* item;
+    std::size_t written_before;
+  };
+  std::vector<Refused> refused;
+  std::size_t written = 0;
+  for (const auto& item : items) {
+    const Step step = write(item, Attempt::first);
+    if (step == Step::ended) return;
+    if (step == Step::refused) refused.push_back({&item, written});
+    if (step == Step::done) ++written;
+  }
+  for (const Refused& one : refused) {
+    const bool is_worth_it = written > one.written_before;
+    const Step step = is_worth_it ? write(*one.item, Attempt::last) : Step::refused;
+    if (step == Step::ended) return;
+    if (step == Step::refused) return refuse(*one.item);
+    ++written;
+  }
+}
 
 /// Changes values of one tool, by the same rule whatever the command: the intent is recorded, the
 /// value is written, what became of it is read back and recorded, and all of it can be put back.

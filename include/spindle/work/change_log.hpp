@@ -20,8 +20,8 @@ namespace spindle::work {
 struct LoggedChange {
   std::string name;
   std::optional<std::uint16_t> register_address = std::nullopt;
-  std::optional<Decimal> old_value = std::nullopt;
-  std::optional<Decimal> new_value = std::nullopt;
+  std::optional<files::LoggedValue> old_value = std::nullopt;
+  std::optional<files::LoggedValue> new_value = std::nullopt;
   std::string result = {};
 };
 

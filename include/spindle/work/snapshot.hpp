@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ enum class Secrets : std::uint8_t { leave_out, include };
 
 /// The unit as shown: the tool's own torque unit where a parameter is a torque, empty when unknown.
 std::string unit_of(const catalogue::Parameter& parameter, const Target& target);
+
+/// What a tool said of itself when its registers were last checked, as files have it.
+std::optional<catalogue::SnapshotIdentity> identity_of(const device::Device& device);
 
 /// What a tool holds, and why some of it could not be read.
 struct ToolSnapshot {
