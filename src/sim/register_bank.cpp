@@ -61,6 +61,13 @@ Registers date_of(const Encoding& encoding, const Decimal& seconds, const Regist
       .value_or(same);
 }
 
+/// One element that holds an integer, as far as it has bits; those beside it stay.
+Registers with_integer(const Encoding& encoding, const Decimal& whole, const Registers& same) {
+  return catalogue::to_registers(encoding,
+                                 catalogue::to_pattern(encoding, {whole.sign(), whole.magnitude()}),
+                                 catalogue::to_pattern(encoding, same));
+}
+
 /// One element that is the nearest to a number, or stays as it is where none is near.
 Registers with_number(const Encoding& encoding, const Decimal& number, const Registers& same) {
   if (encoding.kind == Kind::date) return date_of(encoding, number, same);
@@ -75,9 +82,22 @@ Registers with_number(const Encoding& encoding, const Decimal& number, const Reg
   if (encoding.kind == Kind::bcd) {
     return encode(as_parameter(stored_as(encoding)), {fitting}).value_or(same);
   }
-  return catalogue::to_registers(
-      encoding, catalogue::to_pattern(encoding, {fitting.sign(), fitting.magnitude()}),
-      catalogue::to_pattern(encoding, same));
+  return with_integer(encoding, fitting, same);
+}
+
+/// `make` of each element, one behind the other. It gets what the element is and holds.
+template <typename Make>
+Registers of_each(const Encoding& encoding, const Registers& present, Make make) {
+  if (encoding.count == 1) return make(encoding, present);
+  const Encoding one = element_of(encoding);
+  const auto size = static_cast<std::ptrdiff_t>(catalogue::register_count(one));
+  Registers all;
+  while (all.size() < present.size()) {
+    const auto own = present.begin() + static_cast<std::ptrdiff_t>(all.size());
+    const Registers next = make(one, Registers(own, own + size));
+    all.insert(all.end(), next.begin(), next.end());
+  }
+  return all;
 }
 
 /// The smallest range that has all of both.
@@ -481,31 +501,20 @@ std::optional<Decimal> RegisterBank::number(const Place& place) const {
 }
 
 void RegisterBank::set_number(const Place& place, const Decimal& number) {
-  const Registers present = registers(place);
-  if (place.encoding.count == 1) return put(place, with_number(place.encoding, number, present));
-  const Encoding one = element_of(place.encoding);
-  const auto size = static_cast<std::ptrdiff_t>(catalogue::register_count(one));
-  Registers all;
-  while (all.size() < present.size()) {
-    const auto own = present.begin() + static_cast<std::ptrdiff_t>(all.size());
-    const Registers next = with_number(one, number, Registers(own, own + size));
-    all.insert(all.end(), next.begin(), next.end());
-  }
-  put(place, all);
+  put(place,
+      of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
+        return with_number(one, number, same);
+      }));
 }
 
 // A counter begins anew behind its last number.
 void RegisterBank::set_stored(const Place& place, std::int64_t stored) {
-  Place plain = place;
-  plain.encoding = stored_as(place.encoding);
-  Decimal number(stored);
-  if (plain.encoding.is_integer() && plain.encoding.kind != Kind::bcd) {
-    const std::uint64_t pattern =
-        catalogue::to_pattern(plain.encoding, {number.sign(), number.magnitude()});
-    number = to_decimal(catalogue::to_integer(plain.encoding, pattern));
-  }
-  plain.encoding.count = place.encoding.count;
-  set_number(plain, number);
+  const bool is_integer = place.encoding.is_integer() && place.encoding.kind != Kind::bcd;
+  put(place,
+      of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
+        return is_integer ? with_integer(one, Decimal(stored), same)
+                          : with_number(stored_as(one), Decimal(stored), same);
+      }));
 }
 
 // ---- names ----
