@@ -110,13 +110,12 @@ Result<void> RestoreRun::save_present() {
 
 void RestoreRun::write_all() {
   work::write_in_passes(
-      task_->plan.writes,
-      [&](const PlannedWrite& write, work::Attempt attempt) { return write_one(write, attempt); },
+      task_->plan.writes, [&](const PlannedWrite& write) { return write_one(write); },
       [&](const PlannedWrite& write) { give_up(write); });
   if (!errors_.empty()) roll_back();
 }
 
-work::Step RestoreRun::write_one(const PlannedWrite& write, work::Attempt attempt) {
+work::Step RestoreRun::write_one(const PlannedWrite& write) {
   if (context_->interrupt.signalled()) {
     fail(context_->interrupt.error());
     return work::Step::ended;
@@ -129,10 +128,9 @@ work::Step RestoreRun::write_one(const PlannedWrite& write, work::Attempt attemp
                        .total = task_->plan.writes.size()});
     return work::Step::done;
   }
-  const bool may_wait =
-      attempt == work::Attempt::first && written.result == device::WriteResult::refused;
+  const bool is_refused = written.result == device::WriteResult::refused;
   refused_.insert_or_assign(&write, std::move(written));
-  if (may_wait) return work::Step::refused;
+  if (is_refused) return work::Step::refused;
   give_up(write);
   return work::Step::ended;
 }

@@ -35,7 +35,7 @@ class RestoreRun {
  private:
   Result<void> save_present();
   void write_all();
-  work::Step write_one(const catalogue::PlannedWrite& write, work::Attempt attempt);
+  work::Step write_one(const catalogue::PlannedWrite& write);
   /// Of a write that did not succeed.
   void give_up(const catalogue::PlannedWrite& write);
   void verify();

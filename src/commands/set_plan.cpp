@@ -94,18 +94,6 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
   return Assignment{std::move(*parameter), std::move(*value), text.substr(equals + 1)};
 }
 
-bool overlap(const Parameter& a, const Parameter& b) {
-  const auto end = [](const Parameter& p) {
-    return p.address.value + catalogue::register_count(p.encoding);
-  };
-  const bool meet = a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
-  if (!meet || !a.encoding.is_part() || !b.encoding.is_part() || a.address != b.address)
-    return meet;
-  const auto& [first, width] = a.encoding.slice;
-  const auto& [other, other_width] = b.encoding.slice;
-  return first < other + other_width && other < first + width;
-}
-
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
   return value ? std::optional(value->number) : std::nullopt;
 }
@@ -215,7 +203,7 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
     auto assignment = parse_assignment(text, profile, raw);
     if (!assignment) return tl::unexpected(std::move(assignment.error()));
     for (const Assignment& earlier : assignments) {
-      if (!overlap(earlier.parameter, assignment->parameter)) continue;
+      if (!catalogue::share_bits(earlier.parameter, assignment->parameter)) continue;
       return tl::unexpected(Error{.code = Errc::usage,
                                   .message = "its register is assigned twice",
                                   .hint = "give it one value",

@@ -26,7 +26,7 @@ Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
 Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
   SetCounts& counts = result_.counts;
   work::write_in_passes(
-      steps, [&](const SetStep& step, work::Attempt attempt) { return write_one(step, attempt); },
+      steps, [&](const SetStep& step) { return write_one(step); },
       [&](const SetStep& step) { give_up(step); });
   counts.left = steps.size() - counts.changed - counts.unchanged - counts.failed;
   tell_effects(steps, tool_->target, *context_);
@@ -65,7 +65,7 @@ void SetWriter::send_one(const SetStep& step) {
   log_.end(id, change);
 }
 
-work::Step SetWriter::write_one(const SetStep& step, work::Attempt attempt) {
+work::Step SetWriter::write_one(const SetStep& step) {
   if (context_->interrupt.signalled()) {
     fail(context_->interrupt.error());
     return work::Step::ended;
@@ -82,10 +82,9 @@ work::Step SetWriter::write_one(const SetStep& step, work::Attempt attempt) {
     succeed(step, Ending::written, now);
     return work::Step::done;
   }
-  const bool may_wait =
-      attempt == work::Attempt::first && written.result == device::WriteResult::refused;
+  const bool is_refused = written.result == device::WriteResult::refused;
   refused_.insert_or_assign(&step, std::move(written));
-  if (may_wait) return work::Step::refused;
+  if (is_refused) return work::Step::refused;
   give_up(step);
   return work::Step::ended;
 }

@@ -41,7 +41,7 @@ class SetWriter {
   void succeed(const SetStep& step, Ending ending, const catalogue::Value& now);
   void fail(const Error& error);
   void send_one(const SetStep& step);
-  work::Step write_one(const SetStep& step, work::Attempt attempt);
+  work::Step write_one(const SetStep& step);
   /// Of a write that did not succeed.
   void give_up(const SetStep& step);
   Result<SetResult> end(Summary summary);

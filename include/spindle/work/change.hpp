@@ -33,10 +33,7 @@ enum class Step : std::uint8_t {
   ended,      ///< nothing more is to be written
 };
 
-/// Whether a step that is refused may be tried again.
-enum class Attempt : std::uint8_t { first, last };
-
-/// Calls `write(item, attempt)` for each item in turn. Where values bound each other, what is
+/// Calls `write(item)` for each item in turn. Where values bound each other, what is
 /// refused may be taken behind the others: it is tried once more, if something else was written
 /// meanwhile. `refuse(item)` is told of what is refused for good.
 template <typename Items, typename Write, typename Refuse>
@@ -48,14 +45,14 @@ void write_in_passes(const Items& items, Write write, Refuse refuse) {
   std::vector<Refused> refused;
   std::size_t written = 0;
   for (const auto& item : items) {
-    const Step step = write(item, Attempt::first);
+    const Step step = write(item);
     if (step == Step::ended) return;
     if (step == Step::refused) refused.push_back({&item, written});
     if (step == Step::done) ++written;
   }
   for (const Refused& one : refused) {
     const bool is_worth_it = written > one.written_before;
-    const Step step = is_worth_it ? write(*one.item, Attempt::last) : Step::refused;
+    const Step step = is_worth_it ? write(*one.item) : Step::refused;
     if (step == Step::ended) return;
     if (step == Step::refused) return refuse(*one.item);
     ++written;
