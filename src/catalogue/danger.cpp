@@ -87,7 +87,7 @@ std::optional<Danger> Dangers::find(const Parameter& parameter) const {
   Danger danger{.hazard = parameter.hazard};
   for (const Source& source : sources_) {
     const bool read = touches(source, parameter.address);
-    if (!read && !touches(source, parameter.write_address.value_or(parameter.address))) continue;
+    if (!read && !touches(source, parameter.written_at())) continue;
     danger.runs_motor |= source.danger.runs_motor;
     danger.is_guarded |= source.danger.is_guarded;
     const bool names_action = danger.action.empty() && source.danger.hazard == danger.hazard;

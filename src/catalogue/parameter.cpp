@@ -8,6 +8,21 @@ std::vector<std::string> to_strings(const List<Text>& texts) {
   return {texts.begin(), texts.end()};
 }
 
+bool share_registers(const Parameter& a, const Parameter& b) {
+  const auto end = [](const Parameter& parameter) {
+    return parameter.address.value + register_count(parameter.encoding);
+  };
+  return a.table == b.table && a.address.value < end(b) && b.address.value < end(a);
+}
+
+bool share_bits(const Parameter& a, const Parameter& b) {
+  const BitSlice& one = a.encoding.slice;
+  const BitSlice& other = b.encoding.slice;
+  if (!share_registers(a, b)) return false;
+  if (one.is_whole() || other.is_whole() || a.address != b.address) return true;
+  return one.first < other.first + other.width && other.first < one.first + one.width;
+}
+
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) {
   std::vector<BitName> counting;
   for (const BitName& name : parameter.bits) {

@@ -89,14 +89,6 @@ bool every_register_writable(const Profile& profile, const Parameter& raw) {
   return true;
 }
 
-bool overlap(const Parameter& one, const Parameter& other) {
-  const auto end = [](const Parameter& parameter) {
-    return parameter.address.value + register_count(parameter.encoding);
-  };
-  return one.table == other.table && one.address.value < end(other) &&
-         other.address.value < end(one);
-}
-
 Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
   if (raw && raw->encoding.word_order == WordOrder::big) {
     raw->encoding.word_order = profile.link.word_order;
@@ -346,7 +338,7 @@ Result<Parameter> Profile::find(std::string_view name) const {
 
 Result<void> Profile::may_read(const Parameter& parameter) const {
   for (const Parameter& named : parameters) {
-    if (named.reading != Reading::consumes || !overlap(named, parameter)) continue;
+    if (named.reading != Reading::consumes || !share_registers(named, parameter)) continue;
     if (events && events->flag == named.name) {
       return tl::unexpected(
           Error{.code = Errc::usage,
@@ -373,7 +365,7 @@ Result<std::vector<Parameter>> Profile::describe(const std::vector<std::string>&
 
 bool Profile::consumes(const Parameter& parameter) const {
   return std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& named) {
-    return named.reading == Reading::consumes && overlap(named, parameter);
+    return named.reading == Reading::consumes && share_registers(named, parameter);
   });
 }
 
@@ -384,7 +376,7 @@ Parameter Profile::numbered_parameter(std::uint16_t number) const {
 Parameter Profile::with_secrecy(Parameter parameter) const {
   const bool holds_secret =
       std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& named) {
-        return named.secrecy == Secrecy::secret && overlap(named, parameter);
+        return named.secrecy == Secrecy::secret && share_registers(named, parameter);
       });
   if (holds_secret) parameter.secrecy = Secrecy::secret;
   return parameter;

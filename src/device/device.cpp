@@ -608,7 +608,7 @@ Result<void> Device::while_busy(const std::function<Result<void>()>& write) {
 }
 
 Result<void> Device::send_write(const Parameter& parameter, const Registers& registers) {
-  const modbus::RegisterAddress first = parameter.write_address.value_or(parameter.address);
+  const modbus::RegisterAddress first = parameter.written_at();
   return while_busy([&] { return write_registers(parameter.table, first, registers); })
       .map_error(
           [&](Error error) { return about(std::move(error), parameter.name, parameter.address); });
@@ -824,7 +824,7 @@ Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
 Result<void> Device::send(const Parameter& parameter, const Decimal& number) {
   const auto registers = registers_for(parameter, {number});
   if (!registers) return tl::unexpected(registers.error());
-  const auto first = parameter.write_address.value_or(parameter.address);
+  const auto first = parameter.written_at();
   return write_registers(parameter.table, first, *registers).map_error([&](Error error) {
     return about(std::move(error), parameter.name, parameter.address);
   });
@@ -970,7 +970,7 @@ Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
   const auto registers = catalogue::encode(parameter, value);
   if (!registers) return tl::unexpected(registers.error());
   if (auto fits = catalogue::check_pair(parameter.encoding, profile_->link); !fits) return fits;
-  const auto first = parameter.write_address.value_or(parameter.address);
+  const auto first = parameter.written_at();
   return broadcast_registers(parameter.table, first, *registers).map_error([&](Error error) {
     return about(std::move(error), parameter.name, parameter.address);
   });

@@ -120,14 +120,6 @@ void registers_are_in_the_table(const ProfileDraft& draft, Diagnostics& findings
   });
 }
 
-/// Bits of one register may be those of several parameters.
-bool share_bits(const Parameter& a, const Parameter& b) {
-  const auto& one = a.encoding.slice;
-  const auto& other = b.encoding.slice;
-  if (one.is_whole() || other.is_whole() || a.address != b.address) return true;
-  return one.first < other.first + other.width && other.first < one.first + one.width;
-}
-
 void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
   std::vector<Span> spans;
   spans.reserve(draft.parameters.size());
@@ -141,9 +133,8 @@ void overlaps_are_declared(const ProfileDraft& draft, Diagnostics& findings) {
   for (std::size_t i = 1; i < spans.size(); ++i) {
     const Span& span = spans[i];
     const Span& before = spans[reaching];
-    const bool overlap =
-        span.table == before.table && span.first <= before.last &&
-        share_bits(draft.profile.parameters[span.index], draft.profile.parameters[before.index]);
+    const bool overlap = catalogue::share_bits(draft.profile.parameters[span.index],
+                                               draft.profile.parameters[before.index]);
     const bool declared =
         draft.parameters[span.index].overlaps || draft.parameters[before.index].overlaps;
     if (overlap && !declared) {

@@ -133,6 +133,11 @@ struct Parameter {
   /// Parameters that are written before and behind this one, where they are written together.
   List<Text> before = {};
   List<Text> after = {};
+
+  /// Where it is written.
+  [[nodiscard]] modbus::RegisterAddress written_at() const {
+    return write_address.value_or(address);
+  }
 };
 
 /// The same texts, where strings are asked for.
@@ -148,6 +153,13 @@ Parameter part_of(const Parameter& parameter, const BitName& bit);
 
 /// The parameter with the scale that counts while `scale_by` has this value.
 Parameter with_power(Parameter parameter, std::int64_t power);
+
+/// Whether two parameters, where they are read, have a register in common.
+bool share_registers(const Parameter& a, const Parameter& b);
+
+/// The same of bits: parts of one register may share it without a bit in common. Parts that begin
+/// at different registers count as a whole.
+bool share_bits(const Parameter& a, const Parameter& b);
 
 // As written in profiles and records.
 constexpr std::string_view to_text(Kind kind) { return kind_words.text(kind); }
