@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/base/error.hpp"
+#include "spindle/store/rows.hpp"
+
+namespace spindle::store {
+
+/// Which rows are wanted. What is empty asks for all.
+struct Filter {
+  std::vector<RowId> tools = {};
+  std::vector<RowId> places = {};                ///< of events only
+  std::optional<WallTime> since = std::nullopt;  ///< from this time on
+  std::optional<WallTime> until = std::nullopt;  ///< before this time
+  std::optional<std::int64_t> preset = std::nullopt;
+  std::vector<std::string> kinds = {};
+  std::optional<std::int64_t> epoch = std::nullopt;
+  std::optional<std::uint16_t> number = std::nullopt;
+  RowId after = 0;                                   ///< rows behind this one
+  std::optional<std::size_t> newest = std::nullopt;  ///< at most so many, the newest ones
+};
+
+/// How the numbers of one tool in one epoch are covered by rows and gaps.
+struct Coverage {
+  RowId tool = 0;
+  std::int64_t epoch = 0;
+  std::uint16_t first = 0;
+  std::uint16_t last = 0;
+  std::size_t rows = 0;
+  std::size_t in_gaps = 0;  ///< numbers inside gaps that are counted
+  std::size_t holes = 0;    ///< numbers between first and last that are neither a row nor in a gap
+  std::size_t unknown_gaps = 0;  ///< gaps of unknown size, or that may be larger
+};
+
+/// Reads a store, also while it is written, and by several programs. Every function sees the store
+/// as it was at one moment. Errors: `bad_file` where it is no store, a newer or a damaged one;
+/// `storage` where it cannot be read. One thread.
+class Reader {
+ public:
+  static Result<std::unique_ptr<Reader>> open(const std::string& path);
+
+  Reader() = default;
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+  virtual ~Reader() = default;
+
+  virtual Result<std::vector<Tool>> tools() = 0;
+  virtual Result<std::vector<Place>> places() = 0;  ///< the oldest first
+  virtual Result<std::vector<Epoch>> epochs() = 0;
+  virtual Result<std::vector<PresetSettings>> settings() = 0;  ///< by tool, preset and time
+
+  /// In the order of the store, until `take` returns false.
+  virtual Result<void> events(const Filter& filter,
+                              const std::function<bool(const EventView&)>& take) = 0;
+  virtual Result<std::vector<Gap>> gaps(const Filter& filter) = 0;
+  virtual Result<void> happenings(const Filter& filter,
+                                  const std::function<bool(const Happening&)>& take) = 0;
+
+  /// The newest event's id; 0: there is none.
+  virtual Result<RowId> newest() = 0;
+
+  virtual Result<std::vector<Coverage>> coverage() = 0;
+  /// What SQLite's integrity check and ours find wrong, a line each; empty: nothing.
+  virtual Result<std::vector<std::string>> integrity() = 0;
+
+  /// A whole copy, made while others write. Error `usage`: the file is there.
+  virtual Result<void> backup(const std::string& path) = 0;
+};
+
+}  // namespace spindle::store

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "spindle/base/error.hpp"
+#include "spindle/store/rows.hpp"
+
+namespace spindle::store {
+
+/// An event with the gap that it made known: both are stored, or neither.
+struct NewEvent {
+  Event event = {};
+  std::optional<EpochReason> begins = std::nullopt;  ///< empty: counted on in the epoch of before
+  std::optional<Gap> gap = std::nullopt;             ///< `epoch` and `tool` are the writer's
+};
+
+struct NewGap {
+  Gap gap = {};  ///< `epoch` is the writer's
+};
+
+/// The tool was listened to until then.
+struct Seen {
+  RowId tool = 0;
+  WallTime at = {};
+};
+
+using Entry = std::variant<NewEvent, NewGap, PresetSettings, Happening, Seen>;
+
+/// What became of one entry.
+struct Stored {
+  enum class As : std::uint8_t {
+    row,       ///< it is a new row
+    known,     ///< the very same was there: nothing was added
+    conflict,  ///< another event had its number: it is a row of a new epoch, behind a gap
+    merged,    ///< it says nothing that is not there: settings that did not change, Seen
+  };
+  As as = As::row;
+  RowId id = 0;            ///< of the row; 0: it has none
+  std::int64_t epoch = 0;  ///< of an event or gap
+  RowId gap = 0;           ///< row of the gap that was stored with an event; 0: none
+};
+
+/// What is known of the last that a tool told.
+struct Last {
+  std::int64_t epoch = 0;
+  std::uint16_t number = 0;  ///< the last that is a row, or the last inside a gap behind it
+  std::optional<Registers> block = std::nullopt;  ///< where it is a row
+  WallTime seen = {};                             ///< until when the tool was listened to
+};
+
+struct Trimmed {
+  std::size_t events = 0;
+  std::size_t gaps = 0;
+  std::size_t happenings = 0;
+};
+
+/// The one writer of a store. Every function is one transaction that is durable when it returns
+/// (WAL, synchronous=FULL), or an error after which nothing of it is there: `storage` (disk full,
+/// I/O error; trying again may help), `bad_file` (no store, a newer one, a damaged one). Several
+/// threads may call it.
+class Writer {
+ public:
+  /// Opens or makes the store and its folder's lock file (path + ".lock"). Errors: `storage` where
+  /// another program writes it (the message names its process id) or it cannot be made; `bad_file`
+  /// where it is no store of ours or a newer one.
+  static Result<std::unique_ptr<Writer>> open(const std::string& path);
+
+  Writer() = default;
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+  virtual ~Writer() = default;
+
+  /// The row of a tool, made where there is none.
+  virtual Result<RowId> tool(const ToolName& name, const std::string& model) = 0;
+  /// Whether there is a tool of this name.
+  virtual Result<bool> has_tool(const ToolName& name) = 0;
+  /// The row of a place, made where the newest one of the tool differs in anything but id and
+  /// since.
+  virtual Result<RowId> place(const Place& place) = 0;
+  /// Empty: it never told anything.
+  virtual Result<std::optional<Last>> last(RowId tool) = 0;
+
+  /// Stores all entries in their order, in one transaction. What became of each stands in the same
+  /// order. An event whose number its epoch has already is compared in every register: equal is
+  /// `known`; otherwise nothing is ever dropped (`conflict`).
+  virtual Result<std::vector<Stored>> commit(std::span<const Entry> entries) = 0;
+
+  /// Deletes what is older, but for the last event of each tool and what a sink has not got. Error
+  /// `usage`: a sink has not got it, named in the message. Leaves a happening of type "trim".
+  virtual Result<Trimmed> trim(WallTime before, WallTime now) = 0;
+};
+
+}  // namespace spindle::store
