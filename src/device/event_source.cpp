@@ -38,33 +38,38 @@ bool is_before(std::uint16_t number, std::uint16_t other) {
   return number != other && static_cast<std::uint16_t>(other - number) < half;
 }
 
-std::optional<EventGap> gap_of(const Tracked& tracked, EventOrigin origin) {
-  switch (tracked.novelty) {
+/// How many were missed, as far as it is known.
+std::optional<std::uint32_t> missed_of(const Tracked& tracked) {
+  const bool known = tracked.novelty == Sequence::jump || tracked.novelty == Sequence::wrap;
+  return known ? std::optional(tracked.missed) : std::nullopt;
+}
+
+/// Why events were not seen; empty: none was missed.
+std::string_view reason_of(Sequence novelty, EventOrigin origin) {
+  switch (novelty) {
     case Sequence::restart:
-      return EventGap{std::nullopt, "the tool counts its events anew: it was restarted"};
+      return "the tool counts its events anew: it was restarted";
     case Sequence::doubtful:
-      return EventGap{
-          std::nullopt,
-          "the tool may have been restarted while no client was connected, and count its "
-          "events anew"};
+      return "the tool may have been restarted while no client was connected, and count its events "
+             "anew";
     case Sequence::wrap:
-      return EventGap{tracked.missed, "the tool's event counter began again behind 65535"};
+      return "the tool's event counter began again behind 65535";
     case Sequence::jump:
       break;
     case Sequence::baseline:
     case Sequence::repeat:
     case Sequence::next:
-      return std::nullopt;
+      return {};
   }
   switch (origin) {
     case EventOrigin::catch_up:
-      return EventGap{tracked.missed, "events while no client was connected"};
+      return "events while no client was connected";
     case EventOrigin::poll:
-      return EventGap{tracked.missed, "events came faster than they were polled"};
+      return "events came faster than they were polled";
     case EventOrigin::push:
       break;
   }
-  return EventGap{tracked.missed, "the tool's event counter jumped"};
+  return "the tool's event counter jumped";
 }
 
 /// A tool that counts its events: polled, and its frames heard where it sends any.
@@ -74,7 +79,11 @@ class CounterSource : public EventSource {
       : layout_(profile), clock_(&clock), tell_(std::move(tell)) {}
 
   Result<void> attach(Device& device, Duration unseen) override;
-  void forget() override { tracker_ = {}; }
+  void forget() override {
+    tracker_ = {};
+    first_.reset();
+  }
+  void recall(std::optional<LastEvent> last) override;
   [[nodiscard]] bool polls() const override { return true; }
   Result<void> poll() override;
   void handle(const link::Spontaneous& frame) override {
@@ -105,18 +114,30 @@ class CounterSource : public EventSource {
   Tell tell_;
   Device* device_ = nullptr;
   EventTracker tracker_ = {};
+  /// How long the tool was not listened to behind the last event that was recalled.
+  std::optional<Duration> unseen_ = std::nullopt;
+  bool tells_first_ = false;
+  std::optional<std::uint16_t> first_ = std::nullopt;  ///< number of the event to tell as such
 };
+
+void CounterSource::recall(std::optional<LastEvent> last) {
+  tells_first_ = !last;
+  if (!last) return;
+  tracker_.set_last(last->number, std::move(last->block));
+  unseen_ = last->unseen;
+}
 
 /// The counter is read before the output is armed, and the last event once more after it: whatever
 /// happens in between is either pushed or fetched.
 Result<void> CounterSource::attach(Device& device, Duration unseen) {
   device_ = &device;
   if (tracker_.last()) {
-    tracker_.look_again(unseen);
+    tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
   } else {
     const auto number = device.event_number();
     if (!number) return tl::unexpected(number.error());
     tracker_.set_baseline(*number);
+    if (tells_first_) first_ = *number;
     take_waiting();  // pushed before the counter was read, so they are old
   }
   return arm().and_then([this] { return fetch_last(EventOrigin::catch_up).map([](Fetched) {}); });
@@ -131,8 +152,13 @@ Result<void> CounterSource::poll() {
   if (!fetched) return tl::unexpected(fetched.error());
   if (*fetched == Fetched::yes) return {};
   const auto missed = static_cast<std::uint16_t>(*number - tracker_.last().value_or(*number));
+  const bool wrapped = *number < tracker_.last();
+  tell_(EventGap{.missed = missed,
+                 .reason = "events came faster than they could be read",
+                 .after = tracker_.last(),
+                 .before = static_cast<std::uint16_t>(*number + 1),
+                 .sequence = wrapped ? Sequence::wrap : Sequence::jump});
   tracker_.set_baseline(*number);
-  tell_(EventGap{missed, "events came faster than they could be read"});
   return {};
 }
 
@@ -170,15 +196,37 @@ std::vector<link::Spontaneous> CounterSource::take_waiting() {
 
 void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime time) {
   const std::uint16_t number = layout_.number_of(block);
+  const std::optional<std::uint16_t> last = tracker_.last();
   const Tracked tracked = tracker_.track(number, block);
+  const bool is_first = std::exchange(first_, std::nullopt) == number &&
+                        tracked.novelty == Sequence::repeat && !EventTracker::is_blank(block);
+  if (is_first) {
+    return tell_(ToolEvent{.source = origin,
+                           .block = block,
+                           .time = time,
+                           .standing = Standing::first,
+                           .number = number,
+                           .sequence = Sequence::baseline});
+  }
   if (!tracked.is_new()) return;
-  if (const auto gap = gap_of(tracked, origin)) tell_(*gap);
   // Since it was restarted the tool has had no event; what stands in its registers is none.
   const bool restarted = tracked.novelty == Sequence::restart;
   const bool pushed = origin == EventOrigin::push;
-  if (restarted && number == 0 && (!pushed || EventTracker::is_blank(block))) return;
-  const Standing standing = restarted && !pushed ? Standing::remembered : Standing::result;
-  tell_(ToolEvent{origin, block, time, standing});
+  const bool is_none = restarted && number == 0 && (!pushed || EventTracker::is_blank(block));
+  if (const auto reason = reason_of(tracked.novelty, origin); !reason.empty()) {
+    tell_(EventGap{.missed = missed_of(tracked),
+                   .reason = std::string(reason),
+                   .after = last,
+                   .before = is_none ? std::nullopt : std::optional(number),
+                   .sequence = tracked.novelty});
+  }
+  if (is_none) return;
+  tell_(ToolEvent{.source = origin,
+                  .block = block,
+                  .time = time,
+                  .standing = restarted && !pushed ? Standing::remembered : Standing::result,
+                  .number = number,
+                  .sequence = tracked.novelty});
 }
 
 /// A tool that sends its events unasked, where it has to be told so again and again.
@@ -238,6 +286,7 @@ class FlagSource final : public EventSource {
   }
   Result<void> attach(Device& device, Duration unseen) override;
   void forget() override;
+  void recall(std::optional<LastEvent> last) override;
   [[nodiscard]] bool polls() const override { return true; }
   Result<void> poll() override { return look(EventOrigin::poll); }
 
@@ -263,9 +312,9 @@ Result<void> FlagSource::attach(Device& device, Duration /*unseen*/) {
     seen_ = std::move(*block);
     return look(EventOrigin::catch_up);
   }
-  tell_(EventGap{std::nullopt,
-                 "the tool does not count its results: of those while the link was lost only the "
-                 "last one can be known"});
+  tell_(EventGap{.missed = std::nullopt,
+                 .reason = "the tool does not count its results: of those while the link was lost "
+                           "only the last one can be known"});
   return look(EventOrigin::catch_up).and_then([this] {
     return look_behind(EventOrigin::catch_up, {});
   });
@@ -291,6 +340,14 @@ Result<void> FlagSource::look(EventOrigin origin) {
   return *flag == Shown::yes ? take_result(origin) : Result<void>();
 }
 
+/// An event that nothing is told of while no client looks at the flag: the last one counts, as
+/// after a lost link.
+void FlagSource::recall(std::optional<LastEvent> last) {
+  if (!last || !last->block) return;
+  seen_ = last->block;
+  told_ = std::move(last->block);
+}
+
 /// The flag is cleared, so now or never.
 Result<void> FlagSource::take_result(EventOrigin origin) {
   auto block = device_->event_block();
@@ -301,15 +358,15 @@ Result<void> FlagSource::take_result(EventOrigin origin) {
     block = device_->event_block();
   }
   if (!block) {
-    tell_(EventGap{
-        std::nullopt,
-        fmt::format("there is a result, and it could not be read: {}", message_of(block.error())),
-        true});
+    tell_(EventGap{.missed = std::nullopt,
+                   .reason = fmt::format("there is a result, and it could not be read: {}",
+                                         message_of(block.error())),
+                   .is_only_here = true});
   } else if (told_ == *block) {
-    tell_(EventGap{1,
-                   "the result that was read is the one before: another came before it was read, "
-                   "or both are equal",
-                   true});
+    tell_(EventGap{.missed = 1,
+                   .reason = "the result that was read is the one before: another came before it "
+                             "was read, or both are equal",
+                   .is_only_here = true});
   } else {
     tell(origin, std::move(*block));
   }
@@ -327,7 +384,9 @@ Result<void> FlagSource::look_behind(EventOrigin origin, const std::string& doub
     tell(origin, std::move(*block));
     return {};
   }
-  if (!doubt.empty()) tell_(EventGap{std::nullopt, doubt, true});
+  if (!doubt.empty()) {
+    tell_(EventGap{.missed = std::nullopt, .reason = doubt, .is_only_here = true});
+  }
   if (!block) return tl::unexpected(std::move(block.error()));
   return {};
 }

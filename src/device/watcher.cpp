@@ -48,6 +48,7 @@ bool may_pass(const Error& error) {
     case ExitStatus::unreachable:
     case ExitStatus::no_answer:
     case ExitStatus::malformed:
+    case ExitStatus::storage:  // what keeps the events cannot do so now
       return true;
     default:
       return false;
@@ -67,12 +68,14 @@ Result<void> ask_twice(Ask ask) {
 
 }  // namespace
 
-Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell)
+Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell,
+                 Keeper keeper)
     : open_(std::move(open)),
       make_plan_(std::move(plan)),
       reconnection_(reconnection),
       clock_(&clock),
-      tell_(std::move(tell)) {}
+      tell_(std::move(tell)),
+      keeper_(std::move(keeper)) {}
 
 Result<void> Watcher::run(const Until& until) {
   auto watched = watch(until);
@@ -160,7 +163,17 @@ Result<void> Watcher::attach(Link link) {
   connected_at_ = clock_->now();
   reached_ = true;
   compare_identity(link_->identity);
+  if (auto greeted = greet(); !greeted) return greeted;
   return begin();
+}
+
+/// What keeps the events learns of the tool, and says what it knows of it where we know nothing.
+Result<void> Watcher::greet() {
+  if (!keeper_.greet) return {};
+  auto last = keeper_.greet(link_->device);
+  if (!last) return tl::unexpected(std::move(last.error()));
+  if (source_ && !std::exchange(recalled_, true)) source_->recall(std::move(*last));
+  return {};
 }
 
 Result<void> Watcher::adopt_profile(const catalogue::Profile& profile) {
@@ -172,6 +185,7 @@ Result<void> Watcher::adopt_profile(const catalogue::Profile& profile) {
   motor_.reset();
   if (plan_.motor) motor_.emplace(*plan_.motor, plan_.values);
   profile_ = &profile;
+  recalled_ = false;
   source_ = EventSource::make(profile, plan_.events, *clock_, [this](const auto& news) {
     if (std::holds_alternative<ToolEvent>(news)) served_ = true;
     std::visit([this](const auto& one) { tell(one); }, news);
@@ -194,9 +208,10 @@ void Watcher::compare_identity(const std::string& identity) {
   tell(LinkChange{LinkState::connected, attempts_, message});
   if (!other) return;
   if (source_) {
-    tell(
-        EventGap{std::nullopt, "what the tool of before did after its link was lost is not known"});
+    tell(EventGap{.missed = std::nullopt,
+                  .reason = "what the tool of before did after its link was lost is not known"});
     source_->forget();
+    recalled_ = false;
   }
   previous_.assign(plan_.values.size(), std::nullopt);
 }
@@ -244,6 +259,7 @@ Result<void> Watcher::run_due() {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
     if (auto alive = keep_alive(); !alive) return alive;
   }
+  if (auto done = run_errand(); !done) return done;
   if (!polls() || now < poll_due_) return {};
   const TimePoint due = poll_due_;
   keep_beat(now);
@@ -269,6 +285,22 @@ void Watcher::tell_lag(TimePoint now) {
   tell(PollLag{beat_.missed, plan_.interval, achieved});
   beat_ = {.since = now};
   lag_told_at_ = now;
+}
+
+/// Reads what was asked for beside the watch. What the tool refuses to say ends no watch.
+Result<void> Watcher::run_errand() {
+  if (!keeper_.errand) return {};
+  auto errand = keeper_.errand();
+  if (!errand) return {};
+  std::vector<Reading> readings;
+  auto read = ask([&] {
+    return link_->device.read_each(errand->wanted, Limits::skip).map([&](auto taken) {
+      readings = std::move(taken);
+    });
+  });
+  if (!read) return read;
+  errand->take(readings);
+  return {};
 }
 
 Result<void> Watcher::keep_alive() {

@@ -234,6 +234,122 @@ TEST_CASE("push without arming: frames come by themselves, and nothing is switch
   CHECK(bench.gaps.empty());
 }
 
+namespace {
+
+/// The event that stands in the tool, as a source that has no record of it tells it.
+ToolEvent standing(Bench& bench) {
+  bench.source->recall({});
+  REQUIRE(bench.attach());
+  REQUIRE(bench.events.size() == 1);
+  return bench.events.front();
+}
+
+/// What a second source tells, of which a record says that this was the last event.
+void go_on(Bench& bench, std::optional<device::LastEvent> last) {
+  bench.events.clear();
+  bench.gaps.clear();
+  bench.source = EventSource::make(bench.profile, EventMode::declared, bench.clock,
+                                   [&bench](const auto& news) {
+                                     if (const auto* event = std::get_if<ToolEvent>(&news))
+                                       bench.events.push_back(*event);
+                                     if (const auto* gap = std::get_if<EventGap>(&news))
+                                       bench.gaps.push_back(*gap);
+                                   });
+  bench.source->recall(std::move(last));
+  REQUIRE(bench.attach());
+}
+
+}  // namespace
+
+TEST_CASE("counter: where a record is kept, the event that stands there at first is told, too") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent first = standing(bench);
+  CHECK(first.standing == device::Standing::first);
+  CHECK(first.source == EventOrigin::catch_up);
+  CHECK(bench.gaps.empty());
+  bench.happen();
+  const auto frame = bench.device->session().next_spontaneous(bench.clock.now() + 100ms);
+  REQUIRE((frame && *frame));
+  bench.source->handle(**frame);
+  REQUIRE(bench.events.size() == 2);
+  CHECK(bench.events.back().standing == device::Standing::result);
+  CHECK(bench.events.back().number == *first.number + 1);
+  REQUIRE(bench.attach());
+  CHECK(bench.events.size() == 2);
+}
+
+TEST_CASE("counter: what happened since the last event of the record is a gap and one event") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent last = standing(bench);
+  for (int i = 0; i < 3; ++i) bench.happen();
+  go_on(bench, device::LastEvent{*last.number, last.block, 1s});
+  REQUIRE(bench.gaps.size() == 1);
+  CHECK(bench.gaps.front().missed == 2U);
+  CHECK(bench.gaps.front().after == last.number);
+  CHECK(bench.gaps.front().before == *last.number + 3);
+  REQUIRE(bench.events.size() == 1);
+  CHECK(bench.events.front().source == EventOrigin::catch_up);
+  CHECK(bench.events.front().standing == device::Standing::result);
+  CHECK(bench.events.front().number == *last.number + 3);
+}
+
+TEST_CASE("counter: the last event of the record is not told again") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent last = standing(bench);
+  for (const bool with_block : {true, false}) {
+    CAPTURE(with_block);
+    go_on(bench, device::LastEvent{*last.number,
+                                   with_block ? std::optional(last.block) : std::nullopt, 1s});
+    CHECK(bench.events.empty());
+    CHECK(bench.gaps.empty());
+  }
+}
+
+TEST_CASE("counter: another event with the last number is one of a tool that was restarted") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent last = standing(bench);
+  Registers other = last.block;
+  ++other.back();
+  go_on(bench, device::LastEvent{*last.number, other, 1s});
+  REQUIRE(bench.gaps.size() == 1);
+  CHECK(!bench.gaps.front().missed.has_value());
+  CHECK(bench.gaps.front().sequence == device::Sequence::restart);
+  REQUIRE(bench.events.size() == 1);
+  CHECK(bench.events.front().standing == device::Standing::remembered);
+}
+
+TEST_CASE("counter: a tool that was not listened to for long may have begun to count anew") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent last = standing(bench);
+  bench.happen();
+  bench.happen();
+  go_on(bench, device::LastEvent{*last.number, last.block, 24h});
+  REQUIRE(bench.gaps.size() == 1);
+  CHECK(!bench.gaps.front().missed.has_value());
+  CHECK(bench.gaps.front().after == last.number);
+  CHECK(bench.gaps.front().before == *last.number + 2);
+  CHECK(bench.gaps.front().sequence == device::Sequence::doubtful);
+}
+
+TEST_CASE("flag: the last result of the record is compared with the one that stands there") {
+  Bench bench("kducer");
+  bench.happen();
+  REQUIRE(bench.attach());
+  REQUIRE(bench.events.size() == 1);
+  const ToolEvent last = bench.events.front();
+  go_on(bench, device::LastEvent{0, last.block, 1s});
+  CHECK(bench.events.empty());
+  REQUIRE(bench.gaps.size() == 1);  // it does not count, so what was missed is not known
+  bench.happen(EventKind::fastening_ng);
+  go_on(bench, device::LastEvent{0, last.block, 1s});
+  CHECK(bench.events.size() == 1);
+}
+
 TEST_CASE("flag: an interrupt takes no result with it") {
   for (const std::uint16_t asked : {flag_register, block_register}) {
     CAPTURE(asked);

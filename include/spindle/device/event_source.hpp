@@ -10,6 +10,7 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/device/device.hpp"
+#include "spindle/device/event_tracker.hpp"
 
 namespace spindle::device {
 
@@ -24,6 +25,7 @@ enum class EventOrigin : std::uint8_t {
 enum class Standing : std::uint8_t {
   result,      ///< it happened, and was not told before
   remembered,  ///< the tool held it when its counter was found restarted: it may be an old one
+  first,       ///< the tool held it when it was looked at for the first time: its age is not known
 };
 
 /// A new event. `block` are the registers of the profile's event block.
@@ -32,7 +34,9 @@ struct ToolEvent {
   Registers block;
   WallTime time;
   Standing standing = Standing::result;
-  bool is_only_here = false;  ///< the tool gave it away when it was read
+  bool is_only_here = false;                           ///< the tool gave it away when it was read
+  std::optional<std::uint16_t> number = std::nullopt;  ///< empty: the tool does not count
+  Sequence sequence = Sequence::next;                  ///< what its number says
 };
 
 /// Events that happened, or may have, and were not seen.
@@ -40,6 +44,17 @@ struct EventGap {
   std::optional<std::uint32_t> missed;  ///< empty: unknown
   std::string reason;
   bool is_only_here = false;  ///< as of a result
+  /// The numbers between which they are missing, where they are known.
+  std::optional<std::uint16_t> after = std::nullopt;
+  std::optional<std::uint16_t> before = std::nullopt;
+  Sequence sequence = Sequence::jump;  ///< what made it known
+};
+
+/// The last event that a record of the tool's events holds.
+struct LastEvent {
+  std::uint16_t number = 0;
+  std::optional<Registers> block = std::nullopt;  ///< empty: only its number is known
+  Duration unseen = {};                           ///< how long the tool was not listened to since
 };
 
 /// How events are learned of.
@@ -75,6 +90,11 @@ class EventSource {
 
   /// Another tool answers now: nothing of what is known counts.
   virtual void forget() = 0;
+
+  /// Events are kept in a record, and this is the last one there; empty: none is. Then the one that
+  /// stands in the tool at first is told, too. To be called before the first attach(), and behind
+  /// forget().
+  virtual void recall(std::optional<LastEvent> last) = 0;
 
   /// When run_due() is next due; TimePoint::max(): never.
   [[nodiscard]] virtual TimePoint next_due() const { return TimePoint::max(); }

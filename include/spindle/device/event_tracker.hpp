@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
@@ -46,6 +47,12 @@ class EventTracker {
   void set_baseline(std::uint16_t number) {
     last_ = number;
     last_block_.reset();
+  }
+
+  /// The last event that is known of a tool from before: its block, where it was seen.
+  void set_last(std::uint16_t number, std::optional<Registers> block) {
+    last_ = number;
+    last_block_ = std::move(block);
   }
 
   /// The connection is a new one, and the tool was not looked at for so long. Nothing comes late on

@@ -58,6 +58,20 @@ struct WatchPlan {
   Samples samples = Samples::changes;
 };
 
+/// Something to read of the tool between its events.
+struct Errand {
+  std::vector<catalogue::Parameter> wanted = {};
+  std::function<void(const std::vector<Reading>&)> take = {};
+};
+/// What keeps the events in a record. All may be empty.
+struct Keeper {
+  /// Called on every connection before anything is asked of its events; returns the last event of
+  /// this tool that is in the record. An error of status `storage` counts as trouble of the link.
+  std::function<Result<std::optional<LastEvent>>(Device& device)> greet = {};
+  /// Asked on every turn.
+  std::function<std::optional<Errand>()> errand = {};
+};
+
 /// What the listener wants next.
 enum class WatchControl : std::uint8_t { go_on, stop };
 
@@ -82,7 +96,8 @@ class Watcher {
   /// When to end, asked anew at least once a second; a point in the past ends at once.
   using Until = std::function<TimePoint()>;
 
-  Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell);
+  Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell,
+          Keeper keeper = {});
 
   /// Returns at its end, or when the listener wants to stop; then the tool's output
   /// is switched off again where the link still allows it, and what had arrived is told. Errors: an
@@ -100,9 +115,11 @@ class Watcher {
   Result<void> attach(Link link);
   Result<void> adopt_profile(const catalogue::Profile& profile);
   void compare_identity(const std::string& identity);
+  Result<void> greet();
   Result<void> begin();
   Result<void> serve(const Until& until);
   Result<void> run_due();
+  Result<void> run_errand();
   Result<void> keep_alive();
   Result<void> ask(const std::function<Result<void>()>& request);
   Result<void> poll();
@@ -131,6 +148,7 @@ class Watcher {
   Reconnection reconnection_;
   Clock* clock_;
   Tell tell_;
+  Keeper keeper_;
   const catalogue::Profile* profile_ = nullptr;  ///< empty until the first link
   WatchPlan plan_ = {};
   std::optional<Link> link_ = std::nullopt;
@@ -154,6 +172,7 @@ class Watcher {
   bool served_ = false;       ///< this link has kept the tool alive, or brought an event
   bool reached_ = false;      ///< there was a link
   bool caveat_told_ = false;
+  bool recalled_ = false;  ///< the source knows what the record says of this tool
   bool stopped_ = false;
   std::optional<Error> trouble_ = std::nullopt;  ///< the last one
   /// Since a lag was told, or since the link began.
