@@ -1,6 +1,35 @@
 #include "spindle/catalogue/event_layout.hpp"
 
+#include <algorithm>
+#include <array>
+#include <map>
+
 namespace spindle::catalogue {
+namespace {
+
+/// Keys of an event's record that are no registers.
+constexpr std::array<std::string_view, 15> reserved_keys = {
+    "schema", "type", "time", "target", "serial",     "epoch",       "id",        "kind",
+    "source", "raw",  "text", "result", "remembered", "torque_unit", "error_text"};
+
+/// The last word of a name; the whole name where that is not clear.
+void name_keys(std::vector<EventLayout::Field>& fields) {
+  std::map<std::string, std::size_t> taken;
+  const auto last_word = [](const std::string& name) { return name.substr(name.rfind('.') + 1); };
+  for (const auto& field : fields) ++taken[last_word(field.parameter->name)];
+  for (auto& field : fields) {
+    std::string key = last_word(field.parameter->name);
+    const bool is_reserved =
+        std::find(reserved_keys.begin(), reserved_keys.end(), key) != reserved_keys.end();
+    const bool is_number = key.find_first_not_of("0123456789") == std::string::npos;
+    if (is_reserved || is_number || taken[key] > 1) key = field.parameter->name;
+    std::replace(key.begin(), key.end(), '-', '_');
+    std::replace(key.begin(), key.end(), '.', '_');
+    field.key = std::move(key);
+  }
+}
+
+}  // namespace
 
 EventLayout::EventLayout(const Profile& profile) : facts_(&*profile.events) {
   const auto table = table_of(*facts_);
@@ -13,7 +42,9 @@ EventLayout::EventLayout(const Profile& profile) : facts_(&*profile.events) {
     fields_.push_back({&parameter, at});
     if (parameter.name == facts_->number) number_at_ = at;
     if (parameter.name == facts_->kind) kind_at_ = at;
+    if (parameter.name == facts_->preset) preset_at_ = at;
   }
+  name_keys(fields_);
 }
 
 std::optional<EventKind> EventLayout::kind_of(RegisterView block) const {

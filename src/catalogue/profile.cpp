@@ -423,6 +423,14 @@ std::optional<Profile::LimitRegisters> Profile::limit_registers(const Parameter&
   return LimitRegisters{mirror(limits->minimum_offset), mirror(limits->maximum_offset)};
 }
 
+std::string name_of(const EventSetting& setting, std::int64_t preset) {
+  constexpr std::string_view place = "{n}";
+  std::string name = setting.parameter.to_string();
+  const auto at = name.find(place);
+  if (at != std::string::npos) name.replace(at, place.size(), std::to_string(preset));
+  return name;
+}
+
 bool sends_unasked(const Profile& profile) {
   return profile.events && profile.events->model == EventModel::push;
 }

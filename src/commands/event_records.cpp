@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <map>
 #include <utility>
 
 #include "motor_records.hpp"
@@ -22,44 +20,18 @@ using report::Field;
 using report::Record;
 using report::Tone;
 
-/// Keys of an event record that are no registers.
-constexpr std::array<std::string_view, 12> reserved_keys = {
-    "schema", "type", "time",   "target",     "kind",        "source",
-    "raw",    "text", "result", "remembered", "torque_unit", "error_text"};
-
-/// The last word of a name, as screw_count of event.screw-count; the whole name where that is not
-/// clear.
-std::vector<std::string> keys_of(const catalogue::EventLayout& layout) {
-  std::map<std::string, std::size_t> taken;
-  const auto last_word = [](const std::string& name) { return name.substr(name.rfind('.') + 1); };
-  for (const auto& field : layout.fields()) ++taken[last_word(field.parameter->name)];
-  std::vector<std::string> keys;
-  for (const auto& field : layout.fields()) {
-    std::string key = last_word(field.parameter->name);
-    const bool is_reserved =
-        std::find(reserved_keys.begin(), reserved_keys.end(), key) != reserved_keys.end();
-    const bool is_number = key.find_first_not_of("0123456789") == std::string::npos;
-    if (is_reserved || is_number || taken[key] > 1) key = field.parameter->name;
-    std::replace(key.begin(), key.end(), '-', '_');
-    std::replace(key.begin(), key.end(), '.', '_');
-    keys.push_back(std::move(key));
-  }
-  return keys;
-}
-
 /// Those that the profile wants to see, where it has events.
 std::vector<report::Column> result_columns(const catalogue::Profile& profile) {
   std::vector<report::Column> columns;
   if (!profile.events) return columns;
   const catalogue::EventLayout layout(profile);
-  const auto keys = keys_of(layout);
   for (const catalogue::EventColumn& wanted : profile.events->columns) {
-    for (std::size_t index = 0; index < keys.size(); ++index) {
-      const catalogue::Parameter& parameter = *layout.fields()[index].parameter;
-      if (parameter.name != wanted.parameter) continue;
-      const auto align = parameter.labels.empty() ? report::Align::right : report::Align::left;
+    for (const auto& field : layout.fields()) {
+      if (field.parameter->name != wanted.parameter) continue;
+      const bool is_number = field.parameter->labels.empty();
+      const auto align = is_number ? report::Align::right : report::Align::left;
       const std::size_t width = std::max<std::size_t>(wanted.width, wanted.heading.size());
-      columns.push_back({wanted.heading, keys[index], align, width});
+      columns.push_back({wanted.heading, field.key, align, width});
     }
   }
   return columns;
@@ -102,16 +74,21 @@ NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile
     : target_(&target), tables_(std::move(tables)) {
   if (!profile.events) return;
   layout_.emplace(profile);
-  keys_ = keys_of(*layout_);
-  for (std::size_t index = 0; index < keys_.size(); ++index) {
-    const catalogue::Parameter& parameter = *layout_->fields()[index].parameter;
-    if (parameter.name == profile.events->error) error_at_ = index;
-    if (parameter.unit == catalogue::torque_unit) has_torque_ = true;
+  for (const auto& field : layout_->fields()) {
+    if (field.parameter->name == profile.events->error) error_key_ = field.key;
+    if (field.parameter->unit == catalogue::torque_unit) has_torque_ = true;
   }
 }
 
 Record NewsRecords::blank(std::string type, WallTime time) const {
   return {.type = std::move(type), .target = target_->shown, .time = time, .fields = {}};
+}
+
+/// The name of an event or a gap, for ever.
+void NewsRecords::add_name(Record& record, const Naming& naming) const {
+  record.fields.push_back({"serial", text_or_null(naming.serial)});
+  record.fields.push_back({"epoch", naming.epoch ? number(*naming.epoch) : Cell()});
+  if (naming.id) record.fields.push_back({"id", number(*naming.id)});
 }
 
 EventKind NewsRecords::kind_of(const Registers& block) const {
@@ -124,34 +101,36 @@ std::string NewsRecords::error_text(std::int64_t code) const {
   return known == nullptr ? std::string() : known->text.to_string();
 }
 
-Record NewsRecords::event(const device::ToolEvent& news) const {
+Record NewsRecords::event(const device::ToolEvent& news, const Naming& naming) const {
   Record record = blank("event", news.time);
   const EventKind kind = kind_of(news.block);
-  record.fields.reserve(keys_.size() + 7);
+  record.fields.reserve(layout_->fields().size() + 10);
+  add_name(record, naming);
   record.fields.push_back({"kind", std::string(catalogue::to_text(kind))});
   record.fields.push_back({"source", std::string(origin_words.text(news.source))});
   std::string text;
-  for (std::size_t index = 0; index < keys_.size(); ++index) {
-    const auto& [parameter, at] = layout_->fields()[index];
+  for (const auto& [parameter, at, key] : layout_->fields()) {
     const auto words = catalogue::register_count(parameter->encoding);
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
-    record.fields.push_back({keys_[index], value_cell(*value), value->to_string()});
-    if (index != error_at_) continue;
+    record.fields.push_back({key, value_cell(*value), value->to_string()});
+    if (key != error_key_) continue;
     std::string meaning = error_text(value->number.mantissa());
     if (value->number.mantissa() != 0) {
       text = fmt::format("E{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ", meaning);
     }
-    record.fields.push_back({keys_[index] + "_text", text_or_null(std::move(meaning))});
+    record.fields.push_back({key + "_text", text_or_null(std::move(meaning))});
   }
   if (has_torque_) record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
   record.fields.push_back({"raw", news.block});
-  if (news.standing == device::Standing::remembered) {
-    record.fields.push_back({"remembered", true});
-    text = fmt::format("{}{}remembered by a restarted tool, so perhaps an old result", text,
-                       text.empty() ? "" : "; ");
-  } else {
+  if (news.standing == device::Standing::result) {
     record.fields.push_back(result_of(kind));
+  } else {
+    record.fields.push_back({"remembered", true});
+    const std::string_view why = news.standing == device::Standing::first
+                                     ? "it stood in the tool at first, so its age is not known"
+                                     : "remembered by a restarted tool, so perhaps an old result";
+    text = fmt::format("{}{}{}", text, text.empty() ? "" : "; ", why);
   }
   record.fields.push_back(only_shown("text", std::move(text)));
   return record;
@@ -183,13 +162,16 @@ Record NewsRecords::motor(const device::MotorTransition& news) const {
   return motor_record(news, *target_, tables_);
 }
 
-Record NewsRecords::gap(const device::EventGap& news, WallTime time) const {
+Record NewsRecords::gap(const device::EventGap& news, WallTime time, const Naming& naming) const {
   Record record = blank("gap", time);
-  record.fields = {
-      {"missed", news.missed ? number(*news.missed) : Cell()},
-      {"reason", news.reason},
-      only_shown("kind", "gap", Tone::bad),
-      only_shown("text", fmt::format("{}: {}", missed_text(news.missed), news.reason))};
+  add_name(record, naming);
+  record.fields.push_back({"missed", news.missed ? number(*news.missed) : Cell()});
+  record.fields.push_back({"after", news.after ? number(*news.after) : Cell()});
+  record.fields.push_back({"before", news.before ? number(*news.before) : Cell()});
+  record.fields.push_back({"reason", news.reason});
+  record.fields.push_back(only_shown("kind", "gap", Tone::bad));
+  record.fields.push_back(
+      only_shown("text", fmt::format("{}: {}", missed_text(news.missed), news.reason)));
   return record;
 }
 

@@ -13,6 +13,13 @@
 
 namespace spindle::commands {
 
+/// What names an event for ever, with its number.
+struct Naming {
+  std::string serial = {};                           ///< empty: the tool says none
+  std::optional<std::int64_t> epoch = std::nullopt;  ///< empty: no store was asked
+  std::optional<std::int64_t> id = std::nullopt;     ///< of its row, where it is stored
+};
+
 /// Turns the news of one tool into records. Everything that the profile says of event blocks is
 /// looked up once, so that an event costs little.
 class NewsRecords {
@@ -21,12 +28,13 @@ class NewsRecords {
   NewsRecords(const Target& target, const catalogue::Profile& profile,
               catalogue::CodeTables tables);
 
-  [[nodiscard]] report::Record event(const device::ToolEvent& news) const;
+  [[nodiscard]] report::Record event(const device::ToolEvent& news, const Naming& naming) const;
   /// `type` is "change" or "sample".
   [[nodiscard]] report::Record value(const device::PolledValue& news, const std::string& type,
                                      WallTime time) const;
   [[nodiscard]] report::Record motor(const device::MotorTransition& news) const;
-  [[nodiscard]] report::Record gap(const device::EventGap& news, WallTime time) const;
+  [[nodiscard]] report::Record gap(const device::EventGap& news, WallTime time,
+                                   const Naming& naming) const;
   [[nodiscard]] report::Record lag(const device::PollLag& news, WallTime time) const;
   [[nodiscard]] report::Record link(const device::LinkChange& news, WallTime time) const;
 
@@ -38,12 +46,12 @@ class NewsRecords {
 
  private:
   [[nodiscard]] report::Record blank(std::string type, WallTime time) const;
+  void add_name(report::Record& record, const Naming& naming) const;
 
   const Target* target_;
   std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
-  std::vector<std::string> keys_ = {};  ///< in JSON, side by side with the layout's fields
-  std::optional<std::size_t> error_at_ = std::nullopt;  ///< of the code that the texts explain
-  bool has_torque_ = false;                             ///< in the unit that is set on the tool
+  std::string error_key_ = {};  ///< of the code that the texts explain
+  bool has_torque_ = false;     ///< in the unit that is set on the tool
   catalogue::CodeTables tables_;
 };
 

@@ -163,14 +163,14 @@ Result<void> Watcher::attach(Link link) {
   connected_at_ = clock_->now();
   reached_ = true;
   compare_identity(link_->identity);
-  if (auto greeted = greet(); !greeted) return greeted;
+  if (auto consulted = consult_record(); !consulted) return consulted;
   return begin();
 }
 
 /// What keeps the events learns of the tool, and says what it knows of it where we know nothing.
-Result<void> Watcher::greet() {
-  if (!keeper_.greet) return {};
-  auto last = keeper_.greet(link_->device);
+Result<void> Watcher::consult_record() {
+  if (!keeper_.on_connected) return {};
+  auto last = keeper_.on_connected(link_->device);
   if (!last) return tl::unexpected(std::move(last.error()));
   if (source_ && !std::exchange(recalled_, true)) source_->recall(std::move(*last));
   return {};

@@ -21,12 +21,18 @@ constexpr std::uint64_t last_code = std::numeric_limits<std::uint16_t>::max();
 constexpr auto reset_words = enum_table<Resettable>(
     {{"possible", Resettable::yes}, {"power-cycle", Resettable::no}, {"", Resettable::unknown}});
 
+constexpr auto completion_words =
+    enum_table<catalogue::Completion>({{"true", catalogue::Completion::yes},
+                                       {"false", catalogue::Completion::no},
+                                       {"", catalogue::Completion::unknown}});
+
 constexpr Field<CodeText> code_fields[] = {
     field<&CodeText::text>("text", Need::required),
     field<&CodeText::remedy>("remedy"),
     word<catalogue::evidence_words, &CodeText::evidence>("evidence"),
     field<&CodeText::source>("source"),
     word<reset_words, &CodeText::resettable>("reset"),
+    word<completion_words, &CodeText::completed>("completed"),
 };
 
 /// A map of a list.

@@ -249,6 +249,11 @@ constexpr Field<catalogue::EventColumn> column_fields[] = {
     field_as<std::uint8_t, &catalogue::EventColumn::width>("width"),
 };
 
+constexpr Field<catalogue::EventSetting> setting_fields[] = {
+    word<catalogue::setting_kind_words, &catalogue::EventSetting::is>("is", Need::required),
+    field<&catalogue::EventSetting::parameter>("parameter", Need::required),
+};
+
 std::optional<catalogue::EventKind> to_kind(const std::string& name, const SourceLocation& at,
                                             Diagnostics& findings) {
   const auto kind = catalogue::event_kind_words.find(name);
@@ -282,6 +287,8 @@ constexpr Field<EventSpec> event_fields[] = {
     field<&EventSpec::error>("error"),
     list_of<column_fields, &EventSpec::columns>("columns"),
     field<&EventSpec::interval>("interval"),
+    field<&EventSpec::preset>("preset"),
+    list_of<setting_fields, &EventSpec::settings>("settings"),
 };
 
 constexpr Field<catalogue::LimitSpec> limit_fields[] = {

@@ -674,7 +674,23 @@ void event_fields_are_in_the_block(const ProfileDraft& draft, Diagnostics& findi
   check("number", events.number);
   check("kind", events.kind);
   check("error", events.error);
+  check("preset", events.preset);
   for (const catalogue::EventColumn& column : events.columns) check("columns", column.parameter);
+}
+
+void event_settings_are_parameters(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.events) return;
+  const catalogue::EventSpec& events = *draft.profile.events;
+  if (!events.settings.empty() && events.preset.empty()) {
+    findings.add_once(draft.events.of("settings"),
+                      "settings belong to a preset: say by `preset` which parameter of the event "
+                      "block names it");
+  }
+  for (const catalogue::EventSetting& setting : events.settings) {
+    const std::string name = name_of(setting, 1);
+    if (draft.lacks(name))
+      findings.add_once(draft.events.of("settings"), no_such_parameter(draft, name));
+  }
 }
 
 void arming_is_no_parameter(const ProfileDraft& draft, Diagnostics& findings) {
@@ -755,7 +771,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Diagnostics& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Diagnostics&);
 
-constexpr std::array<Rule, 36> rules = {
+constexpr std::array<Rule, 37> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -787,6 +803,7 @@ constexpr std::array<Rule, 36> rules = {
     event_flag_is_consumed,
     consumed_registers_have_one_reader,
     event_fields_are_in_the_block,
+    event_settings_are_parameters,
     arming_is_no_parameter,
     alarm_reset_is_an_action,
     limits_are_in_the_table,

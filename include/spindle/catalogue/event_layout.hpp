@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
@@ -15,7 +16,8 @@ class EventLayout {
  public:
   struct Field {
     const Parameter* parameter;
-    std::size_t at;  ///< index of its first register in the block
+    std::size_t at;        ///< index of its first register in the block
+    std::string key = {};  ///< in records: screw_count of event.screw-count
   };
 
   /// Requires a profile with events, which must outlive it. That the number, where there is one,
@@ -28,6 +30,9 @@ class EventLayout {
   /// Empty for a value that the profile does not name.
   [[nodiscard]] std::optional<EventKind> kind_of(RegisterView block) const;
 
+  /// Where the number of the preset stands that a result was made with; empty: nowhere.
+  [[nodiscard]] std::optional<std::size_t> preset_at() const { return preset_at_; }
+
   /// All parameters of the block, in the order of the profile.
   [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
 
@@ -36,6 +41,7 @@ class EventLayout {
   std::vector<Field> fields_ = {};
   std::size_t number_at_ = 0;
   std::size_t kind_at_ = 0;
+  std::optional<std::size_t> preset_at_ = std::nullopt;
 };
 
 }  // namespace spindle::catalogue

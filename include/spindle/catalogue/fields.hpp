@@ -112,11 +112,16 @@ inline auto fields(const EventColumn& v) {
   return std::tie(heading, parameter, width);
 }
 
+inline auto fields(const EventSetting& v) {
+  const auto& [is, parameter] = v;
+  return std::tie(is, parameter);
+}
+
 inline auto fields(const EventSpec& v) {
   const auto& [model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-               interval] = v;
+               interval, preset, settings] = v;
   return std::tie(model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-                  interval);
+                  interval, preset, settings);
 }
 
 inline auto fields(const LimitSpec& v) {
@@ -144,8 +149,8 @@ inline auto fields(const Action& v) {
 }
 
 inline auto fields(const CodeText& v) {
-  const auto& [text, remedy, evidence, source, resettable] = v;
-  return std::tie(text, remedy, evidence, source, resettable);
+  const auto& [text, remedy, evidence, source, resettable, completed] = v;
+  return std::tie(text, remedy, evidence, source, resettable, completed);
 }
 
 inline auto fields(const CodeTables& v) {

@@ -138,6 +138,30 @@ struct EventColumn {
   std::uint16_t width = 0;  ///< cells that a table keeps free for it
 };
 
+/// What of a preset decides whether a result is good.
+enum class SettingKind : std::uint8_t {
+  target_torque,
+  torque_limit,  ///< how far the torque may be off its target
+  mode,
+  target_angle,
+  min_angle,
+  max_angle,
+};
+inline constexpr auto setting_kind_words =
+    enum_table<SettingKind>({{"target-torque", SettingKind::target_torque},
+                             {"torque-limit", SettingKind::torque_limit},
+                             {"mode", SettingKind::mode},
+                             {"target-angle", SettingKind::target_angle},
+                             {"min-angle", SettingKind::min_angle},
+                             {"max-angle", SettingKind::max_angle}});
+constexpr std::string_view to_text(SettingKind kind) { return setting_kind_words.text(kind); }
+
+/// Where such a setting stands in the tool.
+struct EventSetting {
+  SettingKind is = SettingKind::target_torque;
+  Text parameter;  ///< with {n} in place of the preset's number
+};
+
 /// Results and what else happens: how it is learned of, and the registers that tell of it.
 struct EventSpec {
   EventModel model = EventModel::push;
@@ -153,7 +177,12 @@ struct EventSpec {
   Text error = {};  ///< parameter of the block that the error codes explain; may be empty
   List<EventColumn> columns = {};
   std::optional<Duration> interval = std::nullopt;  ///< between two polls; empty: as usual
+  Text preset = {};  ///< parameter of the block: which preset a result was made with; may be empty
+  List<EventSetting> settings = {};  ///< of a preset, to be kept with its results
 };
+
+/// The name of a setting's parameter for one preset.
+std::string name_of(const EventSetting& setting, std::int64_t preset);
 
 /// The table that the event block stands in.
 modbus::RegisterTable table_of(const EventSpec& events);
@@ -221,6 +250,10 @@ struct Action {
 /// Whether an alarm can be reset by command once its cause is gone.
 enum class Resettable : std::uint8_t { unknown, yes, no };
 
+/// Whether a rundown that ended with an error came to its end, so that its values are those of a
+/// whole one.
+enum class Completion : std::uint8_t { unknown, yes, no };
+
 /// Meaning of one code: alarm, error, exception.
 struct CodeText {
   Text text;
@@ -228,6 +261,7 @@ struct CodeText {
   Evidence evidence = Evidence::inferred;
   Text source;
   Resettable resettable = Resettable::unknown;
+  Completion completed = Completion::unknown;  ///< of a rundown
 };
 
 using CodeTexts = Table<std::int64_t, CodeText>;

@@ -67,7 +67,7 @@ struct Errand {
 struct Keeper {
   /// Called on every connection before anything is asked of its events; returns the last event of
   /// this tool that is in the record. An error of status `storage` counts as trouble of the link.
-  std::function<Result<std::optional<LastEvent>>(Device& device)> greet = {};
+  std::function<Result<std::optional<LastEvent>>(Device& device)> on_connected = {};
   /// Asked on every turn.
   std::function<std::optional<Errand>()> errand = {};
 };
@@ -115,7 +115,7 @@ class Watcher {
   Result<void> attach(Link link);
   Result<void> adopt_profile(const catalogue::Profile& profile);
   void compare_identity(const std::string& identity);
-  Result<void> greet();
+  Result<void> consult_record();
   Result<void> begin();
   Result<void> serve(const Until& until);
   Result<void> run_due();
