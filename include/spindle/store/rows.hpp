@@ -43,6 +43,7 @@ struct Place {
   std::optional<std::uint32_t> firmware = std::nullopt;
   std::string torque_unit = {};  ///< set on the tool; empty: not known
   WallTime since = {};
+  std::optional<WallTime> seen = std::nullopt;  ///< until when the tool was listened to there
 };
 
 /// Why the events of a tool are counted in another epoch.

@@ -81,8 +81,8 @@ class Writer {
   virtual Result<RowId> tool(const ToolName& name, const std::string& model) = 0;
   /// Whether there is a tool of this name.
   virtual Result<bool> has_tool(const ToolName& name) = 0;
-  /// The row of a place, made where the newest one of the tool differs in anything but id and
-  /// since.
+  /// The row of a place, made where the newest one of the tool differs in anything but id,
+  /// since and seen.
   virtual Result<RowId> place(const Place& place) = 0;
   /// Empty: it never told anything.
   virtual Result<std::optional<Last>> last(RowId tool) = 0;

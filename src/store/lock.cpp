@@ -1,0 +1,77 @@
+#include "store/lock.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "spindle/base/text.hpp"
+
+namespace spindle::store {
+namespace {
+
+constexpr std::size_t longest_number = 20;
+
+/// The process that wrote itself into the file; empty: it has not yet.
+std::optional<std::uint64_t> holder(int file) {
+  std::array<char, longest_number> text = {};
+  const ssize_t length = ::pread(file, text.data(), text.size(), 0);
+  if (length <= 0) return std::nullopt;
+  const std::string_view line(text.data(), static_cast<std::size_t>(length));
+  constexpr std::uint64_t highest = 1ULL << 32U;
+  return parse_unsigned(line.substr(0, line.find('\n')), highest);
+}
+
+bool tell_holder(int file) {
+  const std::string line = fmt::format("{}\n", ::getpid());
+  return ::ftruncate(file, 0) == 0 &&
+         ::pwrite(file, line.data(), line.size(), 0) == static_cast<ssize_t>(line.size());
+}
+
+Error failure(const std::string& path, int number) {
+  return {.code = Errc::storage,
+          .message = fmt::format("cannot be locked: {}", std::generic_category().message(number)),
+          .hint = "check the rights of the file and its folder, and the disk",
+          .name = path};
+}
+
+Error held(const std::string& store, std::optional<std::uint64_t> process) {
+  return {.code = Errc::storage,
+          .message = process ? fmt::format("process {} writes it", *process)
+                             : std::string("another process writes it"),
+          .hint = "one program writes a store: end the other one, or give another path",
+          .name = store};
+}
+
+}  // namespace
+
+Result<WriterLock> WriterLock::take(const std::string& store) {
+  const std::string path = store + ".lock";
+  const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (file < 0) return tl::unexpected(failure(path, errno));
+  WriterLock lock(file);
+  if (::flock(file, LOCK_EX | LOCK_NB) != 0) {
+    const int number = errno;
+    return tl::unexpected(number == EWOULDBLOCK ? held(store, holder(file))
+                                                : failure(path, number));
+  }
+  // Whose it is serves the message only: a full disk is no reason to refuse.
+  static_cast<void>(tell_holder(file));
+  return lock;
+}
+
+WriterLock::WriterLock(WriterLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+
+WriterLock::~WriterLock() {
+  if (file_ >= 0) ::close(file_);
+}
+
+}  // namespace spindle::store
