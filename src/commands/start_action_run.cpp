@@ -110,7 +110,9 @@ class StartActionRun final : public ToolRun {
  private:
   /// What happens to the tool between its start and its end.
   void tell(const device::ToolEvent& event) {
-    if (is_begun_) output().add(records_->event(event));
+    const auto& identity = tool().device.identity();
+    const Naming naming = {.serial = identity ? identity->serial : std::string()};
+    if (is_begun_) output().add(records_->event(event, naming));
   }
 
   /// The time allowed begins before the start is sent, and its echo is not waited for any longer.

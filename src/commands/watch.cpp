@@ -9,6 +9,7 @@
 #include "watch_plan.hpp"
 #include "watch_stream.hpp"
 #include "watched_tool.hpp"
+#include "watching.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -41,45 +42,29 @@ std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, P
   return news_columns(shown, profiles);
 }
 
-/// Whether the error is one of the tool or its link that does not say yet whose it is.
-bool is_about_tool(const Error& error) {
-  switch (error.status()) {
-    case ExitStatus::unreachable:
-    case ExitStatus::no_answer:
-    case ExitStatus::refused:
-    case ExitStatus::malformed:
-    case ExitStatus::mismatch:
-      return error.target.empty();
-    default:
-      return false;
+/// One tool of a watch.
+class WatchListener final : public Listener {
+ public:
+  WatchListener(const Target& target, WatchStream& stream) : stream_(&stream) {
+    voice_.records.emplace(target, unknown_, catalogue::CodeTables());
   }
-}
 
-void watch_one(WatchedTool& tool, const device::OpenTransport& open_transport, WatchStream& stream,
-               const WatchOptions& options, const Context& context) {
-  const catalogue::Profile unknown;
-  Voice voice;
-  voice.records.emplace(tool.target(), unknown, catalogue::CodeTables());
-  const auto open = [&] {
-    const TimePoint until = stream.until();
-    const TimePoint now = context.clock.now();
-    auto link = tool.open(until > now ? until - now : Duration::zero(), open_transport);
-    if (link) voice.records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
-    return link;
-  };
-  const auto plan = [&](const catalogue::Profile& profile) { return plan_watch(options, profile); };
-  device::Watcher watcher(open, plan, options.reconnection, context.clock,
-                          [&](const device::WatchEvent& news) { return stream.tell(news, voice); });
-  const auto of_tool = [&](Error error) {
-    if (is_about_tool(error)) return with_target(std::move(error), tool.target());
-    error.asked_of = tool.target().shown;
-    return error;
-  };
-  auto watched = watcher.run([&] { return stream.until(); }).map_error(of_tool);
-  auto unreached = watcher.unreached();
-  if (unreached) unreached = of_tool(std::move(*unreached));
-  stream.leave(watched, unreached, voice);
-}
+  TimePoint until() override { return stream_->until(); }
+  void opened(const WatchedTool& tool) override {
+    voice_.records.emplace(tool.target(), tool.known()->profile, tool.known()->tables);
+  }
+  device::WatchControl tell(const device::WatchEvent& news) override {
+    return stream_->tell(news, voice_);
+  }
+  void left(const Result<void>& watched, const std::optional<Error>& unreached) override {
+    stream_->leave(watched, unreached, voice_);
+  }
+
+ private:
+  const catalogue::Profile unknown_ = {};
+  WatchStream* stream_;
+  Voice voice_ = {};
+};
 
 }  // namespace
 
@@ -98,8 +83,10 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
   WatchStream stream(options, tools->size(), columns_for(*tools, shelf, options, context), context);
+  const auto plan = [&](const catalogue::Profile& profile) { return plan_watch(options, profile); };
   for_each_side_by_side(*tools, [&](WatchedTool& tool) {
-    watch_one(tool, open_transport, stream, options, context);
+    WatchListener listener(tool.target(), stream);
+    watch_tool(tool, open_transport, plan, options.reconnection, listener, context);
   });
   return stream.finish();
 }

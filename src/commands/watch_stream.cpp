@@ -43,7 +43,7 @@ WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   }
   status_.clear();
   tell_dropped(voice);
-  listing_.add(std::visit([&](const auto& one) { return record_of(one, *voice.records); }, news));
+  listing_.add(std::visit([&](const auto& one) { return record_of(one, voice); }, news));
   show_status();
   const bool counted = options_->count > 0 && activity_ >= options_->count;
   if (counted || !listing_.open()) end();
@@ -99,14 +99,14 @@ Result<Outcome> WatchStream::finish() {
   return out_.drain().map([&](std::size_t) { return outcome_; });
 }
 
-report::Record WatchStream::record_of(const device::ToolEvent& news, const NewsRecords& records) {
-  report::Record record = records.event(news);
-  if (news.standing == device::Standing::remembered) {
+report::Record WatchStream::record_of(const device::ToolEvent& news, const Voice& voice) {
+  report::Record record = voice.records->event(news, voice.naming);
+  if (news.standing != device::Standing::result) {
     ++counts_.remembered;
     return record;
   }
   if (news.source == device::EventOrigin::catch_up) ++counts_.caught_up;
-  const catalogue::EventKind kind = records.kind_of(news.block);
+  const catalogue::EventKind kind = voice.records->kind_of(news.block);
   ++counts_.events;
   if (kind == catalogue::EventKind::fastening_ok) ++counts_.ok;
   if (kind == catalogue::EventKind::fastening_ng) ++counts_.ng;
@@ -114,33 +114,32 @@ report::Record WatchStream::record_of(const device::ToolEvent& news, const NewsR
   return record;
 }
 
-report::Record WatchStream::record_of(const device::MotorTransition& news,
-                                      const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::MotorTransition& news, const Voice& voice) {
   ++counts_.events;
   note_activity();
-  return records.motor(news);
+  return voice.records->motor(news);
 }
 
-report::Record WatchStream::record_of(const device::PolledValue& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::PolledValue& news, const Voice& voice) {
   const bool sample = options_->samples == device::Samples::all;
   ++(sample ? counts_.samples : counts_.changes);
   note_activity();
-  return records.value(news, sample ? "sample" : "change", context_->clock.wall());
+  return voice.records->value(news, sample ? "sample" : "change", context_->clock.wall());
 }
 
-report::Record WatchStream::record_of(const device::EventGap& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::EventGap& news, const Voice& voice) {
   ++counts_.gaps;
-  return records.gap(news, context_->clock.wall());
+  return voice.records->gap(news, context_->clock.wall(), voice.naming);
 }
 
-report::Record WatchStream::record_of(const device::PollLag& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::PollLag& news, const Voice& voice) {
   counts_.missed_intervals += news.missed;
-  return records.lag(news, context_->clock.wall());
+  return voice.records->lag(news, context_->clock.wall());
 }
 
-report::Record WatchStream::record_of(const device::LinkChange& news, const NewsRecords& records) {
+report::Record WatchStream::record_of(const device::LinkChange& news, const Voice& voice) {
   note_link(news);
-  return records.link(news, context_->clock.wall());
+  return voice.records->link(news, context_->clock.wall());
 }
 
 void WatchStream::note_link(const device::LinkChange& news) {
@@ -176,10 +175,10 @@ void WatchStream::tell_dropped(Voice& voice) {
   const Dropped dropped = std::exchange(voice.dropped, {});
   ++counts_.gaps;
   report::Record record = voice.records->gap(
-      {dropped.events,
-       fmt::format("{} not told, because the reader did not take what was told before",
-                   counted(dropped.records, "record"))},
-      context_->clock.wall());
+      {.missed = dropped.events,
+       .reason = fmt::format("{} not told, because the reader did not take what was told before",
+                             counted(dropped.records, "record"))},
+      context_->clock.wall(), voice.naming);
   record.fields.push_back({"dropped", count(dropped.records)});
   listing_.add(record);
 }

@@ -23,6 +23,7 @@ struct Dropped {
 /// What one tool tells, and how.
 struct Voice {
   std::optional<NewsRecords> records = std::nullopt;
+  Naming naming = {};
   Dropped dropped = {};
 };
 
@@ -62,12 +63,12 @@ class WatchStream {
     std::size_t missed_intervals = 0;
   };
 
-  report::Record record_of(const device::ToolEvent& news, const NewsRecords& records);
-  report::Record record_of(const device::MotorTransition& news, const NewsRecords& records);
-  report::Record record_of(const device::PolledValue& news, const NewsRecords& records);
-  report::Record record_of(const device::EventGap& news, const NewsRecords& records);
-  report::Record record_of(const device::PollLag& news, const NewsRecords& records);
-  report::Record record_of(const device::LinkChange& news, const NewsRecords& records);
+  report::Record record_of(const device::ToolEvent& news, const Voice& voice);
+  report::Record record_of(const device::MotorTransition& news, const Voice& voice);
+  report::Record record_of(const device::PolledValue& news, const Voice& voice);
+  report::Record record_of(const device::EventGap& news, const Voice& voice);
+  report::Record record_of(const device::PollLag& news, const Voice& voice);
+  report::Record record_of(const device::LinkChange& news, const Voice& voice);
   void note_link(const device::LinkChange& news);
   void note_activity();
   void drop(const device::WatchEvent& news, Dropped& dropped);

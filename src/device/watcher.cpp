@@ -69,13 +69,13 @@ Result<void> ask_twice(Ask ask) {
 }  // namespace
 
 Watcher::Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell,
-                 Keeper keeper)
+                 RecordHooks hooks)
     : open_(std::move(open)),
       make_plan_(std::move(plan)),
       reconnection_(reconnection),
       clock_(&clock),
       tell_(std::move(tell)),
-      keeper_(std::move(keeper)) {}
+      hooks_(std::move(hooks)) {}
 
 Result<void> Watcher::run(const Until& until) {
   auto watched = watch(until);
@@ -169,8 +169,8 @@ Result<void> Watcher::attach(Link link) {
 
 /// What keeps the events learns of the tool, and says what it knows of it where we know nothing.
 Result<void> Watcher::consult_record() {
-  if (!keeper_.on_connected) return {};
-  auto last = keeper_.on_connected(link_->device);
+  if (!hooks_.on_connected) return {};
+  auto last = hooks_.on_connected(link_->device);
   if (!last) return tl::unexpected(std::move(last.error()));
   if (source_ && !std::exchange(recalled_, true)) source_->recall(std::move(*last));
   return {};
@@ -289,8 +289,8 @@ void Watcher::tell_lag(TimePoint now) {
 
 /// Reads what was asked for beside the watch. What the tool refuses to say ends no watch.
 Result<void> Watcher::run_errand() {
-  if (!keeper_.errand) return {};
-  auto errand = keeper_.errand();
+  if (!hooks_.errand) return {};
+  auto errand = hooks_.errand();
   if (!errand) return {};
   std::vector<Reading> readings;
   auto read = ask([&] {

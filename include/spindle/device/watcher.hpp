@@ -64,7 +64,7 @@ struct Errand {
   std::function<void(const std::vector<Reading>&)> take = {};
 };
 /// What keeps the events in a record. All may be empty.
-struct Keeper {
+struct RecordHooks {
   /// Called on every connection before anything is asked of its events; returns the last event of
   /// this tool that is in the record. An error of status `storage` counts as trouble of the link.
   std::function<Result<std::optional<LastEvent>>(Device& device)> on_connected = {};
@@ -97,7 +97,7 @@ class Watcher {
   using Until = std::function<TimePoint()>;
 
   Watcher(Open open, Plan plan, Reconnection reconnection, Clock& clock, Tell tell,
-          Keeper keeper = {});
+          RecordHooks hooks = {});
 
   /// Returns at its end, or when the listener wants to stop; then the tool's output
   /// is switched off again where the link still allows it, and what had arrived is told. Errors: an
@@ -148,7 +148,7 @@ class Watcher {
   Reconnection reconnection_;
   Clock* clock_;
   Tell tell_;
-  Keeper keeper_;
+  RecordHooks hooks_;
   const catalogue::Profile* profile_ = nullptr;  ///< empty until the first link
   WatchPlan plan_ = {};
   std::optional<Link> link_ = std::nullopt;
