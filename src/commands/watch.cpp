@@ -14,34 +14,6 @@
 namespace spindle::commands {
 namespace {
 
-/// What a tool may be of which nothing is known yet.
-std::vector<const catalogue::Profile*> candidates(ProfileShelf& shelf, const Context& context) {
-  std::vector<const catalogue::Profile*> profiles;
-  for (const files::ProfileEntry& entry : context.profiles.list()) {
-    const auto known = shelf.take(entry.id);
-    if (known && (*known)->profile.identity) profiles.push_back(&(*known)->profile);
-  }
-  return profiles;
-}
-
-/// Motors have other columns than tools that count their results.
-std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, ProfileShelf& shelf,
-                                        const WatchOptions& options, const Context& context) {
-  const bool one = tools.size() == 1 && !names_group(options.targets.front());
-  const Tools shown = one ? Tools::one : Tools::several;
-  const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
-    return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&
-           !tool.known()->profile.events;
-  });
-  if (motors) return motor_columns(shown);
-  std::vector<const catalogue::Profile*> profiles;
-  for (const WatchedTool& tool : tools) {
-    if (tool.known() == nullptr) return news_columns(shown, candidates(shelf, context));
-    profiles.push_back(&tool.known()->profile);
-  }
-  return news_columns(shown, profiles);
-}
-
 /// One tool of a watch.
 class WatchListener final : public Listener {
  public:

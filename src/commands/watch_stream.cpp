@@ -24,9 +24,11 @@ bool is_only_here(const device::WatchEvent& news) {
 }  // namespace
 
 WatchStream::WatchStream(const WatchOptions& options, std::size_t tools,
-                         const std::vector<report::Column>& columns, Context& context)
+                         const std::vector<report::Column>& columns, Context& context,
+                         Records records)
     : options_(&options),
       context_(&context),
+      records_(records),
       tools_(tools),
       status_(context),
       out_(context.io, context.interrupt),
@@ -43,7 +45,9 @@ WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   }
   status_.clear();
   tell_dropped(voice);
-  listing_.add(std::visit([&](const auto& one) { return record_of(one, voice); }, news));
+  const report::Record record =
+      std::visit([&](const auto& one) { return record_of(one, voice); }, news);
+  if (records_ == Records::shown) listing_.add(record);
   show_status();
   const bool counted = options_->count > 0 && activity_ >= options_->count;
   if (counted || !listing_.open()) end();
@@ -69,6 +73,26 @@ void WatchStream::leave(const Result<void>& watched, const std::optional<Error>&
   if (ends_well) return;
   outcome_.fail(watched.error());
   if (!asked_to_end) listing_.add(watched.error());
+}
+
+void WatchStream::fault(const Error& error) {
+  const std::lock_guard lock(mutex_);
+  status_.clear();
+  listing_.add(error);
+  show_status();
+}
+
+void WatchStream::fail(const Error& error) {
+  fault(error);
+  const std::lock_guard lock(mutex_);
+  outcome_.fail(error);
+}
+
+void WatchStream::note(std::string_view sentence) {
+  const std::lock_guard lock(mutex_);
+  status_.clear();
+  context_->renderer.note(sentence);
+  show_status();
 }
 
 /// When to end, as far as is known now.

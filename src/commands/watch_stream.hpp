@@ -20,6 +20,9 @@ struct Dropped {
   std::optional<std::uint32_t> events = 0;  ///< among them, and in gaps; empty: unknown
 };
 
+/// Whether the records are shown, or only counted.
+enum class Records : std::uint8_t { shown, counted };
+
 /// What one tool tells, and how.
 struct Voice {
   std::optional<NewsRecords> records = std::nullopt;
@@ -33,7 +36,8 @@ class WatchStream {
  public:
   /// All must outlive it.
   WatchStream(const WatchOptions& options, std::size_t tools,
-              const std::vector<report::Column>& columns, Context& context);
+              const std::vector<report::Column>& columns, Context& context,
+              Records records = Records::shown);
   WatchStream(const WatchStream&) = delete;
   WatchStream& operator=(const WatchStream&) = delete;
 
@@ -42,6 +46,13 @@ class WatchStream {
 
   /// How the watch of one tool ended. `unreached` says why there never was a link to it.
   void leave(const Result<void>& watched, const std::optional<Error>& unreached, Voice& voice);
+
+  /// Something went wrong that ends no watch.
+  void fault(const Error& error);
+  /// Something failed as a whole.
+  void fail(const Error& error);
+  /// Something that people should know.
+  void note(std::string_view sentence);
 
   /// When to end, as far as is known now; asks, too, whether the output still has a reader.
   TimePoint until();
@@ -81,6 +92,7 @@ class WatchStream {
 
   const WatchOptions* options_;
   Context* context_;
+  Records records_;
   std::size_t tools_;
   std::mutex mutex_ = {};
   ProgressLine status_;

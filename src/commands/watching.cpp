@@ -1,6 +1,10 @@
 #include "watching.hpp"
 
+#include <algorithm>
 #include <utility>
+
+#include "motor_records.hpp"
+#include "spindle/device/run_model.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -25,7 +29,35 @@ Error of_tool(Error error, const Target& target) {
   return error;
 }
 
+/// What a tool may be of which nothing is known yet.
+std::vector<const catalogue::Profile*> candidates(ProfileShelf& shelf, const Context& context) {
+  std::vector<const catalogue::Profile*> profiles;
+  for (const files::ProfileEntry& entry : context.profiles.list()) {
+    const auto known = shelf.take(entry.id);
+    if (known && (*known)->profile.identity) profiles.push_back(&(*known)->profile);
+  }
+  return profiles;
+}
+
 }  // namespace
+
+/// Motors have other columns than tools that count their results.
+std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, ProfileShelf& shelf,
+                                        const WatchOptions& options, const Context& context) {
+  const bool one = tools.size() == 1 && !names_group(options.targets.front());
+  const Tools shown = one ? Tools::one : Tools::several;
+  const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
+    return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&
+           !tool.known()->profile.events;
+  });
+  if (motors) return motor_columns(shown);
+  std::vector<const catalogue::Profile*> profiles;
+  for (const WatchedTool& tool : tools) {
+    if (tool.known() == nullptr) return news_columns(shown, candidates(shelf, context));
+    profiles.push_back(&tool.known()->profile);
+  }
+  return news_columns(shown, profiles);
+}
 
 void watch_tool(WatchedTool& tool, const device::OpenTransport& open_transport,
                 const device::Watcher::Plan& plan, device::Reconnection reconnection,

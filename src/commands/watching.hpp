@@ -2,8 +2,11 @@
 
 #include <functional>
 #include <optional>
+#include <vector>
 
+#include "spindle/commands/commands.hpp"
 #include "spindle/device/watcher.hpp"
+#include "spindle/report/renderer.hpp"
 #include "watched_tool.hpp"
 
 namespace spindle::commands {
@@ -27,6 +30,11 @@ class Listener {
   /// What a record of the tool's events knows and wants.
   virtual device::RecordHooks hooks() { return {}; }
 };
+
+/// The columns of a stream of what these tools tell. Motors have other ones than tools that count
+/// their results.
+std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, ProfileShelf& shelf,
+                                        const WatchOptions& options, const Context& context);
 
 /// Watches one tool until its listener wants to end.
 void watch_tool(WatchedTool& tool, const device::OpenTransport& open_transport,

@@ -94,10 +94,20 @@ struct WatchOptions {
   device::Reconnection reconnection = device::Reconnection::forever;
   std::optional<Duration> interval;  ///< between two polls; empty: as usual
   std::size_t count = 0;             ///< end after so many events, changes and samples; 0: never
-  std::optional<Duration> duration;
-  std::optional<Duration> idle_timeout;
+  std::optional<Duration> duration = std::nullopt;
+  std::optional<Duration> idle_timeout = std::nullopt;
+  std::string store = {};  ///< that knows the last events; empty: the user's own, where it is there
+  std::optional<std::uint16_t> since_event = std::nullopt;  ///< the last number that was seen
 };
 Result<Outcome> watch(const WatchOptions& options, Context& context);
+
+struct RecordOptions {
+  WatchOptions watch = {};                        ///< no targets: all of the tools file
+  std::string store = {};                         ///< empty: the user's own
+  std::optional<Duration> gather = std::nullopt;  ///< how long results wait for others
+  bool tee = false;                               ///< show each record once it is stored
+};
+Result<Outcome> record(const RecordOptions& options, Context& context);
 
 struct RemoteStartOptions : work::RunOptions {
   std::string target = {};

@@ -1,0 +1,313 @@
+#include "recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "records.hpp"
+
+namespace spindle::commands {
+namespace {
+
+/// How often it is stored until when a tool was listened to.
+constexpr Duration seen_every = std::chrono::seconds(10);
+/// Another client may change settings unseen, so they are read again behind a result.
+constexpr Duration settings_every = std::chrono::minutes(1);
+/// People are told of one tool's link at most so often.
+constexpr Duration link_told_every = std::chrono::minutes(1);
+/// Where the clock was set back, nothing is known of how long a tool was not listened to.
+constexpr Duration long_unseen = std::chrono::hours(24);
+
+Duration unseen_since(WallTime seen, WallTime now) {
+  return now < seen ? long_unseen : Duration(now - seen);
+}
+
+}  // namespace
+
+Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
+                   Context& context)
+    : writer_(&writer),
+      stream_(&stream),
+      context_(&context),
+      journal_(
+          writer, options, [](const store::Entry&, const store::Stored&) {},
+          [this](const std::optional<Error>& error) {
+            if (error) {
+              stream_->fault(*error);
+            } else {
+              stream_->note("the store can be written again; what waited is stored");
+            }
+          }) {}
+
+Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::string& target) {
+  const std::lock_guard lock(mutex_);
+  const store::ToolName own = {said.maker, fmt::format("{}@{}", said.serial, target)};
+  const auto has_own = writer_->has_tool(own);
+  if (!has_own) return tl::unexpected(has_own.error());
+  const auto holder = std::find_if(claims_.begin(), claims_.end(), [&](const auto& claim) {
+    return claim.second == said && claim.first != target;
+  });
+  const bool is_taken = holder != claims_.end();
+  const store::ToolName& name = is_taken || *has_own ? own : said;
+  claims_.insert_or_assign(target, name);
+  if (is_taken && told_.insert({own, target}).second) {
+    stream_->fault(Error{
+        .code = Errc::mismatch,
+        .message = fmt::format("serial number {} is also that of {}: its results are recorded "
+                               "under the serial number '{}'",
+                               said.serial, holder->first, own.serial),
+        .hint = "give every tool a serial number of its own",
+        .target = target});
+  }
+  return name;
+}
+
+void Recorder::release(const std::string& target) {
+  const std::lock_guard lock(mutex_);
+  claims_.erase(target);
+}
+
+RecordedTool::RecordedTool(const Target& target, Recorder& recorder)
+    : target_(target), recorder_(&recorder) {
+  voice_.records.emplace(target_, unknown_, catalogue::CodeTables());
+}
+
+void RecordedTool::opened(const WatchedTool& tool) {
+  if (profile_ == &tool.known()->profile) return;
+  const std::lock_guard lock(voice_mutex_);
+  profile_ = &tool.known()->profile;
+  target_ = tool.target();
+  voice_.records.emplace(target_, *profile_, tool.known()->tables);
+  rows_.reset();
+  if (profile_->events) rows_.emplace(*profile_);
+}
+
+device::WatchControl RecordedTool::tell(const device::WatchEvent& news) {
+  std::visit([this](const auto& one) { record(one); }, news);
+  return device::WatchControl::go_on;
+}
+
+void RecordedTool::left(const Result<void>& watched, const std::optional<Error>& unreached) {
+  flush_gap();
+  flush_link();
+  if (tool_) recorder_->journal().add_lazily(store::Seen{*tool_, now()});
+  const std::lock_guard lock(voice_mutex_);
+  // A signal is how a recorder is usually ended.
+  const bool signalled = recorder_->context().interrupt.signalled();
+  recorder_->stream().leave(signalled ? Result<void>() : watched,
+                            signalled ? std::nullopt : unreached, voice_);
+}
+
+device::RecordHooks RecordedTool::hooks() {
+  return {.on_connected = [this](device::Device& device) { return register_tool(device); },
+          .errand = [this] { return next_errand(); }};
+}
+
+// ---- what the tool tells ----
+
+void RecordedTool::record(const device::ToolEvent& news) {
+  store::Event row = rows_->row(news);
+  row.tool = *tool_;
+  row.place = place_;
+  auto begins = epochs_.begins();
+  if (!news.number) {
+    const bool wraps = counted_ == std::numeric_limits<std::uint16_t>::max();
+    counted_ = counted_ ? static_cast<std::uint16_t>(*counted_ + 1) : std::uint16_t{1};
+    row.number = *counted_;
+    if (wraps) begins = store::EpochReason::wrap;
+  }
+  store::NewEvent entry = {std::move(row), begins};
+  if (gap_) entry.gap = work::row_of(*gap_, seen_, news.time);
+  gap_.reset();
+  seen_ = news.time;
+  want_settings(news);
+  recorder_->journal().add(std::move(entry), [this, news](const store::Entry& stored_entry,
+                                                          const store::Stored& stored) {
+    const auto& event = std::get<store::NewEvent>(stored_entry);
+    if (stored.as == store::Stored::As::known) return;
+    if (event.gap) tell_stream(work::news_of(*event.gap), stored.epoch, stored.gap);
+    tell_stream(news, stored.epoch, stored.id);
+  });
+}
+
+void RecordedTool::record(const device::EventGap& news) {
+  flush_gap();
+  epochs_.note(news);
+  gap_ = news;
+}
+
+void RecordedTool::record(const device::LinkChange& news) {
+  flush_gap();
+  flush_link();
+  note_link(news);
+  if (news.state == device::LinkState::lost) recorder_->release(target_.shown);
+  link_ = news;
+  // What the tool is is known right behind a connection.
+  if (news.state != device::LinkState::connected) flush_link();
+}
+
+void RecordedTool::record(const device::PolledValue& news) {
+  happen(voice_.records->value(news, "change", now()), news);
+}
+
+void RecordedTool::record(const device::PollLag& news) {
+  happen(voice_.records->lag(news, now()), news);
+}
+
+void RecordedTool::record(const device::MotorTransition& news) {
+  happen(voice_.records->motor(news), news);
+}
+
+void RecordedTool::happen(report::Record record, device::WatchEvent news) {
+  recorder_->journal().add(
+      store::Happening{
+          .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
+      [this, news = std::move(news)](const store::Entry&, const store::Stored& stored) {
+        tell_stream(news, stored.epoch, stored.id);
+      });
+}
+
+/// A gap that no event stands behind.
+void RecordedTool::flush_gap() {
+  if (!gap_ || !tool_) return;
+  const device::EventGap news = *std::exchange(gap_, std::nullopt);
+  store::Gap row = work::row_of(news, seen_, now());
+  row.tool = *tool_;
+  recorder_->journal().add(store::NewGap{std::move(row)},
+                           [this, news](const store::Entry&, const store::Stored& stored) {
+                             if (stored.as == store::Stored::As::known) return;
+                             tell_stream(news, stored.epoch, stored.id);
+                           });
+}
+
+void RecordedTool::flush_link() {
+  if (!link_) return;
+  const device::LinkChange news = *std::exchange(link_, std::nullopt);
+  happen(voice_.records->link(news, now()), news);
+}
+
+void RecordedTool::tell_stream(const device::WatchEvent& news, std::int64_t epoch,
+                               store::RowId id) {
+  const std::lock_guard lock(voice_mutex_);
+  voice_.naming = {.serial = serial_, .epoch = epoch, .id = id};
+  recorder_->stream().tell(news, voice_);
+}
+
+// ---- what the record knows ----
+
+Result<std::optional<device::LastEvent>> RecordedTool::register_tool(device::Device& device) {
+  flush_gap();
+  store::Writer& writer = recorder_->writer();
+  const store::ToolName said = work::name_of(device, target_.shown);
+  const auto name = recorder_->claim(said, target_.shown);
+  if (!name) return tl::unexpected(name.error());
+  const auto& identity = device.identity();
+  const auto tool = writer.tool(*name, identity ? identity->tool_model : std::string());
+  if (!tool) return tl::unexpected(tool.error());
+  const auto place =
+      writer.place({.tool = *tool,
+                    .name = target_.shown,
+                    .url = target_.endpoint.text,
+                    .profile = profile_->id.to_string(),
+                    .firmware = identity ? identity->firmware : std::optional<std::uint32_t>(),
+                    .torque_unit = target_.torque_unit,
+                    .since = now()});
+  if (!place) return tl::unexpected(place.error());
+  const auto last = writer.last(*tool);
+  if (!last) return tl::unexpected(last.error());
+  {
+    const std::lock_guard lock(voice_mutex_);
+    serial_ = name->serial;
+  }
+  if (tool_ != *tool) {
+    epochs_ = {};
+    counted_ = *last ? std::optional((*last)->number) : std::nullopt;
+    seen_ = *last ? (*last)->seen : now();
+  }
+  tool_ = *tool;
+  place_ = *place;
+  flush_link();
+  if (identity) record_total(*identity, *last);
+  if (rows_) wanted_ = rows_->presets();
+  if (!*last) return std::nullopt;
+  return device::LastEvent{(*last)->number, (*last)->block, unseen_since((*last)->seen, now())};
+}
+
+/// The tool's own count of its fastenings, by which it can be checked whether results are missing.
+void RecordedTool::record_total(const catalogue::Identity& identity,
+                                const std::optional<store::Last>& last) {
+  if (!identity.total) return;
+  report::Record record = {.type = "total", .target = target_.shown, .time = now(), .fields = {}};
+  record.fields = {{"serial", serial_},
+                   {"total", number(*identity.total)},
+                   {"epoch", last ? number(last->epoch) : report::Cell()},
+                   {"number", last ? number(last->number) : report::Cell()}};
+  recorder_->journal().add(store::Happening{
+      .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)});
+}
+
+/// A result is worth more with the settings that it was made by.
+void RecordedTool::want_settings(const device::ToolEvent& news) {
+  const auto preset = rows_->preset_of(news.block);
+  const auto& presets = rows_->presets();
+  if (!preset || std::find(presets.begin(), presets.end(), *preset) == presets.end()) return;
+  if (std::find(wanted_.begin(), wanted_.end(), *preset) != wanted_.end()) return;
+  const auto read = read_at_.find(*preset);
+  const bool is_old =
+      read == read_at_.end() || recorder_->context().clock.now() >= read->second + settings_every;
+  if (is_old || rows_->is_preset_change(news.block)) wanted_.push_back(*preset);
+}
+
+/// The settings of all presets are read at first, a few at a time, so that no event waits for long.
+std::optional<device::Errand> RecordedTool::next_errand() {
+  const TimePoint clock_now = recorder_->context().clock.now();
+  if (tool_ && clock_now >= seen_due_) {
+    seen_due_ = clock_now + seen_every;
+    recorder_->journal().add_lazily(store::Seen{*tool_, now()});
+  }
+  note_pending();
+  if (wanted_.empty() || !rows_) return std::nullopt;
+  constexpr std::size_t at_once = 8;
+  const std::size_t count = std::min(at_once, wanted_.size());
+  const std::vector<std::int64_t> presets(wanted_.begin(),
+                                          wanted_.begin() + static_cast<std::ptrdiff_t>(count));
+  wanted_.erase(wanted_.begin(), wanted_.begin() + static_cast<std::ptrdiff_t>(count));
+  std::vector<catalogue::Parameter> parameters;
+  for (const std::int64_t preset : presets) {
+    read_at_.insert_or_assign(preset, clock_now);
+    for (auto& parameter : rows_->settings_of(preset)) parameters.push_back(std::move(parameter));
+  }
+  return device::Errand{.wanted = std::move(parameters),
+                        .take = [this, presets](const std::vector<device::Reading>& readings) {
+                          for (const std::int64_t preset : presets) {
+                            auto row = rows_->settings_row(preset, readings);
+                            if (!row) continue;
+                            row->tool = *tool_;
+                            row->since = now();
+                            recorder_->journal().add(*row);
+                          }
+                        }};
+}
+
+// ---- what people are told ----
+
+void RecordedTool::note_link(const device::LinkChange& news) {
+  const bool is_up = news.state == device::LinkState::connected;
+  const bool is_first = !noted_at_ && !link_text_;
+  if (is_up == is_up_ && !is_first) return;
+  is_up_ = is_up;
+  link_text_ = is_up ? news.message : "no link: " + news.message;
+  note_pending();
+}
+
+void RecordedTool::note_pending() {
+  const TimePoint clock_now = recorder_->context().clock.now();
+  if (!link_text_ || (noted_at_ && clock_now < *noted_at_ + link_told_every)) return;
+  noted_at_ = clock_now;
+  recorder_->stream().note(
+      fmt::format("{}: {}", target_.shown, *std::exchange(link_text_, std::nullopt)));
+}
+
+}  // namespace spindle::commands

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spindle/work/event_rows.hpp"
+#include "spindle/work/journal.hpp"
+#include "watch_stream.hpp"
+#include "watching.hpp"
+
+namespace spindle::commands {
+
+/// What all tools of one `record` share: the store, its journal, and who has which name there.
+class Recorder {
+ public:
+  /// All must outlive it.
+  Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
+           Context& context);
+
+  [[nodiscard]] store::Writer& writer() { return *writer_; }
+  [[nodiscard]] work::Journal& journal() { return journal_; }
+  [[nodiscard]] WatchStream& stream() { return *stream_; }
+  [[nodiscard]] Context& context() { return *context_; }
+
+  /// The name of a target's tool in the store. Where another tool that is connected says the same
+  /// serial number, it gets a name of its own for ever, and an error says so: no tool may hide the
+  /// results of another.
+  Result<store::ToolName> claim(const store::ToolName& said, const std::string& target);
+  /// The target's tool is not connected any more.
+  void release(const std::string& target);
+
+ private:
+  store::Writer* writer_;
+  WatchStream* stream_;
+  Context* context_;
+  std::mutex mutex_ = {};
+  std::map<std::string, store::ToolName> claims_ = {};  ///< by target
+  std::map<store::ToolName, std::string> told_ = {};    ///< names of which an error spoke
+  work::Journal journal_;
+};
+
+/// One tool that is recorded: what it tells goes to the store, and from there to the stream.
+class RecordedTool final : public Listener {
+ public:
+  RecordedTool(const Target& target, Recorder& recorder);
+
+  TimePoint until() override { return recorder_->stream().until(); }
+  void opened(const WatchedTool& tool) override;
+  device::WatchControl tell(const device::WatchEvent& news) override;
+  void left(const Result<void>& watched, const std::optional<Error>& unreached) override;
+  device::RecordHooks hooks() override;
+
+ private:
+  void record(const device::ToolEvent& news);
+  void record(const device::EventGap& news);
+  void record(const device::LinkChange& news);
+  void record(const device::PolledValue& news);
+  void record(const device::PollLag& news);
+  void record(const device::MotorTransition& news);
+
+  Result<std::optional<device::LastEvent>> register_tool(device::Device& device);
+  void record_total(const catalogue::Identity& identity, const std::optional<store::Last>& last);
+  std::optional<device::Errand> next_errand();
+  void want_settings(const device::ToolEvent& news);
+  void flush_gap();
+  void flush_link();
+  void happen(report::Record record, device::WatchEvent news);
+  void note_link(const device::LinkChange& news);
+  void note_pending();
+  void tell_stream(const device::WatchEvent& news, std::int64_t epoch, store::RowId id);
+  [[nodiscard]] WallTime now() const { return recorder_->context().clock.wall(); }
+
+  const catalogue::Profile unknown_ = {};
+  Target target_;
+  Recorder* recorder_;
+  std::mutex voice_mutex_ = {};  ///< the journal's thread tells the stream, too
+  Voice voice_ = {};
+  const catalogue::Profile* profile_ = nullptr;
+  std::optional<work::EventRows> rows_ = std::nullopt;
+  std::optional<store::RowId> tool_ = std::nullopt;  ///< empty: never connected
+  store::RowId place_ = 0;
+  std::string serial_ = {};
+  work::EpochFollower epochs_ = {};
+  std::optional<device::EventGap> gap_ = std::nullopt;     ///< waits for the event behind it
+  std::optional<device::LinkChange> link_ = std::nullopt;  ///< waits for what the tool is
+  std::optional<std::uint16_t> counted_ = std::nullopt;    ///< of a tool that does not count
+  WallTime seen_ = {};
+  TimePoint seen_due_ = {};
+  std::vector<std::int64_t> wanted_ = {};  ///< presets whose settings are to be read
+  std::map<std::int64_t, TimePoint> read_at_ = {};
+  std::map<std::int64_t, store::PresetSettings> settings_ = {};
+  bool is_up_ = false;
+  std::optional<std::string> link_text_ = std::nullopt;  ///< not told on stderr yet
+  std::optional<TimePoint> noted_at_ = std::nullopt;
+};
+
+}  // namespace spindle::commands
