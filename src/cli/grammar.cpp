@@ -77,6 +77,7 @@ struct AllOptions {
   commands::PingOptions ping;
   ScanArguments scan;
   WatchArguments watch;
+  commands::RecordOptions record;
   commands::RemoteStartOptions remote_start;
   commands::RemoteStopOptions remote_stop;
   commands::AlarmsOptions alarms;
@@ -449,6 +450,10 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
             "poll the event counter; for tools whose output another client uses");
   bind.flag("--no-reconnect", options.reconnection, device::Reconnection::never,
             "end when the link is lost");
+  bind.option("--since-event", "N", options.since_event, NumberFrom{0, 65'535},
+              "the last event number that is known: what came since is told, or is a gap");
+  bind.option("--store", "FILE", options.store,
+              "go on behind the last events of this store (default: that of spindle record)");
 }
 
 void add_watch(CLI::App& app, ParseState& draft) {
@@ -458,6 +463,29 @@ void add_watch(CLI::App& app, ParseState& draft) {
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
   add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
+}
+
+void bind_record(Binder& bind, commands::RecordOptions& options) {
+  bind.argument("TARGET", options.watch.targets, "tools (default: all of the tools file)");
+  bind.option("--store", "FILE", options.store,
+              "where results are kept (default: events.db in the user's folder of state)");
+  bind.flag("--tee", options.tee, true, "show each record once it is stored");
+  bind.option("--commit", "DURATION", options.gather, to_duration,
+              "how long results wait to be stored together (default 20ms)");
+  bind.option("--interval", "DURATION", options.watch.interval, to_duration,
+              "time between two polls (default 200ms)");
+  bind.option("--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
+              "end after so many events and changes are stored");
+  bind.option("--duration", "DURATION", options.watch.duration, to_duration, "end after this time");
+}
+
+void add_record(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"record", "[TARGET...]",
+                           "watch tools and keep every result in a store, until stopped",
+                           "spindle record\n"
+                           "spindle record station3 --tee --json\n"
+                           "spindle record @line1 --store line1.db"};
+  add_command(app, draft, words, draft.options.record, commands::record, bind_record);
 }
 
 constexpr auto stop_modes = enum_table<catalogue::StopMode>(
@@ -841,7 +869,7 @@ void build(CLI::App& app, ParseState& draft) {
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
   for (const auto add :
-       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_remote_start,
+       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_record, add_remote_start,
         add_remote_stop, add_alarms, add_backup, add_dump, add_diff, add_restore, add_ping,
         add_scan, add_simulate, add_profile, add_tools}) {
     add(app, draft);
