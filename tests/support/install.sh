@@ -12,6 +12,7 @@ test_packages=(
   doctest-dev nlohmann-json3-dev mold
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
+  python3-scipy python3-statsmodels
   python3-jsonschema mandoc dpkg-dev lintian
 )
 
