@@ -16,7 +16,6 @@ std::optional<Series> Series::of(std::span<const double> values,
     if (index < values.size()) begins.push_back(index);
   }
   std::sort(begins.begin(), begins.end());
-  begins.erase(std::unique(begins.begin(), begins.end()), begins.end());
   begins.push_back(values.size());
 
   std::vector<IndexRange> segments;

@@ -10,6 +10,7 @@
 #include <optional>
 #include <random>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -379,6 +380,10 @@ TEST_CASE("runs that a few points part are one period of a shifted mean") {
   REQUIRE(one.size() == 1);
   CHECK(one[0].side == Side::upper);
   CHECK(one[0].points == IndexRange{.first = 3, .count = 26});
+  const Values close = appended(joined({{9, 0.5}, {3, -0.5}, {1, 0.5}, {3, -0.5}}), Values(9, 0.5));
+  CHECK(periods(close).size() == 1);
+  const Values apart = appended(joined({{9, 0.5}, {4, -0.5}, {1, 0.5}, {3, -0.5}}), Values(9, 0.5));
+  CHECK(periods(apart).size() == 2);
   const auto three = periods(joined({{9, 0.5}, {8, -0.5}, {9, 0.5}}));
   REQUIRE(three.size() == 3);
   CHECK(three[1].side == Side::lower);
@@ -415,8 +420,10 @@ TEST_CASE("the quantile of Poisson is exact") {
 
 TEST_CASE("an error of the limits allows more signals, and the more the smaller the baseline") {
   const Surroundings all = {.points = 1200};
-  const auto allowed = [&](std::size_t baseline, LimitsFrom from) {
+  const auto allowed = [&](std::size_t baseline, LimitsFrom from,
+                           ChartKind kind = ChartKind::individuals) {
     ControlLimits limits = unit_limits;
+    limits.kind = kind;
     limits.points = baseline;
     limits.from = from;
     const Stability stability = judge({}, limits, RuleSet::standard, all);
@@ -426,6 +433,9 @@ TEST_CASE("an error of the limits allows more signals, and the more the smaller 
   CHECK(allowed(1200, LimitsFrom::another_series) >= poisson_95(1200 / 370.0));
   CHECK(allowed(125, LimitsFrom::this_series) > poisson_95(1200 / 370.0));
   CHECK(allowed(25, LimitsFrom::this_series) > allowed(125, LimitsFrom::this_series));
+  // Of each point of 25 in a chart of subgroups, sigma is known from 5 values.
+  CHECK(allowed(25, LimitsFrom::this_series, ChartKind::subgroups) <
+        allowed(25, LimitsFrom::this_series));
 }
 
 namespace {
@@ -566,6 +576,10 @@ TEST_CASE("indices and their bounds by the formulas") {
     CHECK(std::abs(found.index->low - low) < 0.006);
     CHECK(std::abs(found.index->high - high) < 0.006);
     CHECK(*found.spread == Approx(9.99 / 6).epsilon(1e-12));
+    const auto n = static_cast<double>(count);
+    const double swing = 1.959963984540054 * std::sqrt(1 / (9 * n) + 1.33 * 1.33 / (2 * (n - 1)));
+    CHECK(found.index->high == Approx(1.33 + swing).epsilon(1e-12));
+    CHECK(found.index->low == Approx(1.33 - swing).epsilon(1e-12));
   }
 }
 
@@ -616,6 +630,8 @@ TEST_CASE("a machine study needs 50 values in one uninterrupted run") {
   CHECK_FALSE(machine_performance(series_of(values, {40, 80}), specification));
   CHECK(machine_run(series_of(values, {10, 60})) == IndexRange{.first = 60, .count = 60});
   CHECK(machine_run(series_of(values, {60})) == IndexRange{.first = 60, .count = 60});
+  CHECK(machine_run(series_of(values).part({0, 50})));
+  CHECK_FALSE(machine_run(series_of(values).part({0, 49})));
   const auto found = machine_performance(series_of(values, {51}), specification);
   REQUIRE(found);
   CHECK(found->count == 69);
@@ -672,6 +688,10 @@ TEST_CASE("Pareto is ordered by count and adds up to 100 %") {
   CHECK(rows[0].percent == Approx(1100.0 / 18));
   CHECK(rows[1].cumulated == Approx(1400.0 / 18));
   CHECK(rows[3].cumulated == 100);
+  std::vector<KeyCount> equal;
+  for (char key = 'A'; key <= 'Z'; ++key) equal.push_back({.key = std::string(1, key), .count = 3});
+  const auto ties = pareto(equal);
+  for (std::size_t at = 0; at < equal.size(); ++at) CHECK(ties[at].key == equal[at].key);
   CHECK(pareto({}).empty());
   CHECK(pareto(std::vector<KeyCount>{{"E300", 0}}).empty());
 }
@@ -690,6 +710,9 @@ TEST_CASE("a histogram counts every value once") {
   const auto [lowest, highest] = std::minmax_element(values.begin(), values.end());
   CHECK(found->edge(0) <= *lowest);
   CHECK(found->edge(found->counts.size()) >= *highest);
+  // 2 IQR / n^(1/3) is 0.00376.
+  CHECK(found->steps == 1);
+  CHECK(histogram(series_of(values), 0.001)->steps == 4);
 }
 
 TEST_CASE("a histogram of one outlier keeps to its most classes") {
