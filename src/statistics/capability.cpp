@@ -58,15 +58,15 @@ Indices indices_of(const Moments& moments, const Deviation& deviation,
   const double value = least_distance(specification, moments.mean().value_or(0), 3 * d, 3 * d);
   const auto n = static_cast<double>(moments.count());
   const double swing = normal_95 * std::sqrt(1 / (9 * n) + value * value / (2 * deviation.freedom));
-  const double spread =
+  const double centred =
       (specification.upper.value_or(0) - specification.lower.value_or(0)) / (6 * d);
   // A deviation may be so small that they are beyond any number.
-  if (!std::isfinite(spread) || !std::isfinite(swing)) return result;
+  if (!std::isfinite(centred) || !std::isfinite(swing)) return result;
   result.index = Index{.name = name_of(specification, names),
                        .value = value,
                        .low = value - swing,
                        .high = value + swing};
-  if (specification.lower && specification.upper) result.spread = spread;
+  if (specification.lower && specification.upper) result.centred = centred;
   return result;
 }
 

@@ -73,12 +73,12 @@ std::optional<double> Moments::deviation() const {
 }
 
 std::optional<double> Moments::skewness() const {
-  const double n = static_cast<double>(count_);
+  const auto n = static_cast<double>(count_);
   return if_finite(std::sqrt(n) * cube_ / (square_ * std::sqrt(square_)));
 }
 
 std::optional<double> Moments::excess_kurtosis() const {
-  const double n = static_cast<double>(count_);
+  const auto n = static_cast<double>(count_);
   return if_finite(n * fourth_ / (square_ * square_) - 3);
 }
 

@@ -34,7 +34,7 @@ std::optional<Normality> normality(const Series& series) {
   std::vector<double> z(series.values().begin(), series.values().end());
   for (double& value : z) value = (value - mean) / s;
   std::sort(z.begin(), z.end());
-  const double n = static_cast<double>(z.size());
+  const auto n = static_cast<double>(z.size());
   double sum = 0;
   for (std::size_t at = 0; at < z.size(); ++at) {
     const double weight = 2 * static_cast<double>(at) + 1;

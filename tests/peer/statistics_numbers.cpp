@@ -28,7 +28,7 @@ void print(const char* name, std::initializer_list<std::optional<double>> values
 
 void print(const char* name, const Indices& indices) {
   if (!indices.index) return;
-  print(name, {indices.index->value, indices.index->low, indices.index->high, indices.spread});
+  print(name, {indices.index->value, indices.index->low, indices.index->high, indices.centred});
 }
 
 void print(const ControlLimits& limits) {

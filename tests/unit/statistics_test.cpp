@@ -575,7 +575,7 @@ TEST_CASE("indices and their bounds by the formulas") {
     CHECK(found.index->value == Approx(1.33).epsilon(1e-12));
     CHECK(std::abs(found.index->low - low) < 0.006);
     CHECK(std::abs(found.index->high - high) < 0.006);
-    CHECK(*found.spread == Approx(9.99 / 6).epsilon(1e-12));
+    CHECK(*found.centred == Approx(9.99 / 6).epsilon(1e-12));
     const auto n = static_cast<double>(count);
     const double swing = 1.959963984540054 * std::sqrt(1 / (9 * n) + 1.33 * 1.33 / (2 * (n - 1)));
     CHECK(found.index->high == Approx(1.33 + swing).epsilon(1e-12));
@@ -598,7 +598,7 @@ TEST_CASE("a specification that is none gives no index") {
     CHECK_FALSE(specification.is_usable());
     const Indices found = performance_of(standardised(50), specification);
     CHECK_FALSE(found.index);
-    CHECK_FALSE(found.spread);
+    CHECK_FALSE(found.centred);
   }
 }
 
@@ -753,7 +753,7 @@ TEST_CASE("rejected: an index without its number of values and bounds, or from l
     const Indices found = performance(moments_of(part.values()), specification);
     CHECK(found.count == count);
     CHECK_FALSE(found.index);
-    CHECK_FALSE(found.spread);
+    CHECK_FALSE(found.centred);
     CHECK_FALSE(capability(part, specification, stable)->index);
   }
   const Indices found = performance(moments_of(series.part({0, 30}).values()), specification);
@@ -862,16 +862,16 @@ TEST_CASE("rejected: control limits that move so that today's shift disappears")
 TEST_CASE("rejected: a two-sided index where only one limit exists") {
   const Values values = standardised(100);
   const Indices upper = performance_of(values, {.lower = {}, .upper = 6});
-  CHECK_FALSE(upper.spread);
+  CHECK_FALSE(upper.centred);
   CHECK(to_text(upper.index->name) == "Ppu");
   CHECK(upper.index->value == Approx(2));
   const Indices lower = performance_of(values, {.lower = -3, .upper = {}});
-  CHECK_FALSE(lower.spread);
+  CHECK_FALSE(lower.centred);
   CHECK(to_text(lower.index->name) == "Ppl");
   CHECK(lower.index->value == Approx(1));
   const auto within = capability(series_of(values), {.lower = {}, .upper = 6}, stable);
   CHECK(to_text(within->index->name) == "Cpu");
-  CHECK_FALSE(within->spread);
+  CHECK_FALSE(within->centred);
   const auto below = capability(series_of(values), {.lower = -3, .upper = {}}, stable);
   CHECK(to_text(below->index->name) == "Cpl");
 }
@@ -953,7 +953,7 @@ void check_finite(const std::optional<double>& number) {
 }
 
 void check_finite(const Indices& indices) {
-  check_finite(indices.spread);
+  check_finite(indices.centred);
   if (!indices.index) return;
   for (const double number : {indices.index->value, indices.index->low, indices.index->high}) {
     CHECK(std::isfinite(number));

@@ -46,14 +46,14 @@ enum class Amount : std::uint8_t {
 
 Amount amount_of(std::size_t count);
 
-/// One family of indices. By two limits `spread` is (U - L) / (6 d) and `index` is
+/// One family of indices. By two limits `centred` (Pp, Cp, Cm) is (U - L) / (6 d), and `index` is
 /// min(U - mean, mean - L) / (3 d), by name ppk, cpk or cmk; by one limit `index` is that of this
-/// limit alone, by name ppu or ppl and so on, and there is no `spread`. Both are nothing below 30
+/// limit alone, by name ppu or ppl and so on, and there is no `centred`. Both are nothing below 30
 /// values, without a usable specification, and when d is 0.
 struct Indices {
   std::size_t count = 0;
   Amount amount = Amount::too_few;
-  std::optional<double> spread = {};
+  std::optional<double> centred = {};  ///< what `index` is if the mean is in the middle
   std::optional<Index> index = {};
 };
 

@@ -56,8 +56,8 @@ struct RuleCount {
   Rule rule = Rule::beyond_limits;
   std::size_t signals = 0;
   double expected = 0;  ///< as many come by chance
-  std::optional<std::size_t> allowed =
-      {};  ///< more do not in 95 %; without: not part of the verdict
+  /// More do not come in 95 % of all cases. Nothing: the rule is no part of the verdict.
+  std::optional<std::size_t> allowed = {};
 };
 
 /// Correlation of neighbours above which sigma from moving ranges is too small and the rules signal
