@@ -46,6 +46,9 @@ std::optional<Chart> chart_of(const Series& series, const Assessment& known,
   chart.periods = shifted_periods(chart.signals, options.rules);
   chart.stability = judge(chart.signals, chart.limits, options.rules,
                           {.points = points.size(),
+                           .step = kind == ChartKind::subgroups
+                                       ? options.resolution / static_cast<double>(subgroup_size)
+                                       : options.resolution,
                            .autocorrelation = known.autocorrelation,
                            .is_too_coarse = known.is_too_coarse});
   chart.subgroups = std::move(groups);

@@ -148,28 +148,64 @@ std::size_t allowed(const Errors& errors, const std::function<double(double, dou
   return poisson_95(mixture);
 }
 
-RuleCount beyond_count(double points, const Errors& errors) {
-  const double expected = points / 370;
-  const double known = 2 * normal_probability(-3);
-  const auto with_errors = [&](double centre, double sigma) {
-    return expected / known *
-           (normal_probability(centre - 3 * sigma) + normal_probability(-centre - 3 * sigma));
-  };
-  return {
-      .rule = Rule::beyond_limits, .expected = expected, .allowed = allowed(errors, with_errors)};
+/// Beyond which values a point counts, in sigma from the centre.
+struct Thresholds {
+  double beyond_lower = -3;
+  double below_centre = 0;
+  double above_centre = 0;
+  double beyond_upper = 3;
+};
+
+/// Of points that are rounded to steps: those between two steps lie half-way.
+Thresholds rounded(const ControlLimits& limits, double step) {
+  const auto in_sigma = [&](double steps) { return (steps * step - limits.centre) / limits.sigma; };
+  const auto below = [&](double limit) { return in_sigma(std::ceil(limit / step) - 0.5); };
+  const auto above = [&](double limit) { return in_sigma(std::floor(limit / step) + 0.5); };
+  return {.beyond_lower = below(limits.lower),
+          .below_centre = below(limits.centre),
+          .above_centre = above(limits.centre),
+          .beyond_upper = above(limits.upper)};
 }
 
-RuleCount run_count(double points, const Errors& errors, RuleSet rules) {
+/// Without rounding, and with it where there is any. What is allowed is the larger count: rounding
+/// excuses signals, but that it makes them rarer accuses nothing.
+std::vector<Thresholds> thresholds_of(const ControlLimits& limits, double step) {
+  std::vector<Thresholds> thresholds = {{}};
+  if (step > 0 && limits.sigma > 0) thresholds.push_back(rounded(limits, step));
+  return thresholds;
+}
+
+RuleCount beyond_count(double points, const Errors& errors,
+                       const std::vector<Thresholds>& thresholds) {
+  RuleCount result{.rule = Rule::beyond_limits, .expected = points / 370, .allowed = 0};
+  const double known = 2 * normal_probability(-3);
+  for (const Thresholds& at : thresholds) {
+    const auto with_errors = [&](double centre, double sigma) {
+      const double share = normal_probability(at.beyond_lower * sigma - centre) +
+                           normal_probability(centre - at.beyond_upper * sigma);
+      return result.expected * share / known;
+    };
+    result.allowed = std::max(*result.allowed, allowed(errors, with_errors));
+  }
+  return result;
+}
+
+RuleCount run_count(double points, const Errors& errors, RuleSet rules,
+                    const std::vector<Thresholds>& thresholds) {
   const auto length = static_cast<double>(run_length(rules));
-  const auto with_errors = [&](double centre, double) {
-    const double p = normal_probability(centre);
-    // The one before it on the other side, then all of them on this one.
-    return points * ((1 - p) * std::pow(p, length) + p * std::pow(1 - p, length));
-  };
+  RuleCount result{.rule = Rule::one_side, .expected = points / std::exp2(length), .allowed = 0};
   const Errors of_centre{.centre = errors.centre, .sigma = 0};
-  return {.rule = Rule::one_side,
-          .expected = points / std::exp2(length),
-          .allowed = allowed(of_centre, with_errors)};
+  for (const Thresholds& at : thresholds) {
+    const auto with_errors = [&](double centre, double) {
+      const double below = normal_probability(at.below_centre - centre);
+      const double above = normal_probability(centre - at.above_centre);
+      // The one before it not on this side, then all of them on it.
+      return points *
+             ((1 - below) * std::pow(below, length) + (1 - above) * std::pow(above, length));
+    };
+    result.allowed = std::max(*result.allowed, allowed(of_centre, with_errors));
+  }
+  return result;
 }
 
 }  // namespace
@@ -225,7 +261,9 @@ Stability judge(const std::vector<Signal>& signals, const ControlLimits& limits,
   const Errors errors = errors_of(limits, surroundings.points);
   Stability result{.autocorrelation = surroundings.autocorrelation};
   result.is_greyed = surroundings.autocorrelation.value_or(0) > greying_autocorrelation;
-  result.counts = {beyond_count(points, errors), run_count(points, errors, rules)};
+  const std::vector<Thresholds> thresholds = thresholds_of(limits, surroundings.step);
+  result.counts = {beyond_count(points, errors, thresholds),
+                   run_count(points, errors, rules, thresholds)};
   if (rules == RuleSet::western_electric) {
     for (const Window& window : windows) {
       result.counts.push_back({.rule = window.rule, .expected = points * chance_of(window)});

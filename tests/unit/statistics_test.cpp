@@ -474,6 +474,50 @@ TEST_CASE("stable processes are called unstable in less than a tenth of all wind
   }
 }
 
+TEST_CASE("rounding makes no stable process unstable") {
+  // Of 0.01; sigma is 1.5 and 3 steps, and the mean lies where one side has more steps.
+  for (const double deviation : {0.015, 0.03}) {
+    for (const std::size_t count : {125U, 1200U, 2000U, 2500U}) {
+      CAPTURE(deviation);
+      CAPTURE(count);
+      const auto round = [&](Values& values) {
+        for (double& value : values) value = std::round(271.2 + value * deviation * 100) / 100;
+      };
+      CHECK(called_unstable(count, {}, round) <= windows_of_each / 10);
+      const auto shift = [&](Values& values) {
+        for (std::size_t at = values.size() / 2; at < values.size(); ++at) values[at] += 1.5;
+        round(values);
+      };
+      if (count > 1000) CHECK(called_unstable(count, {}, shift) >= windows_of_each * 99 / 100);
+    }
+  }
+}
+
+TEST_CASE("only what rounding brings is excused") {
+  const auto allowed = [](double centre, double step) {
+    ControlLimits limits = unit_limits;
+    limits.centre = centre;
+    limits.lower += centre;
+    limits.upper += centre;
+    const Stability stability =
+        judge({}, limits, RuleSet::standard, {.points = 10'000, .step = step});
+    return std::pair(*stability.counts[0].allowed, *stability.counts[1].allowed);
+  };
+  const auto exact = allowed(0, 0);
+  CHECK(exact == std::pair(poisson_95(10'000 / 370.0), poisson_95(10'000 / 256.0)));
+  CHECK(allowed(0, 1e-6) == exact);
+  // Values lie as far from the centre and the limits on both sides.
+  CHECK(allowed(0.25, 0.5) == exact);
+  // What is 3.25 or more becomes 3.5 and is beyond 3.4; what is -2.75 or less becomes -3.
+  const double share = normal_probability(-2.85) + normal_probability(-3.15);
+  const double of_known = share / (2 * normal_probability(-3));
+  CHECK(allowed(0.4, 0.5).first == poisson_95(10'000 / 370.0 * of_known));
+  CHECK(allowed(0.4, 0.5).first > exact.first);
+  // More below the centre than above.
+  CHECK(allowed(0.1, 0.5).second > exact.second);
+  CHECK(allowed(0.4, 0.5).second == allowed(0.1, 0.5).second);
+}
+
 TEST_CASE("a shift of the mean is found") {
   struct Case {
     std::size_t count;

@@ -78,6 +78,7 @@ struct Stability {
 /// What stands beside the signals of a chart when they are judged.
 struct Surroundings {
   std::size_t points = 0;  ///< of the chart
+  double step = 0;         ///< between two values that a point can have; 0: any
   std::optional<double> autocorrelation = {};
   bool is_too_coarse = false;
 };
@@ -85,9 +86,13 @@ struct Surroundings {
 /// Count test. Of n points, n / 370 are beyond the limits by chance, and n / 2^k runs of k begin:
 /// two of the 2^(k+1) ways that a point and the k behind it can fall, so n / 256, or n / 128 for 7.
 /// The verdict is `stable` when no count is larger than the 95 % quantile of the Poisson
-/// distribution of that mean. Where the baseline is not all that is judged, the quantile is that of
-/// the mixture which errors of centre and sigma of a baseline of that size bring: without it, half
-/// of all stable series of 1,200 would be unstable by a baseline of 25.
+/// distribution of that mean. The quantile is larger where less is known of the limits:
+///   - Where the baseline is not all that is judged, centre and sigma have errors, and it is that
+///   of
+///     the mixture which they bring. Without it, half of all stable series of 1,200 would be
+///     unstable by a baseline of 25.
+///   - Where points are rounded, more of them may lie on one side of the centre or beyond a limit.
+///     Without it, half of all stable series of 2,000 would be unstable when sigma is 1.5 steps.
 /// The other two rules are counted beside what chance brings and are no part of the verdict: their
 /// signals come in clusters.
 Stability judge(const std::vector<Signal>& signals, const ControlLimits& limits, RuleSet rules,
