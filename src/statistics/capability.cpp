@@ -1,6 +1,7 @@
 #include "spindle/statistics/capability.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -76,15 +77,20 @@ Indices of_all(const Moments& moments, const Specification& specification, const
   return indices_of(moments, s, specification, names);
 }
 
-/// The value below which the share `p` of the values lies. Puts the values into another order.
-double quantile(std::vector<double>& values, double p) {
-  const double position = p * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::size_t>(position);
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(below);
-  std::nth_element(values.begin(), at, values.end());
-  if (at + 1 == values.end()) return *at;
-  const double next = *std::min_element(at + 1, values.end());
-  return *at + (position - std::floor(position)) * (next - *at);
+/// The values below which these shares of the values lie; the shares ascend.
+std::array<double, 3> quantiles(std::vector<double> values, const std::array<double, 3>& shares) {
+  std::array<double, 3> found = {};
+  auto from = values.begin();
+  for (std::size_t which = 0; which < shares.size(); ++which) {
+    const double position = shares[which] * static_cast<double>(values.size() - 1);
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(position);
+    // Those below `from` are the smallest ones already.
+    std::nth_element(from, at, values.end());
+    const double next = at + 1 == values.end() ? *at : *std::min_element(at + 1, values.end());
+    found[which] = *at + (position - std::floor(position)) * (next - *at);
+    from = at;
+  }
+  return found;
 }
 
 }  // namespace
@@ -145,10 +151,10 @@ std::optional<PercentileIndex> percentile_performance(const Series& series,
                                                       const Indices& normal) {
   if (series.size() < least_for_percentiles || !normal.index) return std::nullopt;
   constexpr double tail = 0.00135;
-  std::vector<double> values(series.values().begin(), series.values().end());
-  const double median = quantile(values, 0.5);
-  const double lower_width = median - quantile(values, tail);
-  const double upper_width = quantile(values, 1 - tail) - median;
+  const auto [low, median, high] =
+      quantiles({series.values().begin(), series.values().end()}, {tail, 0.5, 1 - tail});
+  const double lower_width = median - low;
+  const double upper_width = high - median;
   if ((specification.lower && lower_width <= 0) || (specification.upper && upper_width <= 0)) {
     return std::nullopt;
   }
