@@ -37,6 +37,7 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"sim", {"catalogue", "link"}},
     {"report", {"base"}},
     {"store", {"base"}},
+    {"statistics", {}},
     {"files", {"catalogue"}},
     {"shipped", {"files", "posix"}},
     {"device", {"link", "catalogue"}},
@@ -597,6 +598,7 @@ TEST_CASE("the law has no circles and the arrows lead down") {
     }
   }
   CHECK(visible_from("report") == Names{"report", "base"});
+  CHECK(visible_from("statistics") == Names{"statistics"});
   CHECK(visible_from("posix") == Names{"posix", "link", "sim", "catalogue", "modbus", "base"});
   CHECK_FALSE(visible_from("device").contains("sim"));
   CHECK_FALSE(visible_from("work").contains("report"));
