@@ -138,7 +138,13 @@ void check_after(const std::string& path, const Told& told) {
     const std::set<RowId> found = ids_of(events);
     CHECK(std::ranges::includes(found, told.events));
     CHECK(std::ranges::includes(ids_of(*gaps), told.gaps));
-    for (std::size_t i = 0; i < events.size(); ++i) CHECK(events[i].number == 2 * (i + 1));
+    std::vector<std::size_t> numbers;
+    std::vector<std::size_t> expected;
+    for (const StoredEvent& event : events) {
+      numbers.push_back(event.number);
+      expected.push_back(2 * numbers.size());
+    }
+    CHECK(numbers == expected);
   }
   auto writer = Writer::open(path);
   REQUIRE(writer);
@@ -175,7 +181,7 @@ TEST_CASE("a power cut at any moment loses nothing that was told") {
 TEST_CASE("a full or failing disk loses nothing and stops nothing") {
   const TemporaryFolder folder;
   const std::string path = folder.path() + "/events.db";
-  for (const int answer : {SQLITE_FULL, SQLITE_IOERR_WRITE, SQLITE_IOERR_FSYNC}) {
+  for (const int answer : {SQLITE_FULL, SQLITE_IOERR}) {
     for (std::size_t change = 1;; ++change) {
       CAPTURE(change);
       CAPTURE(answer);

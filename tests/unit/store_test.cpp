@@ -523,6 +523,15 @@ TEST_CASE("a filter lets through what it names, in the order of the store") {
   CHECK(numbers({.places = {shop.place, 99}, .until = second(2)}) == Numbers{1});
   CHECK(*reader->newest() == bad_id + 1);
 
+  const Filter torques = {.columns = std::vector{Column::torque}};
+  CHECK(reader->events(torques, [&](const EventView& event) {
+    CHECK(event.columns[Column::torque] == 27'100 + event.number);
+    CHECK_FALSE(event.columns[Column::preset]);
+    CHECK(event.raw.empty());
+    CHECK(event.source == "push");
+    return true;
+  }));
+
   std::size_t taken = 0;
   CHECK(reader->events({}, [&](const EventView& /*event*/) { return ++taken < 2; }));
   CHECK(taken == 2);
@@ -545,6 +554,23 @@ TEST_CASE("a reader sees what is written while it reads") {
   CHECK(stored_events(*reader).size() == 6);
   shop.writer.reset();
   CHECK(stored_events(*reader).size() == 6);
+}
+
+TEST_CASE("a write-ahead log that a reader made long is emptied behind it") {
+  const Shop shop;
+  shop.store_numbers(1, 2);
+  const std::string text = '"' + std::string(1U << 20U, 'x') + '"';
+  constexpr int texts = 40;
+  constexpr std::uintmax_t long_log = 32U << 20U;
+  CHECK(shop.reader()->events({}, [&](const EventView& /*event*/) {
+    for (int second_of = 0; second_of < texts; ++second_of) {
+      shop.store(Happening{.at = second(second_of), .type = "link", .json = text});
+    }
+    return false;
+  }));
+  CHECK(std::filesystem::file_size(shop.path + "-wal") > long_log);
+  shop.store_numbers(3, 3);
+  CHECK(std::filesystem::file_size(shop.path + "-wal") == 0);
 }
 
 TEST_CASE("several threads write") {
