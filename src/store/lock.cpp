@@ -8,6 +8,9 @@
 
 #include <array>
 #include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -20,20 +23,22 @@ namespace {
 
 constexpr std::size_t longest_number = 20;
 
+/// As wide as any number of a process, so that nothing of a longer one stays behind it.
+constexpr std::size_t width = 10;
+
 /// The process that wrote itself into the file; empty: it has not yet.
 std::optional<std::uint64_t> holder(int file) {
-  std::array<char, longest_number> text = {};
+  std::array<char, width> text = {};
   const ssize_t length = ::pread(file, text.data(), text.size(), 0);
   if (length <= 0) return std::nullopt;
   const std::string_view line(text.data(), static_cast<std::size_t>(length));
-  constexpr std::uint64_t highest = 1ULL << 32U;
-  return parse_unsigned(line.substr(0, line.find('\n')), highest);
+  return parse_unsigned(line.substr(0, line.find(' ')), std::numeric_limits<std::uint32_t>::max());
 }
 
-bool tell_holder(int file) {
-  const std::string line = fmt::format("{}\n", ::getpid());
-  return ::ftruncate(file, 0) == 0 &&
-         ::pwrite(file, line.data(), line.size(), 0) == static_cast<ssize_t>(line.size());
+void tell_holder(int file) {
+  const std::string line = fmt::format("{:<{}}\n", ::getpid(), width);
+  // It serves the message only: a full disk is no reason to refuse.
+  static_cast<void>(::pwrite(file, line.data(), line.size(), 0) == 0);
 }
 
 Error failure(const std::string& path, int number) {
@@ -63,8 +68,7 @@ Result<WriterLock> WriterLock::take(const std::string& store) {
     return tl::unexpected(number == EWOULDBLOCK ? held(store, holder(file))
                                                 : failure(path, number));
   }
-  // Whose it is serves the message only: a full disk is no reason to refuse.
-  static_cast<void>(tell_holder(file));
+  tell_holder(file);
   return lock;
 }
 

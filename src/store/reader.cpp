@@ -66,14 +66,25 @@ std::int64_t milliseconds(WallTime time) { return time.time_since_epoch().count(
 
 constexpr int first_value = 12;  ///< column of a query for events from which on Columns stand
 
-std::string event_names() {
-  return fmt::format(
-      "id, tool, place, epoch, number, at, tool_time, source, kind, remembered, barcode, raw, {}",
-      names_of(column_words));
+std::vector<Column> columns_of(const Filter& filter) {
+  if (filter.columns) return *filter.columns;
+  std::vector<Column> all;
+  for (const auto& [word, column] : column_words) all.push_back(column);
+  return all;
+}
+
+std::string event_names(const Filter& filter) {
+  std::string names =
+      fmt::format("id, tool, place, epoch, number, at, tool_time, source, kind, remembered, {}",
+                  filter.columns ? "NULL, NULL" : "barcode, raw");
+  for (const Column column : columns_of(filter)) {
+    names += fmt::format(", {}", column_words.text(column));
+  }
+  return names;
 }
 
 Statement event_query(Connection& connection, const Filter& filter) {
-  const std::string names = event_names();
+  const std::string names = event_names(filter);
   Selection selection(names, "event");
   selection.require_one_of("tool", filter.tools);
   selection.require_one_of("place", filter.places);
@@ -87,7 +98,7 @@ Statement event_query(Connection& connection, const Filter& filter) {
   return selection.statement(connection, filter.newest);
 }
 
-void read_event(const Rows& rows, EventView& event) {
+void read_event(const Rows& rows, const std::vector<Column>& columns, EventView& event) {
   event.id = rows.integer(0);
   event.tool = rows.integer(1);
   event.place = rows.integer(2);
@@ -101,7 +112,7 @@ void read_event(const Rows& rows, EventView& event) {
   event.barcode = rows.text(10);
   event.raw = rows.bytes(11);
   int place = first_value;
-  for (const auto& [word, column] : column_words) event.columns[column] = rows.maybe(place++);
+  for (const Column column : columns) event.columns[column] = rows.maybe(place++);
 }
 
 Statement gap_query(Connection& connection, const Filter& filter) {
@@ -230,12 +241,13 @@ class FileReader : public Reader {
 
   Result<void> events(const Filter& filter,
                       const std::function<bool(const EventView&)>& take) override {
+    const std::vector<Column> columns = columns_of(filter);
     Statement statement = event_query(*connection_, filter);
     {
       Rows rows = statement.rows();
       EventView event;
       while (rows.next()) {
-        read_event(rows, event);
+        read_event(rows, columns, event);
         if (!take(event)) break;
       }
     }

@@ -13,7 +13,9 @@
 
 namespace spindle::store {
 
-/// Which rows are wanted. What is empty asks for all.
+/// Which rows are wanted. What is empty asks for all. Gaps are asked by tools, epoch, after, newest
+/// and the time that they share with since and until; happenings by tools, since, until, after,
+/// newest and, as kinds, their types.
 struct Filter {
   std::vector<RowId> tools = {};
   std::vector<RowId> places = {};                ///< of events only
@@ -25,23 +27,28 @@ struct Filter {
   std::optional<std::uint16_t> number = std::nullopt;
   RowId after = 0;                                   ///< rows behind this one
   std::optional<std::size_t> newest = std::nullopt;  ///< at most so many, the newest ones
+  /// Of events, only these columns, and neither barcode nor raw: half the time.
+  std::optional<std::vector<Column>> columns = std::nullopt;
 };
 
-/// How the numbers of one tool in one epoch are covered by rows and gaps.
+/// How the numbers of one tool in one epoch are covered by rows and gaps: each number from the
+/// first to the last is a row, else in a gap, else a hole.
 struct Coverage {
   RowId tool = 0;
   std::int64_t epoch = 0;
-  std::uint16_t first = 0;
-  std::uint16_t last = 0;
+  std::uint16_t first = 0;  ///< that is a row or in a gap; 0 where the epoch before it is stored
+                            ///< and its counter only wrapped
+  std::uint16_t last = 0;   ///< the same; 65535 where the counter wraps behind it
   std::size_t rows = 0;
-  std::size_t in_gaps = 0;  ///< numbers inside gaps that are counted
-  std::size_t holes = 0;    ///< numbers between first and last that are neither a row nor in a gap
+  std::size_t in_gaps = 0;
+  std::size_t holes = 0;
   std::size_t unknown_gaps = 0;  ///< gaps of unknown size, or that may be larger
 };
 
 /// Reads a store, also while it is written, and by several programs. Every function sees the store
-/// as it was at one moment. Errors: `bad_file` where it is no store, a newer or a damaged one;
-/// `storage` where it cannot be read. One thread.
+/// as it was at one moment; one that takes long keeps the writer's log from being emptied. Errors:
+/// `bad_file` where it is no store, a newer or a damaged one; `storage` where it cannot be read.
+/// One thread.
 class Reader {
  public:
   static Result<std::unique_ptr<Reader>> open(const std::string& path);

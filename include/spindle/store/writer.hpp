@@ -14,13 +14,16 @@
 
 namespace spindle::store {
 
-/// An event with the gap that it made known: both are stored, or neither.
+/// An event with the gap that it made known: both are stored, or neither. The first event of a tool
+/// begins its first epoch, whatever `begins` says; else it is `wrap`, `restart` or `unsure`.
 struct NewEvent {
   Event event = {};
   std::optional<EpochReason> begins = std::nullopt;  ///< empty: counted on in the epoch of before
   std::optional<Gap> gap = std::nullopt;             ///< `epoch` and `tool` are the writer's
 };
 
+/// A gap that no event ended yet. It is known where its epoch has one between the same numbers and
+/// with the same reason (and, where it has no numbers, the same beginning); so is that of an event.
 struct NewGap {
   Gap gap = {};  ///< `epoch` is the writer's
 };
@@ -88,12 +91,18 @@ class Writer {
   virtual Result<std::optional<Last>> last(RowId tool) = 0;
 
   /// Stores all entries in their order, in one transaction. What became of each stands in the same
-  /// order. An event whose number its epoch has already is compared in every register: equal is
-  /// `known`; otherwise nothing is ever dropped (`conflict`).
+  /// order, and all may be handed over again: nothing is there twice. An event whose number the
+  /// newest epoch has already is compared in every register: equal is `known` (one that begins an
+  /// epoch: with the same time, too); otherwise nothing is ever dropped (`conflict`: a new epoch,
+  /// and a gap of unknown size in place of its own). Settings are newer than those stored before,
+  /// whatever the clock says. Error `internal` where an entry names what is not there, or is no
+  /// JSON.
   virtual Result<std::vector<Stored>> commit(std::span<const Entry> entries) = 0;
 
-  /// Deletes what is older, but for the last event of each tool and what a sink has not got. Error
-  /// `usage`: a sink has not got it, named in the message. Leaves a happening of type "trim".
+  /// Deletes what is older, but for the last event of each tool, the gap behind it, and former
+  /// trims. The events of a tool go in the order of the store, so that no holes come between. Error
+  /// `usage`: a sink has not got all of it, named in the message. Leaves a happening of type
+  /// "trim".
   virtual Result<Trimmed> trim(WallTime before, WallTime now) = 0;
 };
 
