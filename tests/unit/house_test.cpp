@@ -36,6 +36,7 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"link", {"modbus"}},
     {"sim", {"catalogue", "link"}},
     {"report", {"base"}},
+    {"chart", {"base"}},
     {"files", {"catalogue"}},
     {"shipped", {"files", "posix"}},
     {"device", {"link", "catalogue"}},
