@@ -265,7 +265,7 @@ TopWords top_words(std::span<const Change> changes, std::span<const Blank> blank
               change.word);
   }
   for (const Blank& blank : blanks) {
-    words.add(blank.left, Look::change_word, grouped(blank.missed) + " missed");
+    words.add_optional(blank.left, Look::change_word, grouped(blank.missed) + " missed");
   }
   return words;
 }

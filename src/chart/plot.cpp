@@ -255,7 +255,20 @@ void TopWords::add(double x, Look look, std::string text) {
   words_.push_back({.x = x, .look = look, .text = std::move(text)});
 }
 
+void TopWords::add_optional(double x, Look look, std::string text) {
+  words_.push_back({.x = x, .look = look, .text = std::move(text), .is_optional = true});
+}
+
 void TopWords::place(double left, const Sheet& sheet) {
+  distribute(left, sheet);
+  if (dropped_ == 0) return;
+  std::erase_if(words_, [](const Word& word) { return word.is_optional; });
+  distribute(left, sheet);
+}
+
+void TopWords::distribute(double left, const Sheet& sheet) {
+  rows_ = 0;
+  dropped_ = 0;
   const std::size_t most_rows = sheet.is_narrow ? 3 : 2;
   const double right = sheet.width - 4;
   constexpr double between = 8;

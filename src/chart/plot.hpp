@@ -95,6 +95,8 @@ void draw_margin(Svg& svg, const Box& box, std::vector<MarginWord> words, const 
 class TopWords {
  public:
   void add(double x, Look look, std::string text);
+  /// One that gives way where not all have room.
+  void add_optional(double x, Look look, std::string text);
   /// Distributes what was added over rows.
   void place(double left, const Sheet& sheet);
   [[nodiscard]] double height() const;
@@ -108,9 +110,12 @@ class TopWords {
     Look look;
     std::string text;
     std::size_t row = 0;
+    bool is_optional = false;
     bool ends_at_x = false;
     bool is_dropped = false;
   };
+  void distribute(double left, const Sheet& sheet);
+
   std::vector<Word> words_;
   std::size_t rows_ = 0;
   std::size_t dropped_ = 0;

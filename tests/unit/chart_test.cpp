@@ -780,6 +780,12 @@ TEST_CASE("chart: words along the top stay apart, and what is left out is counte
   CHECK(count_of(few, ">settings changed<") == 2);
   CHECK(contains(few, ">firmware<"));
   CHECK(!contains(few, ">3 changes<"));
+  // What is missing is said in the legend too, so its words give way.
+  chart.gaps = {{21, 22, 5}, {23, 24, 6}};
+  CHECK(contains(run_chart(chart), ">11 missed in 2 gaps<"));
+  CHECK(count_of(run_chart(chart), " missed<") == 0);
+  CHECK(count_of(run_chart(chart), ">settings changed<") == 2);
+  CHECK(contains(run_chart(chart), ">firmware<"));
   for (std::int64_t at = 0; at < 100; ++at) chart.changes.push_back({at, "settings changed"});
   const std::string many = run_chart(chart);
   CHECK(count_of(many, ">settings changed<") < 20);
