@@ -63,10 +63,11 @@ double highest_count(const Histogram& chart, const Edges& edges) {
   for (const HistogramClass& each : chart.classes) {
     highest = std::max(highest, static_cast<double>(each.count));
   }
-  if (has_curve(chart)) highest = std::max(highest, expected(chart, edges, chart.normal->mean));
   // A curve far narrower than a class must not make the bars vanish.
-  const double bars = static_cast<double>(std::max<std::uint64_t>(values_of(chart), 1));
-  return std::min(highest, 1.5 * bars) * 1.08;
+  if (has_curve(chart)) {
+    highest = std::max(highest, std::min(expected(chart, edges, chart.normal->mean), 3 * highest));
+  }
+  return highest * 1.08;
 }
 
 void draw_bars(Svg& svg, const Histogram& chart, const Edges& edges, const Scale& x,

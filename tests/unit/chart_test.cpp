@@ -845,6 +845,16 @@ TEST_CASE("chart: classes lie half a step beside their values") {
   CHECK(value(std::stod(left[0]) - 1) == doctest::Approx(2.595).epsilon(0.0002));
   CHECK(value(std::stod(left[1]) + std::stod(width[1]) + 1) ==
         doctest::Approx(2.635).epsilon(0.0002));
+  // However narrow the curve, the bars stay visible: the highest a third of the plot.
+  const auto height_of = [](const std::string& text) {
+    double highest = 0;
+    for (const std::string& height : attributes(part_of(text, "bar"), "height")) {
+      highest = std::max(highest, std::stod(height));
+    }
+    return highest;
+  };
+  chart.normal = NormalCurve{2.61, 1e-9};
+  CHECK(height_of(histogram(chart)) > 0.3 * 230);
   chart.normal = NormalCurve{2.61, 0.02};
   CHECK(contains(histogram(chart), ">normal curve: mean 2.610, s 0.0200<"));
   CHECK(contains(part_of(histogram(chart), "normal"), "stroke-dasharray"));
