@@ -769,8 +769,10 @@ TEST_CASE("chart: a level ends where it no longer holds") {
   CHECK(lines[0][1].first == doctest::Approx(lines[1][0].first));
   CHECK(lines[0][0].first < lines[0][1].first);
   CHECK(lines[1][0].second < lines[0][0].second);
-  CHECK(contains(run_chart(chart), ">USL 2.98<"));
-  CHECK(contains(run_chart(chart), ">USL 3.10<"));
+  // Beside its end, not in the margin.
+  CHECK(contains(run_chart(chart), " text-anchor=\"end\">USL 2.98<"));
+  CHECK(contains(run_chart(chart), "\">USL 3.10<"));
+  CHECK(!contains(run_chart(chart), " text-anchor=\"end\">USL 3.10<"));
 }
 
 TEST_CASE("chart: words along the top stay apart, and what is left out is counted") {
