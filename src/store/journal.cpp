@@ -44,12 +44,6 @@ Bytes bytes_of(RegisterView registers) {
   return bytes;
 }
 
-Registers registers_of(ByteView bytes) {
-  Registers registers;
-  for (std::size_t at = 0; at + 1 < bytes.size(); at += 2) registers.push_back(get_u16(bytes, at));
-  return registers;
-}
-
 /// Empty texts are not known ones.
 std::optional<std::string_view> known(const std::string& text) {
   if (text.empty()) return std::nullopt;
@@ -77,6 +71,7 @@ Gap conflict_gap(const NewEvent& entry, WallTime other) {
 
 Journal::Journal(Connection& connection)
     : connection_(connection),
+      last_(connection),
       find_tool_(connection, "SELECT id FROM tool WHERE maker = ?1 AND serial = ?2"),
       insert_tool_(connection, "INSERT INTO tool (maker, serial, model) VALUES (?1, ?2, ?3)"),
       newest_place_(connection,
@@ -88,20 +83,11 @@ Journal::Journal(Connection& connection)
       set_seen_(
           connection,
           "UPDATE place SET seen = ?2 WHERE id = (SELECT max(id) FROM place WHERE tool = ?1)"),
-      last_seen_(connection,
-                 "SELECT seen FROM place WHERE tool = ?1 AND seen IS NOT NULL "
-                 "ORDER BY id DESC LIMIT 1"),
-      newest_epoch_(connection,
-                    "SELECT ordinal FROM epoch WHERE tool = ?1 ORDER BY ordinal DESC LIMIT 1"),
       insert_epoch_(connection,
                     "INSERT INTO epoch (tool, ordinal, began, reason) VALUES (?1, ?2, ?3, ?4)"),
       find_event_(connection,
                   "SELECT id, at, raw FROM event WHERE tool = ?1 AND epoch = ?2 AND number = ?3"),
       insert_event_(connection, event_insertion()),
-      last_event_(connection,
-                  "SELECT number, at, raw FROM event WHERE tool = ?1 AND epoch = ?2 "
-                  "ORDER BY number DESC LIMIT 1"),
-      last_gap_(connection, "SELECT max(before) FROM gap WHERE tool = ?1 AND epoch = ?2"),
       find_gap_(connection,
                 "SELECT id FROM gap WHERE tool = ?1 AND epoch = ?2 AND before IS ?3 "
                 "AND after IS ?4 AND reason = ?5 AND (before IS NOT NULL OR after IS NOT NULL "
@@ -141,41 +127,6 @@ RowId Journal::place(const Place& place) {
   return new_row();
 }
 
-std::optional<Last> Journal::last(RowId tool) {
-  const auto epoch = newest_epoch(tool);
-  if (!epoch) return std::nullopt;
-  Last last = {.epoch = *epoch};
-  bool is_known = false;
-  {
-    Rows rows = last_event_.query(tool, *epoch);
-    if (rows.next()) {
-      is_known = true;
-      last.number = static_cast<std::uint16_t>(rows.integer(0));
-      last.seen = rows.time(1);
-      last.block = registers_of(rows.bytes(2));
-    }
-  }
-  {
-    Rows rows = last_gap_.query(tool, *epoch);
-    const auto before = rows.next() ? rows.maybe(0) : std::nullopt;
-    if (before && *before > 0 && (!is_known || *before - 1 > last.number)) {
-      is_known = true;
-      last.number = static_cast<std::uint16_t>(*before - 1);
-      last.block = std::nullopt;
-    }
-  }
-  Rows rows = last_seen_.query(tool);
-  if (rows.next()) last.seen = std::max(last.seen, rows.time(0));
-  if (!is_known) return std::nullopt;
-  return last;
-}
-
-std::optional<std::int64_t> Journal::newest_epoch(RowId tool) {
-  Rows rows = newest_epoch_.query(tool);
-  if (!rows.next()) return std::nullopt;
-  return rows.integer(0);
-}
-
 void Journal::begin_epoch(RowId tool, std::int64_t ordinal, WallTime at, EpochReason reason) {
   insert_epoch_.run(tool, ordinal, at, epoch_reason_words.text(reason));
 }
@@ -192,7 +143,7 @@ std::optional<Journal::Taken> Journal::taken(const Event& event, std::int64_t ep
 Stored Journal::store(const NewEvent& entry) {
   const Event& event = entry.event;
   const Bytes raw = bytes_of(event.raw);
-  const auto newest = newest_epoch(event.tool);
+  const auto newest = last_.newest_epoch(event.tool);
   std::int64_t epoch = newest.value_or(0);
   if (!newest) {
     begin_epoch(event.tool, epoch, event.at, EpochReason::first);
@@ -243,7 +194,7 @@ Stored Journal::store(const Gap& gap, RowId tool, std::int64_t epoch) {
 
 Stored Journal::store(const NewGap& entry) {
   const Gap& gap = entry.gap;
-  const auto newest = newest_epoch(gap.tool);
+  const auto newest = last_.newest_epoch(gap.tool);
   if (!newest) begin_epoch(gap.tool, 0, gap.began, EpochReason::first);
   return store(gap, gap.tool, newest.value_or(0));
 }

@@ -6,6 +6,7 @@
 
 #include "spindle/store/writer.hpp"
 #include "store/connection.hpp"
+#include "store/last_events.hpp"
 
 namespace spindle::store {
 
@@ -18,7 +19,7 @@ class Journal {
   RowId tool(const ToolName& name, const std::string& model);
   bool has_tool(const ToolName& name);
   RowId place(const Place& place);
-  std::optional<Last> last(RowId tool);
+  std::optional<Last> last(RowId tool) { return last_.find(tool); }
 
   Stored store(const NewEvent& entry);
   Stored store(const NewGap& entry);
@@ -36,7 +37,6 @@ class Journal {
 
   [[nodiscard]] RowId new_row() const { return sqlite3_last_insert_rowid(connection_.handle()); }
   std::optional<RowId> find_tool(const ToolName& name);
-  std::optional<std::int64_t> newest_epoch(RowId tool);
   void begin_epoch(RowId tool, std::int64_t ordinal, WallTime at, EpochReason reason);
   std::optional<Taken> taken(const Event& event, std::int64_t epoch, const Bytes& raw);
   RowId insert(const Event& event, std::int64_t epoch, const Bytes& raw);
@@ -45,18 +45,15 @@ class Journal {
   Stored store(const Gap& gap, RowId tool, std::int64_t epoch);
 
   Connection& connection_;
+  LastEvents last_;
   Statement find_tool_;
   Statement insert_tool_;
   Statement newest_place_;
   Statement insert_place_;
   Statement set_seen_;
-  Statement last_seen_;
-  Statement newest_epoch_;
   Statement insert_epoch_;
   Statement find_event_;
   Statement insert_event_;
-  Statement last_event_;
-  Statement last_gap_;
   Statement find_gap_;
   Statement insert_gap_;
   Statement newest_settings_;

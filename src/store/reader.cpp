@@ -14,6 +14,7 @@
 #include "store/coverage.hpp"
 #include "store/folder.hpp"
 #include "store/integrity.hpp"
+#include "store/last_events.hpp"
 #include "store/schema.hpp"
 
 namespace spindle::store {
@@ -274,6 +275,22 @@ class FileReader : public Reader {
       }
     }
     return connection_->outcome();
+  }
+
+  Result<std::optional<Last>> last(const ToolName& name) override {
+    connection_->run("BEGIN");
+    std::optional<Last> found;
+    {
+      Statement find_tool(*connection_, "SELECT id FROM tool WHERE maker = ?1 AND serial = ?2");
+      std::optional<RowId> tool;
+      {
+        Rows rows = find_tool.query(name.maker, name.serial);
+        if (rows.next()) tool = rows.integer(0);
+      }
+      if (tool) found = LastEvents(*connection_).find(*tool);
+    }
+    if (auto read = connection_->end_transaction(); !read) return tl::unexpected(read.error());
+    return found;
   }
 
   Result<RowId> newest() override {

@@ -70,6 +70,9 @@ class Reader {
   virtual Result<void> happenings(const Filter& filter,
                                   const std::function<bool(const Happening&)>& take) = 0;
 
+  /// The last that a tool told; empty: nothing, or there is no such tool.
+  virtual Result<std::optional<Last>> last(const ToolName& name) = 0;
+
   /// The newest event's id; 0: there is none.
   virtual Result<RowId> newest() = 0;
 

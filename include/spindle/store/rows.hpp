@@ -209,4 +209,12 @@ struct Happening {
   std::string json = {};  ///< the whole record
 };
 
+/// What is known of the last that a tool told.
+struct Last {
+  std::int64_t epoch = 0;
+  std::uint16_t number = 0;  ///< the last that is a row, or the last inside a gap behind it
+  std::optional<Registers> block = std::nullopt;  ///< where it is a row
+  WallTime seen = {};                             ///< until when the tool was listened to
+};
+
 }  // namespace spindle::store

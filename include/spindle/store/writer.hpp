@@ -50,14 +50,6 @@ struct Stored {
   RowId gap = 0;           ///< row of the gap that was stored with an event; 0: none
 };
 
-/// What is known of the last that a tool told.
-struct Last {
-  std::int64_t epoch = 0;
-  std::uint16_t number = 0;  ///< the last that is a row, or the last inside a gap behind it
-  std::optional<Registers> block = std::nullopt;  ///< where it is a row
-  WallTime seen = {};                             ///< until when the tool was listened to
-};
-
 struct Trimmed {
   std::size_t events = 0;
   std::size_t gaps = 0;
