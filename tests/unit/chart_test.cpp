@@ -937,3 +937,36 @@ TEST_CASE("chart: the style asks for nothing and knows print and phones") {
   CHECK(count_of(both, "class=\"chart chart-wide\"") == 1);
   CHECK(count_of(both, "class=\"chart chart-narrow\"") == 1);
 }
+
+TEST_CASE("chart: NG results alone have a scale of their own") {
+  RunChart chart = run_of({{1, 2.7, true}, {2, 1.7, true}, {3, 2.7, true}});
+  chart.levels.clear();
+  CHECK(crosses_in(run_chart(chart)) == 3);
+  CHECK(arrows_in(run_chart(chart)) == 0);
+}
+
+TEST_CASE("chart: words never cover each other") {
+  const std::string figure = run_chart(run_of(samples_of(50)));
+  const double mean = std::stod(attributes(part_of(figure, "mean-word"), "y").at(0));
+  const double target = std::stod(attributes(part_of(figure, "target-word"), "y").at(0));
+  CHECK(std::abs(mean - target) >= letter_height);
+
+  // The last label would be cut off at the edge, or cover the one before.
+  RunChart one{.caption = {}, .quantity = torque, .samples = {{start, 2.7}}};
+  one.course.along = Along::time;
+  CHECK(contains(run_chart(one), ">07:00:25<"));
+  CHECK(!contains(run_chart(one), ">07:00:30<"));
+
+  ControlChart control = control_of(300);
+  control.values.points[10] = {10, 2.9, 1};
+  control.values.points[11] = {11, 2.9, 1};
+  CHECK(count_of(part_of(control_chart(control), "signal-word"), ">1<") == 1);
+
+  // The numbers of all classes or of none.
+  Histogram few = histogram_of({{5, 0}, {123, 0}});
+  few.steps_per_class = 5;
+  CHECK(contains(part_of(histogram(few), "word"), ">5<"));
+  std::vector<HistogramClass> many(200, {123, 0});
+  many[7].count = 5;
+  CHECK(!contains(part_of(histogram(histogram_of(many)), "word"), ">5<"));
+}
