@@ -17,13 +17,6 @@ constexpr Duration seen_every = std::chrono::seconds(10);
 constexpr Duration settings_every = std::chrono::minutes(1);
 /// People are told of one tool's link at most so often.
 constexpr Duration link_told_every = std::chrono::minutes(1);
-/// Where the clock was set back, nothing is known of how long a tool was not listened to.
-constexpr Duration long_unseen = std::chrono::hours(24);
-
-Duration unseen_since(WallTime seen, WallTime now) {
-  return now < seen ? long_unseen : Duration(now - seen);
-}
-
 }  // namespace
 
 Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
@@ -197,7 +190,7 @@ void RecordedTool::tell_stream(const device::WatchEvent& news, std::int64_t epoc
 
 // ---- what the record knows ----
 
-Result<std::optional<device::LastEvent>> RecordedTool::register_tool(device::Device& device) {
+Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device) {
   flush_gap();
   store::Writer& writer = recorder_->writer();
   const store::ToolName said = work::name_of(device, target_.shown);
@@ -231,8 +224,9 @@ Result<std::optional<device::LastEvent>> RecordedTool::register_tool(device::Dev
   flush_link();
   if (identity) record_total(*identity, *last);
   if (rows_) wanted_ = rows_->presets();
-  if (!*last) return std::nullopt;
-  return device::LastEvent{(*last)->number, (*last)->block, unseen_since((*last)->seen, now())};
+  device::RecordedPast past = {.wants_first = true};
+  if (*last) past.last = work::last_event_of(**last, now());
+  return past;
 }
 
 /// The tool's own count of its fastenings, by which it can be checked whether results are missing.

@@ -61,7 +61,7 @@ class RecordedTool final : public Listener {
   void record(const device::PollLag& news);
   void record(const device::MotorTransition& news);
 
-  Result<std::optional<device::LastEvent>> register_tool(device::Device& device);
+  Result<device::RecordedPast> register_tool(device::Device& device);
   void record_total(const catalogue::Identity& identity, const std::optional<store::Last>& last);
   std::optional<device::Errand> next_errand();
   void want_settings(const device::ToolEvent& news);

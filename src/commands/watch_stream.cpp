@@ -239,8 +239,7 @@ std::string WatchStream::sentence() const {
   text += fmt::format(", {} OK, {} NG, {}, ", counts_.ok, counts_.ng,
                       counted(counts_.changes, "change"));
   if (counts_.samples > 0) text += counted(counts_.samples, "sample") + ", ";
-  if (counts_.remembered > 0)
-    text += fmt::format("{} remembered by a restarted tool, ", counts_.remembered);
+  if (counts_.remembered > 0) text += fmt::format("{} of unknown age, ", counts_.remembered);
   text += fmt::format("{}, {}", counted(counts_.gaps, "gap"), counted(counts_.losses, "reconnect"));
   if (counts_.missed_intervals > 0)
     text += ", " + counted(counts_.missed_intervals, "interval") + " missed";

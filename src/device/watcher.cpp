@@ -170,9 +170,10 @@ Result<void> Watcher::attach(Link link) {
 /// What keeps the events learns of the tool, and says what it knows of it where we know nothing.
 Result<void> Watcher::consult_record() {
   if (!hooks_.on_connected) return {};
-  auto last = hooks_.on_connected(link_->device);
-  if (!last) return tl::unexpected(std::move(last.error()));
-  if (source_ && !std::exchange(recalled_, true)) source_->recall(std::move(*last));
+  auto past = hooks_.on_connected(link_->device);
+  if (!past) return tl::unexpected(std::move(past.error()));
+  const bool is_news = source_ && !std::exchange(recalled_, true);
+  if (is_news && (past->last || past->wants_first)) source_->recall(std::move(past->last));
   return {};
 }
 

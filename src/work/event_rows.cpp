@@ -124,6 +124,13 @@ device::EventGap news_of(const store::Gap& row) {
   return {.missed = row.missed, .reason = row.reason, .after = row.after, .before = row.before};
 }
 
+device::LastEvent last_event_of(const store::Last& last, WallTime now) {
+  // Where the clock was set back, nothing is known of how long the tool was not listened to.
+  constexpr Duration long_unseen = std::chrono::hours(24);
+  const Duration unseen = now < last.seen ? long_unseen : Duration(now - last.seen);
+  return {.number = last.number, .block = last.block, .unseen = unseen};
+}
+
 store::Gap row_of(const device::EventGap& gap, WallTime began, WallTime ended) {
   return {.after = gap.after,
           .before = gap.before,

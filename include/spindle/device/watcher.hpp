@@ -63,11 +63,18 @@ struct Errand {
   std::vector<catalogue::Parameter> wanted = {};
   std::function<void(const std::vector<Reading>&)> take = {};
 };
-/// What keeps the events in a record. All may be empty.
+/// What a record of a tool's events says when the tool is connected.
+struct RecordedPast {
+  std::optional<LastEvent> last = std::nullopt;  ///< empty: nothing is known of it
+  /// The event that stands in the tool is told, too, where no last one is known.
+  bool wants_first = false;
+};
+
+/// What keeps the events in a record, or knows one. All may be empty.
 struct RecordHooks {
-  /// Called on every connection before anything is asked of its events; returns the last event of
-  /// this tool that is in the record. An error of status `storage` counts as trouble of the link.
-  std::function<Result<std::optional<LastEvent>>(Device& device)> on_connected = {};
+  /// Called on every connection before anything is asked of its events. An error of status
+  /// `storage` counts as trouble of the link.
+  std::function<Result<RecordedPast>(Device& device)> on_connected = {};
   /// Asked on every turn.
   std::function<std::optional<Errand>()> errand = {};
 };

@@ -52,6 +52,9 @@ device::ToolEvent news_of(const store::EventView& row);
 /// A stored gap as the news that it was.
 device::EventGap news_of(const store::Gap& row);
 
+/// The last event of a tool, to go on behind it now.
+device::LastEvent last_event_of(const store::Last& last, WallTime now);
+
 /// The same gap as a row; tool and epoch are still to be named.
 store::Gap row_of(const device::EventGap& gap, WallTime began, WallTime ended);
 
