@@ -171,7 +171,11 @@ bool Journal::commit(std::unique_lock<std::mutex>& lock) {
   retry_ = {};
   if (waiting_.empty()) flush_lost();
   lock.unlock();
-  if (!stored) trouble_(stored.error());
+  if (!stored) {
+    Error left_out = stored.error();
+    left_out.hint = "this one record is left out";
+    trouble_(left_out);
+  }
   if (recovered) trouble_(std::nullopt);
   for (std::size_t index = 0; stored && index < count; ++index) {
     const Told& told = done[index].told ? done[index].told : told_;
