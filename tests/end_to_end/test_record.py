@@ -241,7 +241,7 @@ class Recorded(unittest.TestCase):
 
     def test_settings_are_kept_with_the_results(self):
         with support.simulator("doga-bm", "--rundown-every", "200ms") as tool, \
-                Recording(self.path, tool.url, *PROFILE) as recorder:
+                Recording(self.path, tool, *PROFILE) as recorder:
             support.wait_until(
                 lambda: self.path.exists() and self.store.ask("SELECT count(*) FROM preset")[0][0] >= 15,
                 "the settings are stored")
