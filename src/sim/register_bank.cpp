@@ -1,6 +1,7 @@
 #include "register_bank.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 
 #include "spindle/base/text.hpp"
@@ -12,6 +13,7 @@ namespace {
 using catalogue::Access;
 using catalogue::Content;
 using catalogue::Encoding;
+using catalogue::Integer;
 using catalogue::Kind;
 using catalogue::Parameter;
 using catalogue::Value;
@@ -43,8 +45,19 @@ Encoding stored_as(const Encoding& encoding) {
   return plain;
 }
 
-Decimal to_decimal(const catalogue::Integer& integer) {
-  return {integer.sign, integer.magnitude, 0};
+Decimal to_decimal(const Integer& integer) { return {integer.sign, integer.magnitude, 0}; }
+
+/// Requires a number without decimals.
+Integer to_integer(const Decimal& whole) { return {whole.sign(), whole.magnitude()}; }
+
+Integer fitting(const Encoding& encoding, const Integer& step) {
+  return std::clamp(step, to_integer(catalogue::lowest(encoding)),
+                    to_integer(catalogue::highest(encoding)));
+}
+
+/// Whether elements are integers that stand in registers as they are.
+bool is_plain(const Encoding& encoding) {
+  return encoding.is_integer() && encoding.kind != Kind::bcd;
 }
 
 std::optional<Decimal> number_in(const Encoding& encoding, RegisterView registers) {
@@ -61,14 +74,8 @@ Registers date_of(const Encoding& encoding, const Decimal& seconds, const Regist
       .value_or(same);
 }
 
-/// One element that holds an integer, as far as it has bits; those beside it stay.
-Registers with_integer(const Encoding& encoding, const Decimal& whole, const Registers& same) {
-  return catalogue::to_registers(encoding,
-                                 catalogue::to_pattern(encoding, {whole.sign(), whole.magnitude()}),
-                                 catalogue::to_pattern(encoding, same));
-}
-
-/// One element that is the nearest to a number, or stays as it is where none is near.
+/// One element, none of plain integers, that is the nearest to a number, or stays as it is where
+/// none is near.
 Registers with_number(const Encoding& encoding, const Decimal& number, const Registers& same) {
   if (encoding.kind == Kind::date) return date_of(encoding, number, same);
   if (encoding.kind == Kind::text) {
@@ -77,12 +84,8 @@ Registers with_number(const Encoding& encoding, const Decimal& number, const Reg
   if (encoding.is_float()) return encode(as_parameter(encoding), {number}).value_or(same);
   const auto step = catalogue::nearest_step(encoding, number);
   if (!step) return same;
-  const Decimal fitting =
-      std::clamp(to_decimal(*step), catalogue::lowest(encoding), catalogue::highest(encoding));
-  if (encoding.kind == Kind::bcd) {
-    return encode(as_parameter(stored_as(encoding)), {fitting}).value_or(same);
-  }
-  return with_integer(encoding, fitting, same);
+  const Decimal fit = to_decimal(fitting(encoding, *step));
+  return encode(as_parameter(stored_as(encoding)), {fit}).value_or(same);
 }
 
 /// `make` of each element, one behind the other. It gets what the element is and holds.
@@ -160,6 +163,22 @@ Registers words_at(const Words& words, const Place& place) {
 void put_words(Words& words, const Place& place, RegisterView registers) {
   auto address = place.address;
   for (const std::uint16_t word : registers) words.put(address++, word);
+}
+
+/// Each element holds this integer then, as far as it has bits; those beside it stay. Requires
+/// plain integers.
+void put_integer(Words& words, const Place& place, const Integer& integer) {
+  constexpr std::size_t most_registers = 4;
+  std::array<std::uint16_t, most_registers> held = {};
+  const unsigned size = place.size() / place.encoding.count;
+  const std::span<std::uint16_t> one(held.data(), std::min<std::size_t>(size, held.size()));
+  const std::uint64_t pattern = catalogue::to_pattern(place.encoding, integer);
+  for (unsigned first = place.address; first < place.end(); first += size) {
+    const auto at = [first](std::size_t i) { return static_cast<std::uint16_t>(first + i); };
+    for (std::size_t i = 0; i < one.size(); ++i) one[i] = words.at(at(i));
+    catalogue::put_pattern(place.encoding, pattern, one);
+    for (std::size_t i = 0; i < one.size(); ++i) words.put(at(i), one[i]);
+  }
 }
 
 /// The bits of `registers` that are the value's, and the others of `present`.
@@ -356,24 +375,23 @@ void RegisterBank::limit(const Place& place, std::int64_t minimum, std::int64_t 
 
 void RegisterBank::add_mirrors(const catalogue::LimitSpec& facts) {
   constexpr unsigned addresses = 0x10000;
-  const auto show = [this](Place mirror, std::uint16_t offset,
-                           const std::optional<Decimal>& limit) {
-    if (!limit || mirror.end() + offset > addresses) return;
+  // The limit, or where the value has none, what its bits can hold.
+  const auto show = [this](Place mirror, std::uint16_t offset, const std::optional<Decimal>& limit,
+                           Decimal (*extreme)(const Encoding&)) {
+    const bool is_shown = limit || mirror.encoding.is_integer();
+    if (!is_shown || mirror.end() + offset > addresses) return;
     mirror.address = static_cast<std::uint16_t>(mirror.address + offset);
     add_registers(mirror);
-    set_number(mirror, *limit);
+    if (limit) {
+      set_number(mirror, *limit);
+    } else {
+      set_stored(mirror, extreme(mirror.encoding));
+    }
   };
   for (const auto& [key, cell] : cells_) {
-    const Place& place = cell.place;
     if (!is_mirrored(cell, facts)) continue;
-    catalogue::Range range = cell.range;
-    if (place.encoding.is_integer()) {
-      const Encoding& encoding = place.encoding;
-      if (!range.minimum) range.minimum = catalogue::scaled(encoding, catalogue::lowest(encoding));
-      if (!range.maximum) range.maximum = catalogue::scaled(encoding, catalogue::highest(encoding));
-    }
-    show(place, facts.minimum_offset, range.minimum);
-    show(place, facts.maximum_offset, range.maximum);
+    show(cell.place, facts.minimum_offset, cell.range.minimum, catalogue::lowest);
+    show(cell.place, facts.maximum_offset, cell.range.maximum, catalogue::highest);
   }
 }
 
@@ -501,6 +519,11 @@ std::optional<Decimal> RegisterBank::number(const Place& place) const {
 }
 
 void RegisterBank::set_number(const Place& place, const Decimal& number) {
+  if (is_plain(place.encoding)) {
+    const auto step = catalogue::nearest_step(place.encoding, number);
+    if (step) put_integer(tables_.of(place.table), place, fitting(place.encoding, *step));
+    return;
+  }
   put(place,
       of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
         return with_number(one, number, same);
@@ -508,12 +531,14 @@ void RegisterBank::set_number(const Place& place, const Decimal& number) {
 }
 
 // A counter begins anew behind its last number.
-void RegisterBank::set_stored(const Place& place, std::int64_t stored) {
-  const bool is_integer = place.encoding.is_integer() && place.encoding.kind != Kind::bcd;
+void RegisterBank::set_stored(const Place& place, const Decimal& stored) {
+  if (is_plain(place.encoding)) {
+    put_integer(tables_.of(place.table), place, to_integer(stored));
+    return;
+  }
   put(place,
       of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
-        return is_integer ? with_integer(one, Decimal(stored), same)
-                          : with_number(stored_as(one), Decimal(stored), same);
+        return with_number(stored_as(one), stored, same);
       }));
 }
 

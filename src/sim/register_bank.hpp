@@ -143,7 +143,7 @@ class RegisterBank {
   [[nodiscard]] std::int64_t stored(const Place& place) const {
     return stored_in(place.encoding, registers(place));
   }
-  void set_stored(const Place& place, std::int64_t stored);
+  void set_stored(const Place& place, std::int64_t stored) { set_stored(place, Decimal(stored)); }
 
   /// Empty when the profile does not name it.
   [[nodiscard]] std::optional<Place> find(std::string_view name) const;
@@ -175,6 +175,7 @@ class RegisterBank {
   [[nodiscard]] std::vector<const Cell*> cells_at(modbus::RegisterTable table,
                                                   std::uint16_t address) const;
   [[nodiscard]] Change change_of(const Cell& cell, std::uint16_t first, RegisterView values) const;
+  void set_stored(const Place& place, const Decimal& stored);
   void add(const Cell& cell);
   void add_registers(const Place& place);
   void add_parameter(const catalogue::Parameter& parameter, bool is_command);
