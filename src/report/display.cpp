@@ -50,12 +50,14 @@ std::size_t append_printable(std::string& out, std::string_view text) {
 /// The cell, or what the record says of itself.
 std::string_view own_text(const Record& record, std::string_view key, const Field* field,
                           std::string& made) {
+  if (field != nullptr) {
+    if (const auto* text = std::get_if<std::string>(&field->cell)) return *text;
+    return made = to_text(field->cell);
+  }
   if (key == "target") return record.target;
   if (key == "time") return made = to_text(record.time);
   if (key == "type") return record.type;
-  if (field == nullptr) return {};
-  if (const auto* text = std::get_if<std::string>(&field->cell)) return *text;
-  return made = to_text(field->cell);
+  return {};
 }
 
 }  // namespace
