@@ -14,7 +14,7 @@ namespace spindle::posix {
 
 int read_whole(int descriptor, std::string& text) {
   constexpr std::size_t read_step = 65536;  // most files are read in one piece
-  std::array<char, read_step> step;  // filled as far as it is read
+  std::array<char, read_step> step;         // filled as far as it is read
   while (text.size() <= largest_file) {
     const ssize_t got = ::read(descriptor, step.data(), step.size());
     if (got < 0) return errno;
