@@ -147,9 +147,8 @@ const std::string* nearest_by(std::string_view word, const std::vector<std::stri
 
 bool glob_match(std::string_view pattern, std::string_view text) {
   // Most names differ from a pattern already at an end of it.
-  constexpr std::string_view special = "*?[]";
-  while (!pattern.empty() && !text.empty() &&
-         special.find(pattern.back()) == std::string_view::npos) {
+  const auto is_special = [](char c) { return c == '*' || c == '?' || c == '[' || c == ']'; };
+  while (!pattern.empty() && !text.empty() && !is_special(pattern.back())) {
     if (pattern.back() != text.back()) return false;
     pattern.remove_suffix(1);
     text.remove_suffix(1);

@@ -80,6 +80,29 @@ std::uint16_t swapped(std::uint16_t word) {
   return static_cast<std::uint16_t>((word << bits_per_byte) | (word >> bits_per_byte));
 }
 
+/// The bits of the slice from `pattern`, the others from `present`.
+std::uint64_t with_slice(const Encoding& encoding, std::uint64_t pattern, std::uint64_t present) {
+  const std::uint64_t mask = low_bits(encoding.slice.width) << encoding.slice.first;
+  return (pattern & mask) | (present & ~mask);
+}
+
+void fill(const Encoding& encoding, std::uint64_t pattern, std::span<std::uint16_t> registers) {
+  for (std::size_t i = registers.size(); i > 0; --i) {
+    const bool is_big = encoding.word_order == WordOrder::big;
+    const auto word = static_cast<std::uint16_t>(pattern);
+    registers[is_big ? i - 1 : registers.size() - i] =
+        encoding.byte_order == ByteOrder::big ? word : swapped(word);
+    pattern >>= bits_per_register;
+  }
+}
+
+/// Whether a number is what is stored, to the digit.
+bool is_as_stored(const Encoding& encoding) {
+  return encoding.scale.magnitude() == 1 && encoding.scale.exponent() == 0 &&
+         encoding.scale.sign() == Sign::plus && encoding.divisor == 1 &&
+         encoding.offset.magnitude() == 0;
+}
+
 /// value × 10^tens; empty when it does not fit.
 std::optional<Wide> times_ten(Wide value, std::int64_t tens) {
   for (; tens > 0 && value != 0; --tens) {
@@ -108,6 +131,11 @@ std::optional<Aligned> align(Wide left, int left_exponent, Wide right, int right
   const auto grown_right = times_ten(right, std::int64_t{right_exponent} - left_exponent);
   if (!grown_left || !grown_right) return std::nullopt;
   return Aligned{*grown_left, *grown_right};
+}
+
+Integer step_of(const Decimal& number, const Decimal& scale, std::uint64_t steps) {
+  const Sign sign = number.sign() == scale.sign() || steps == 0 ? Sign::plus : Sign::minus;
+  return {sign, steps};
 }
 
 /// How many decimals tell the steps of a fraction apart, with two more.
@@ -178,19 +206,16 @@ std::uint64_t to_pattern(const Encoding& encoding, RegisterView registers) {
 }
 
 Registers to_registers(const Encoding& encoding, std::uint64_t pattern, std::uint64_t present) {
-  if (encoding.is_part()) {
-    const std::uint64_t mask = low_bits(encoding.slice.width) << encoding.slice.first;
-    pattern = (pattern & mask) | (present & ~mask);
-  }
+  if (encoding.is_part()) pattern = with_slice(encoding, pattern, present);
   Registers registers(registers_of_one(encoding));
-  for (std::size_t i = registers.size(); i > 0; --i) {
-    const bool is_big = encoding.word_order == WordOrder::big;
-    const auto word = static_cast<std::uint16_t>(pattern);
-    registers[is_big ? i - 1 : registers.size() - i] =
-        encoding.byte_order == ByteOrder::big ? word : swapped(word);
-    pattern >>= bits_per_register;
-  }
+  fill(encoding, pattern, registers);
   return registers;
+}
+
+void put_pattern(const Encoding& encoding, std::uint64_t pattern,
+                 std::span<std::uint16_t> registers) {
+  if (encoding.is_part()) pattern = with_slice(encoding, pattern, to_pattern(encoding, registers));
+  fill(encoding, pattern, registers);
 }
 
 Integer to_integer(const Encoding& encoding, std::uint64_t pattern) {
@@ -208,6 +233,7 @@ std::uint64_t to_pattern(const Encoding& encoding, const Integer& integer) {
 }
 
 std::optional<Decimal> scaled(const Encoding& encoding, const Decimal& stored) {
+  if (is_as_stored(encoding)) return stored;
   const Decimal& scale = encoding.scale;
   Wide product = 0;
   if (__builtin_mul_overflow(Wide{stored.magnitude()}, Wide{scale.magnitude()}, &product)) {
@@ -237,11 +263,15 @@ std::optional<Integer> nearest_step(const Encoding& encoding, const Decimal& num
   const auto shifted =
       encoding.offset.magnitude() == 0 ? number : number.plus(encoding.offset.negated());
   if (!shifted) return std::nullopt;
+  const Decimal& scale = encoding.scale;
+  // Most numbers have the decimals of their steps.
+  if (scale.magnitude() == 1 && encoding.divisor == 1 && shifted->exponent() == scale.exponent()) {
+    return step_of(*shifted, scale, shifted->magnitude());
+  }
   Wide dividend = 0;
   if (__builtin_mul_overflow(Wide{shifted->magnitude()}, Wide{encoding.divisor}, &dividend)) {
     return std::nullopt;
   }
-  const Decimal& scale = encoding.scale;
   auto sides = align(dividend, shifted->exponent(), scale.magnitude(), scale.exponent());
   if (!sides) {
     // A number too small to be lined up is less than half a step.
@@ -252,8 +282,7 @@ std::optional<Integer> nearest_step(const Encoding& encoding, const Decimal& num
   const Wide rest = above % below;
   const Wide steps = above / below + (rest >= below - rest ? 1U : 0U);
   if (steps > std::numeric_limits<std::uint64_t>::max()) return std::nullopt;
-  const Sign sign = shifted->sign() == scale.sign() || steps == 0 ? Sign::plus : Sign::minus;
-  return Integer{sign, static_cast<std::uint64_t>(steps)};
+  return step_of(*shifted, scale, static_cast<std::uint64_t>(steps));
 }
 
 }  // namespace spindle::catalogue

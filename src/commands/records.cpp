@@ -32,8 +32,15 @@ std::string bit_text(const catalogue::BitName& bit, const Parameter& parameter) 
   return fmt::format("{} {} while {} is {}", place, bit.text, parameter.bits_by, *bit.when);
 }
 
+report::Texts bits_of(const Parameter& parameter) {
+  report::Texts bits;
+  bits.reserve(parameter.bits.size());
+  for (const auto& bit : parameter.bits) bits.push_back(bit_text(bit, parameter));
+  return bits;
+}
+
 /// What it means, with the labels of an enumeration or the bits of a bit field behind it.
-std::string meaning_of(const Parameter& parameter) {
+std::string meaning_of(const Parameter& parameter, const report::Texts& bits) {
   if (parameter.labels.empty() && parameter.bits.empty()) return {};
   std::string text = parameter.title + " (";
   std::string_view between;
@@ -41,18 +48,14 @@ std::string meaning_of(const Parameter& parameter) {
     text.append(between).append(part);
     between = ", ";
   };
-  for (const auto& bit : parameter.bits) add(bit_text(bit, parameter));
+  for (const std::string& bit : bits) add(bit);
   for (const auto& label : parameter.labels) add(std::to_string(label.number) + " " + label.text);
   return text + ")";
 }
 
 /// What only some products say of their parameters.
-void add_drive_fields(const Parameter& parameter, report::Record& record) {
-  if (!parameter.bits.empty()) {
-    report::Texts bits;
-    for (const auto& bit : parameter.bits) bits.push_back(bit_text(bit, parameter));
-    record.fields.push_back({"bits", bits});
-  }
+void add_drive_fields(const Parameter& parameter, report::Texts bits, report::Record& record) {
+  if (!bits.empty()) record.fields.push_back({"bits", std::move(bits)});
   if (parameter.except) {
     record.fields.push_back({"except_minimum", number_or_null(parameter.except->minimum)});
     record.fields.push_back({"except_maximum", number_or_null(parameter.except->maximum)});
@@ -174,7 +177,9 @@ std::span<const Column> value_columns(device::Limits limits) {
 
 report::Record parameter_record(const Parameter& parameter, const std::string& target,
                                 const Clock& clock) {
+  report::Texts bits = bits_of(parameter);
   report::Pairs labels;
+  labels.reserve(parameter.labels.size());
   for (const auto& label : parameter.labels) {
     labels.emplace_back(std::to_string(label.number), label.text);
   }
@@ -185,7 +190,7 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
     record.fields.emplace_back(key, std::move(cell), std::move(shown));
   };
   add("name", parameter.name.to_string());
-  add("title", parameter.title.to_string(), meaning_of(parameter));
+  add("title", parameter.title.to_string(), meaning_of(parameter, bits));
   add("table", std::string(catalogue::to_text(parameter.table)));
   add("register", number(parameter.address.value));
   add("encoding", std::string(catalogue::to_text(parameter.encoding.kind)),
@@ -201,7 +206,7 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   add("source", parameter.source.to_string());
   add("note", text_or_null(parameter.note));
   add_encoding_fields(parameter.encoding, record);
-  add_drive_fields(parameter, record);
+  add_drive_fields(parameter, std::move(bits), record);
   if (parameter.hazard != catalogue::Hazard::none) {
     record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});
   }

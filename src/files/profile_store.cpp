@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -24,7 +23,24 @@ constexpr std::string_view extension = ".yaml";
 constexpr std::size_t deepest_chain = 8;
 
 std::string in_folder(const std::string& folder, std::string_view id) {
-  return fmt::format("{}/{}{}", folder, id, extension);
+  std::string path;
+  path.reserve(folder.size() + id.size() + extension.size() + 1);
+  path.append(folder).append("/").append(id).append(extension);
+  return path;
+}
+
+/// The name of a file without its folder and its last extension.
+std::string_view stem_of(std::string_view path) {
+  const std::string_view name = path.substr(path.rfind('/') + 1);
+  const std::size_t dot = name.rfind('.');
+  return dot == 0 ? name : name.substr(0, dot);
+}
+
+std::string folder_of(std::string_view path) {
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string_view::npos) return ".";
+  const std::size_t last = path.find_last_not_of('/', slash);
+  return last == std::string_view::npos ? "/" : std::string(path.substr(0, last + 1));
 }
 
 /// One file of a chain of bases.
@@ -78,9 +94,7 @@ std::optional<std::string> locate_file(std::string_view id, const std::vector<st
 /// The base of a file: beside it, else in the store's folders.
 std::optional<std::string> locate_base(const std::string& file, std::string_view id,
                                        const Places& places) {
-  std::string beside = std::filesystem::path(file).parent_path().string();
-  if (beside.empty()) beside = ".";
-  auto path = locate_file(id, {beside}, places.disk);
+  auto path = locate_file(id, {folder_of(file)}, places.disk);
   return path ? path : locate_file(id, places.folders, places.disk);
 }
 
@@ -89,7 +103,7 @@ std::optional<std::string> locate_base(const std::string& file, std::string_view
 const ShippedProfile* shipped_as(const std::string& path, const Places& places);
 
 const ShippedProfile* compare(const std::string& path, const Places& places) {
-  const ShippedProfile* shipped = find(places.shipped, std::filesystem::path(path).stem().string());
+  const ShippedProfile* shipped = find(places.shipped, stem_of(path));
   if (shipped == nullptr) return nullptr;
   const auto text = places.disk.read_trusted(path);
   if (!text || *text != shipped->yaml) return nullptr;
@@ -250,11 +264,10 @@ const YamlNode* nearest_simulation(const Chain& chain, Diagnostics& findings) {
 std::map<std::string, std::string> profile_files(const Places& places) {
   std::map<std::string, std::string> found;
   for (const std::string& folder : places.folders) {
-    for (const std::filesystem::path path : places.disk.list(folder)) {
-      const std::string id = path.stem().string();
-      if (path.extension() == extension && is_catalogue_name(id)) {
-        found.try_emplace(id, in_folder(folder, id));
-      }
+    for (const std::string& name : places.disk.list(folder)) {
+      const std::string_view id = stem_of(name);
+      if (!name.ends_with(extension) || !is_catalogue_name(id)) continue;
+      found.try_emplace(std::string(id), in_folder(folder, id));
     }
   }
   return found;
@@ -282,15 +295,16 @@ std::vector<ProfileEntry> look_for_profiles(const Places& places) {
   return entries;
 }
 
-std::vector<ProfileEntry> list_profiles(const Places& places) {
+/// What was found once stays.
+const std::vector<ProfileEntry>& list_profiles(const Places& places) {
   {
     const std::lock_guard lock(places.mutex);
     if (places.listed) return *places.listed;
   }
   std::vector<ProfileEntry> entries = look_for_profiles(places);
   const std::lock_guard lock(places.mutex);
-  places.listed = entries;
-  return entries;
+  if (!places.listed) places.listed = std::move(entries);
+  return *places.listed;
 }
 
 /// A profile's file, or the profile of the program.
@@ -398,6 +412,11 @@ Result<catalogue::CodeTables> load_codes_of(const std::string& path, const Place
 template <typename Made>
 using Kept = std::map<std::string, Made, std::less<>>;
 
+template <typename Made>
+Made copy_of(const Made* kept) {
+  return *kept;
+}
+
 }  // namespace
 
 bool names_profile_file(std::string_view text) {
@@ -422,16 +441,26 @@ struct ProfileStore::Memory {
   Kept<catalogue::SimulationSpec> simulations = {};
   Kept<catalogue::CodeTables> codes = {};
 
-  /// What is kept under this name, else what `make(located)` makes, which is kept.
+  /// What is kept under this name, else what `make(located)` makes, which is kept. It stays where
+  /// it is.
   template <typename Made, typename Make>
-  Result<Made> take(Kept<Made>& kept, std::string_view name, Make make) {
+  Result<const Made*> take(Kept<Made>& kept, std::string_view name, Make make) {
     const std::lock_guard lock(mutex);
-    if (const auto known = kept.find(name); known != kept.end()) return known->second;
+    if (const auto known = kept.find(name); known != kept.end()) return &known->second;
     auto located = locate(name, places);
     if (!located) return tl::unexpected(std::move(located.error()));
     Result<Made> made = make(*located);
-    if (made) kept.emplace(name, *made);
-    return made;
+    if (!made) return tl::unexpected(std::move(made.error()));
+    return &kept.emplace(name, std::move(*made)).first->second;
+  }
+
+  Result<const AnyProfile*> profile(std::string_view name) {
+    return take(profiles, name, [this](const Located& located) {
+      if (located.shipped == nullptr) return load_file(located.path, places);
+      Profile profile = *located.shipped->profile;
+      profile.path = located.path.empty() ? std::string(located.shipped->id) : located.path;
+      return Result<AnyProfile>(AnyProfile{std::move(profile), located.shipped->is_abstract});
+    });
   }
 };
 
@@ -442,27 +471,24 @@ ProfileStore& ProfileStore::operator=(ProfileStore&&) noexcept = default;
 ProfileStore::~ProfileStore() = default;
 
 Result<AnyProfile> ProfileStore::load_any(std::string_view name_or_file) const {
-  return memory_->take(memory_->profiles, name_or_file, [&](const Located& located) {
-    if (located.shipped == nullptr) return load_file(located.path, memory_->places);
-    Profile profile = *located.shipped->profile;
-    profile.path = located.path.empty() ? std::string(located.shipped->id) : located.path;
-    return Result<AnyProfile>(AnyProfile{std::move(profile), located.shipped->is_abstract});
-  });
+  return memory_->profile(name_or_file).map(copy_of<AnyProfile>);
 }
 
 Result<Profile> ProfileStore::load(std::string_view name_or_file) const {
-  return load_any(name_or_file).and_then([&](AnyProfile loaded) -> Result<Profile> {
-    if (loaded.is_abstract) return tl::unexpected(only_a_base(name_or_file));
-    return std::move(loaded.profile);
+  return memory_->profile(name_or_file).and_then([&](const AnyProfile* loaded) -> Result<Profile> {
+    if (loaded->is_abstract) return tl::unexpected(only_a_base(name_or_file));
+    return loaded->profile;
   });
 }
 
 Result<catalogue::SimulationSpec> ProfileStore::load_simulation(
     std::string_view name_or_file) const {
-  return memory_->take(memory_->simulations, name_or_file, [&](const Located& located) {
+  const auto make = [&](const Located& located) {
     return located.shipped == nullptr ? load_simulation_of(located.path, memory_->places)
                                       : *located.shipped->simulation;
-  });
+  };
+  return memory_->take(memory_->simulations, name_or_file, make)
+      .map(copy_of<catalogue::SimulationSpec>);
 }
 
 Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view name_or_file) const {
@@ -472,10 +498,11 @@ Result<catalogue::CodeTexts> ProfileStore::load_error_codes(std::string_view nam
 }
 
 Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view name_or_file) const {
-  return memory_->take(memory_->codes, name_or_file, [&](const Located& located) {
+  const auto make = [&](const Located& located) {
     return located.shipped == nullptr ? load_codes_of(located.path, memory_->places)
                                       : *located.shipped->codes;
-  });
+  };
+  return memory_->take(memory_->codes, name_or_file, make).map(copy_of<catalogue::CodeTables>);
 }
 
 Result<std::vector<Diagnostic>> ProfileStore::check(std::string_view name_or_file) const {
@@ -499,8 +526,10 @@ Result<std::vector<Diagnostic>> ProfileStore::check(std::string_view name_or_fil
 std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(memory_->places); }
 
 std::vector<Profile> ProfileStore::load_all() const {
+  const std::vector<ProfileEntry>& entries = list_profiles(memory_->places);
   std::vector<Profile> profiles;
-  for (const ProfileEntry& entry : list()) {
+  profiles.reserve(entries.size());
+  for (const ProfileEntry& entry : entries) {
     if (auto profile = load(entry.id)) profiles.push_back(std::move(*profile));
   }
   return profiles;

@@ -1,19 +1,20 @@
 #include "posix/reading.hpp"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <filesystem>
+#include <string_view>
 
 #include "posix/descriptor.hpp"
 
 namespace spindle::posix {
 
 int read_whole(int descriptor, std::string& text) {
-  constexpr std::size_t read_step = 16384;
-  std::array<char, read_step> step{};
+  constexpr std::size_t read_step = 65536;  // most files are read in one piece
+  std::array<char, read_step> step;         // filled as far as it is read
   while (text.size() <= largest_file) {
     const ssize_t got = ::read(descriptor, step.data(), step.size());
     if (got < 0) return errno;
@@ -32,11 +33,13 @@ std::string text_of(const std::string& path) {
 
 std::vector<std::string> names_in(const std::string& folder) {
   std::vector<std::string> names;
-  std::error_code failed;
-  for (std::filesystem::directory_iterator entry(folder, failed), end; !failed && entry != end;
-       entry.increment(failed)) {
-    names.push_back(entry->path().filename().string());
+  DIR* const open = ::opendir(folder.c_str());
+  if (open == nullptr) return names;
+  while (const dirent* entry = ::readdir(open)) {
+    const std::string_view name = entry->d_name;
+    if (name != "." && name != "..") names.emplace_back(name);
   }
+  ::closedir(open);
   return names;
 }
 

@@ -10,7 +10,8 @@
 #include <csignal>
 #include <cstdint>
 #include <ctime>
-#include <map>
+#include <utility>
+#include <vector>
 
 namespace spindle::posix {
 namespace {
@@ -137,7 +138,7 @@ bool has_handler(const struct sigaction& action) {
 }  // namespace
 
 struct SignalWatch::Previous {
-  std::map<int, struct sigaction> actions = {};
+  std::vector<std::pair<int, struct sigaction>> actions = {};
 };
 
 SignalWatch::SignalWatch()
@@ -145,11 +146,12 @@ SignalWatch::SignalWatch()
       previous_(std::make_unique<Previous>()) {
   watched.store(&interrupt_);
   const sigset_t held = held_back();
+  previous_->actions.reserve(static_cast<std::size_t>(SIGRTMAX));
   for (int number = 1; number <= SIGRTMAX; ++number) {
     if (!is_watched(number)) continue;
     struct sigaction before = {};
     if (::sigaction(number, nullptr, &before) != 0) continue;
-    previous_->actions[number] = before;
+    previous_->actions.emplace_back(number, before);
     if (is_in(suspending, number)) continue;
     if (stays_ignored(number, before) || (is_in(faults, number) && has_handler(before))) continue;
     const struct sigaction action = action_for(number, held);

@@ -36,8 +36,9 @@ class CsvRenderer final : public PlainRenderer {
   }
 
   Result<void> record(const Record& record) override {
-    return write_line([&record](std::string_view key) {
-      return printable(cell_text(record, key), LineBreaks::keep);
+    std::string made;
+    return write_line([&](std::string_view key) {
+      return printable(cell_text(record, key, made), LineBreaks::keep);
     });
   }
 

@@ -48,11 +48,16 @@ std::size_t append_printable(std::string& out, std::string_view text) {
 }
 
 /// The cell, or what the record says of itself.
-std::string own_text(const Record& record, std::string_view key, const Field* field) {
+std::string_view own_text(const Record& record, std::string_view key, const Field* field,
+                          std::string& made) {
+  if (field != nullptr) {
+    if (const auto* text = std::get_if<std::string>(&field->cell)) return *text;
+    return made = to_text(field->cell);
+  }
   if (key == "target") return record.target;
-  if (key == "time") return to_text(record.time);
+  if (key == "time") return made = to_text(record.time);
   if (key == "type") return record.type;
-  return field == nullptr ? std::string() : to_text(field->cell);
+  return {};
 }
 
 }  // namespace
@@ -92,10 +97,14 @@ std::string fitted(std::string_view text, std::size_t cells, Keep keep) {
   return std::string(text.substr(0, kept)).append(mark);
 }
 
-Cells to_cells(std::string text) {
-  if (is_plain(text)) return {.width = text.size(), .text = std::move(text)};
-  std::string shown = printable(text, LineBreaks::fold);
-  return {.width = display_width(shown), .text = std::move(shown)};
+std::size_t append_cells(std::string& out, std::string_view text) {
+  if (is_plain(text)) {
+    out += text;
+    return text.size();
+  }
+  const std::string shown = printable(text, LineBreaks::fold);
+  out += shown;
+  return display_width(shown);
 }
 
 std::string printable(std::string_view text, LineBreaks breaks) {
@@ -113,13 +122,14 @@ std::string printable(std::string_view text, LineBreaks breaks) {
   return out;
 }
 
-std::string shown_text(const Record& record, std::string_view key, const Field* field) {
+std::string_view shown_text(const Record& record, std::string_view key, const Field* field,
+                            std::string& made) {
   if (field != nullptr && !field->shown.empty()) return field->shown;
-  return own_text(record, key, field);
+  return own_text(record, key, field, made);
 }
 
-std::string cell_text(const Record& record, std::string_view key) {
-  return own_text(record, key, record.find(key));
+std::string_view cell_text(const Record& record, std::string_view key, std::string& made) {
+  return own_text(record, key, record.find(key), made);
 }
 
 }  // namespace spindle::report

@@ -26,20 +26,16 @@ enum class LineBreaks : std::uint8_t { fold, keep };
 /// invisible one is shown as `\x1b` or `\u202e` is, and ill-formed UTF-8 as U+FFFD.
 std::string printable(std::string_view text, LineBreaks breaks);
 
-/// What stands in a cell of a table, and how many cells of a terminal it takes.
-struct Cells {
-  std::size_t width = 0;
-  std::string text;
-};
-/// Text that is harmless, on one line.
-Cells to_cells(std::string text);
+/// Appends text that is harmless, on one line; returns how many cells of a terminal it takes.
+std::size_t append_cells(std::string& out, std::string_view text);
 
 /// What people see of a record under a column's key: the `shown` of its field of this key, else its
 /// cell; "target", "time" and "type" are the record's own. Empty where the field is null: there is
-/// none.
-std::string shown_text(const Record& record, std::string_view key, const Field* field);
+/// none. It stands in the record, or in `made` where it has to be made.
+std::string_view shown_text(const Record& record, std::string_view key, const Field* field,
+                            std::string& made);
 
 /// The same as programs see it: always the cell, never the field's `shown`.
-std::string cell_text(const Record& record, std::string_view key);
+std::string_view cell_text(const Record& record, std::string_view key, std::string& made);
 
 }  // namespace spindle::report

@@ -1,7 +1,8 @@
 #include "register_bank.hpp"
 
 #include <algorithm>
-#include <iterator>
+#include <array>
+#include <numeric>
 
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/value.hpp"
@@ -12,6 +13,7 @@ namespace {
 using catalogue::Access;
 using catalogue::Content;
 using catalogue::Encoding;
+using catalogue::Integer;
 using catalogue::Kind;
 using catalogue::Parameter;
 using catalogue::Value;
@@ -19,6 +21,7 @@ using modbus::RegisterTable;
 
 constexpr std::string_view commands_prefix = "command.";
 constexpr std::string_view pattern_characters = "*?[";
+constexpr std::string_view anything = "*";
 constexpr Duration longest = std::chrono::hours(24);
 /// What clocks show at first: 2026-01-01 00:00:00, whenever that is.
 constexpr std::int64_t first_second = 1'767'225'600;
@@ -43,8 +46,19 @@ Encoding stored_as(const Encoding& encoding) {
   return plain;
 }
 
-Decimal to_decimal(const catalogue::Integer& integer) {
-  return {integer.sign, integer.magnitude, 0};
+Decimal to_decimal(const Integer& integer) { return {integer.sign, integer.magnitude, 0}; }
+
+/// Requires a number without decimals.
+Integer to_integer(const Decimal& whole) { return {whole.sign(), whole.magnitude()}; }
+
+Integer fitting(const Encoding& encoding, const Integer& step) {
+  return std::clamp(step, to_integer(catalogue::lowest(encoding)),
+                    to_integer(catalogue::highest(encoding)));
+}
+
+/// Whether elements are integers that stand in registers as they are.
+bool is_plain(const Encoding& encoding) {
+  return encoding.is_integer() && encoding.kind != Kind::bcd;
 }
 
 std::optional<Decimal> number_in(const Encoding& encoding, RegisterView registers) {
@@ -61,14 +75,8 @@ Registers date_of(const Encoding& encoding, const Decimal& seconds, const Regist
       .value_or(same);
 }
 
-/// One element that holds an integer, as far as it has bits; those beside it stay.
-Registers with_integer(const Encoding& encoding, const Decimal& whole, const Registers& same) {
-  return catalogue::to_registers(encoding,
-                                 catalogue::to_pattern(encoding, {whole.sign(), whole.magnitude()}),
-                                 catalogue::to_pattern(encoding, same));
-}
-
-/// One element that is the nearest to a number, or stays as it is where none is near.
+/// One element, none of plain integers, that is the nearest to a number, or stays as it is where
+/// none is near.
 Registers with_number(const Encoding& encoding, const Decimal& number, const Registers& same) {
   if (encoding.kind == Kind::date) return date_of(encoding, number, same);
   if (encoding.kind == Kind::text) {
@@ -77,12 +85,8 @@ Registers with_number(const Encoding& encoding, const Decimal& number, const Reg
   if (encoding.is_float()) return encode(as_parameter(encoding), {number}).value_or(same);
   const auto step = catalogue::nearest_step(encoding, number);
   if (!step) return same;
-  const Decimal fitting =
-      std::clamp(to_decimal(*step), catalogue::lowest(encoding), catalogue::highest(encoding));
-  if (encoding.kind == Kind::bcd) {
-    return encode(as_parameter(stored_as(encoding)), {fitting}).value_or(same);
-  }
-  return with_integer(encoding, fitting, same);
+  const Decimal fit = to_decimal(fitting(encoding, *step));
+  return encode(as_parameter(stored_as(encoding)), {fit}).value_or(same);
 }
 
 /// `make` of each element, one behind the other. It gets what the element is and holds.
@@ -149,6 +153,16 @@ bool needs_unlock(const std::optional<catalogue::UnlockSpec>& unlock, std::strin
          });
 }
 
+/// What cells are sorted by.
+std::uint32_t key_of(RegisterTable table, std::uint16_t address) {
+  constexpr unsigned bits_per_address = 16;
+  return (static_cast<std::uint32_t>(table) << bits_per_address) | address;
+}
+std::uint32_t key_of(const Place& place) { return key_of(place.table, place.written_at()); }
+std::uint32_t key_of(const Cell& cell) { return key_of(cell.place); }
+bool is_below(const Cell& cell, std::uint32_t key) { return key_of(cell) < key; }
+bool is_before(const Cell& a, const Cell& b) { return key_of(a) < key_of(b); }
+
 Registers words_at(const Words& words, const Place& place) {
   Registers registers;
   for (unsigned i = 0; i < place.size(); ++i) {
@@ -162,6 +176,25 @@ void put_words(Words& words, const Place& place, RegisterView registers) {
   for (const std::uint16_t word : registers) words.put(address++, word);
 }
 
+/// Each element holds this integer then, as far as it has bits; those beside it stay. Requires
+/// plain integers.
+void put_integer(Words& words, const Place& place, const Integer& integer) {
+  constexpr std::size_t most_registers = 4;
+  std::array<std::uint16_t, most_registers> held = {};
+  const unsigned all = place.size();
+  const unsigned size = all / place.encoding.count;
+  const std::span<std::uint16_t> one(held.data(), std::min<std::size_t>(size, held.size()));
+  const std::uint64_t pattern = catalogue::to_pattern(place.encoding, integer);
+  for (unsigned first = 0; first < all; first += size) {
+    const auto at = [&](std::size_t i) {
+      return static_cast<std::uint16_t>(place.address + first + i);
+    };
+    for (std::size_t i = 0; i < one.size(); ++i) one[i] = words.at(at(i));
+    catalogue::put_pattern(place.encoding, pattern, one);
+    for (std::size_t i = 0; i < one.size(); ++i) words.put(at(i), one[i]);
+  }
+}
+
 /// The bits of `registers` that are the value's, and the others of `present`.
 Registers merged(const Encoding& encoding, Registers registers, RegisterView present) {
   if (!encoding.is_part() || encoding.count > 1) return registers;
@@ -171,16 +204,17 @@ Registers merged(const Encoding& encoding, Registers registers, RegisterView pre
 
 }  // namespace
 
-void Words::add(std::uint16_t address) {
-  if (has(address)) return;
-  if (address >= words_.size()) {
+void Words::add(std::uint16_t first, std::size_t count) {
+  constexpr std::size_t addresses = 0x10000;
+  const std::size_t end = std::min(first + count, addresses);
+  if (end > words_.size()) {
     // In steps, as profiles name registers in rising order.
     constexpr std::size_t step = 1024;
-    const std::size_t size = (std::size_t{address} / step + 1) * step;
+    const std::size_t size = (end + step - 1) / step * step;
     words_.resize(size);
     there_.resize(size);
   }
-  there_[address] = true;
+  for (std::size_t address = first; address < end; ++address) there_[address] = true;
 }
 
 std::int64_t stored_in(const Encoding& encoding, RegisterView registers) {
@@ -203,44 +237,90 @@ bool Cell::takes(RegisterView registers) const {
   return fits(*value) && std::all_of(value->elements.begin(), value->elements.end(), fits);
 }
 
+template <typename Visit>
+void RegisterBank::for_each_match(std::string_view pattern, Visit visit) const {
+  const std::string_view head = pattern.substr(0, pattern.find_first_of(pattern_characters));
+  if (head == pattern) {
+    if (const auto place = find(pattern)) visit(*place);
+    return;
+  }
+  const std::string_view rest = pattern.substr(head.size());
+  for (auto at = names_from(head); at != by_name_.end(); ++at) {
+    const auto& [name, place] = named_[*at];
+    if (!name.starts_with(head)) break;
+    if (rest == anything || glob_match(rest, name.view().substr(head.size()))) visit(place);
+  }
+  if (numbered_) for_each_number(pattern, visit);
+}
+
+template <typename Visit>
+void RegisterBank::for_each_number(std::string_view pattern, Visit visit) const {
+  const std::string_view head = pattern.substr(0, pattern.find_first_of(pattern_characters));
+  const std::string_view prefix = numbered_->prefix;
+  const std::size_t common = std::min(head.size(), prefix.size());
+  const bool may_match = head.substr(0, common) == prefix.substr(0, common) &&
+                         head.find_first_not_of("0123456789", common) == std::string_view::npos;
+  if (!may_match) return;
+  const bool is_each = head.size() == common && pattern.substr(common) == anything;
+  std::string name(prefix);
+  Place place{numbered_->table};
+  for (std::uint32_t number = numbered_->from; number <= numbered_->to; ++number) {
+    if (!is_each) {
+      name.resize(prefix.size());
+      if (!glob_match(pattern, name += std::to_string(number))) continue;
+    }
+    place.address = static_cast<std::uint16_t>(number);
+    visit(place);
+  }
+}
+
 // ---- layout ----
 
 RegisterBank::RegisterBank(const catalogue::Profile& profile,
                            const catalogue::SimulationSpec& start, Commands commands)
     : unlock_(profile.unlock) {
   named_.reserve(profile.parameters.size());
+  cells_.reserve(profile.parameters.size() + profile.actions.size());
   for (const catalogue::Parameter& parameter : profile.parameters) {
     add_parameter(parameter, profile.commands_motion(parameter));
   }
-  std::sort(named_.begin(), named_.end(),
-            [](const Named& a, const Named& b) { return a.name < b.name; });
+  sort_names();
   for (const catalogue::Action& action : profile.actions) {
     add_command(action, profile.link.even_pairs, commands);
   }
   if (profile.numbered) add_numbered(*profile.numbered);
   if (profile.events) add_events(*profile.events);
   for (const auto& value : start.values) {
-    for (const Place& place : matching(value.pattern)) {
-      set_stored(place, value.raw);
-    }
+    for_each_match(value.pattern, [&](const Place& place) { set_stored(place, value.raw); });
   }
   for (const auto& limits : start.limits) {
-    for (const Place& place : matching(limits.pattern)) {
-      limit(place, limits.minimum, limits.maximum);
-    }
+    auto next = cells_.begin();
+    for_each_match(limits.pattern, [&](const Place& place) {
+      next = limit(place, limits.minimum, limits.maximum, next);
+    });
   }
   if (profile.limits) add_mirrors(*profile.limits);
   for (const catalogue::Area& area : start.absent) remove(area, profile.limits);
 }
 
-void RegisterBank::add_registers(const Place& place) {
-  for (unsigned address = place.address; address < place.end(); ++address) {
-    tables_.of(place.table).add(static_cast<std::uint16_t>(address));
-  }
+void RegisterBank::sort_names() {
+  by_name_.resize(named_.size());
+  std::iota(by_name_.begin(), by_name_.end(), std::uint32_t{0});
+  std::sort(by_name_.begin(), by_name_.end(), [this](std::uint32_t a, std::uint32_t b) {
+    return named_[a].name.view() < named_[b].name.view();
+  });
 }
 
+void RegisterBank::add_registers(const Place& place) {
+  tables_.of(place.table).add(place.address, place.size());
+}
+
+/// Behind those that are written by the same register.
 void RegisterBank::add(const Cell& cell) {
-  cells_.insert({{cell.place.table, cell.place.written_at()}, cell});
+  const auto at =
+      std::upper_bound(cells_.begin(), cells_.end(), key_of(cell),
+                       [](std::uint32_t key, const Cell& other) { return key < key_of(other); });
+  cells_.insert(at, cell);
   longest_ = std::max(longest_, cell.place.size());
 }
 
@@ -282,17 +362,25 @@ void RegisterBank::begin(const Parameter& parameter, const Cell& cell) {
 // A register that has a name already keeps what its name says of it.
 void RegisterBank::add_numbered(const catalogue::NumberedSpec& facts) {
   numbered_ = facts;
+  const std::size_t count = std::size_t{facts.to} - facts.from + 1;
+  tables_.of(facts.table).add(facts.from, count);
+  Words named;
+  for (const Cell& cell : cells_) {
+    if (cell.place.table == facts.table) named.add(cell.place.written_at(), cell.place.size());
+  }
+  const auto middle = static_cast<std::ptrdiff_t>(cells_.size());
+  cells_.reserve(cells_.size() + count);
+  const bool is_writable = facts.access == Access::read_write;
+  Cell cell{.place = {facts.table}, .writable = is_writable, .is_parameter = is_writable};
   for (std::uint32_t number = facts.from; number <= facts.to; ++number) {
-    const Place place{facts.table, static_cast<std::uint16_t>(number)};
-    tables_.of(facts.table).add(place.address);
-    const bool is_writable = facts.access == Access::read_write;
-    if (!cells_at(place.table, place.address).empty()) continue;
-    Cell cell{.place = place, .writable = is_writable, .is_parameter = is_writable};
+    cell.place.address = static_cast<std::uint16_t>(number);
+    if (named.has(cell.place.address)) continue;
     if (unlock_) {
       cell.needs_unlock = needs_unlock(unlock_, facts.prefix.to_string() + std::to_string(number));
     }
-    add(cell);
+    cells_.push_back(cell);
   }
+  std::inplace_merge(cells_.begin(), cells_.begin() + middle, cells_.end(), is_before);
 }
 
 // Where values are pairs, the register of an action is the lower of its pair, or it is a pair by
@@ -312,68 +400,67 @@ void RegisterBank::add_command(const catalogue::Action& action, bool even_pairs,
     add_registers(cell.place);
     cell.range = values_of(action);
   }
-  const auto [from, to] = cells_.equal_range({cell.place.table, cell.place.address});
-  for (auto known = from; known != to;) {
-    const Cell& other = known->second;
-    const bool is_same = other.place.address == cell.place.address &&
-                         other.place.encoding.slice == cell.place.encoding.slice &&
-                         other.place.size() <= cell.place.size();
-    if (is_same && other.writable) {
-      cell.is_parameter |= other.is_parameter;
-      cell.needs_unlock |= other.needs_unlock;
-      cell.range = hull(cell.range, other.range);
-    }
-    known = is_same ? cells_.erase(known) : std::next(known);
+  const auto replaces = [&](const Cell& other) {
+    return key_of(other) == key_of(cell) && other.place.address == cell.place.address &&
+           other.place.encoding.slice == cell.place.encoding.slice &&
+           other.place.size() <= cell.place.size();
+  };
+  for (const Cell& other : cells_) {
+    if (!replaces(other) || !other.writable) continue;
+    cell.is_parameter |= other.is_parameter;
+    cell.needs_unlock |= other.needs_unlock;
+    cell.range = hull(cell.range, other.range);
   }
+  std::erase_if(cells_, replaces);
   if (cell_at(cell.place.table, cell.place.address) != nullptr) cell.range = {};
   add(cell);
 }
 
 void RegisterBank::add_events(const catalogue::EventSpec& facts) {
-  for (std::uint16_t i = 0; i < facts.count; ++i) {
-    tables_.of(catalogue::table_of(facts)).add(static_cast<std::uint16_t>(facts.first + i));
-  }
+  tables_.of(catalogue::table_of(facts)).add(facts.first, facts.count);
   if (!facts.arm) return;
   const Place arm{.address = facts.arm->address};
   if (cells_at(arm.table, arm.address).empty()) add({.place = arm, .writable = true});
 }
 
 void RegisterBank::fill(const catalogue::Area& area) {
-  for (std::uint32_t address = area.from; address <= area.to; ++address) {
-    tables_.of(area.table).add(static_cast<std::uint16_t>(address));
-  }
+  tables_.of(area.table).add(area.from, std::size_t{area.to} - area.from + 1);
 }
 
-void RegisterBank::limit(const Place& place, std::int64_t minimum, std::int64_t maximum) {
-  const auto [from, to] = cells_.equal_range({place.table, place.written_at()});
-  for (auto at = from; at != to; ++at) {
-    Cell& cell = at->second;
-    if (cell.place.encoding.slice != place.encoding.slice) continue;
-    cell.range = {catalogue::scaled(cell.place.encoding, Decimal(minimum)),
-                  catalogue::scaled(cell.place.encoding, Decimal(maximum))};
+RegisterBank::Cells::iterator RegisterBank::limit(const Place& place, std::int64_t minimum,
+                                                  std::int64_t maximum, Cells::iterator next) {
+  const std::uint32_t key = key_of(place);
+  // Numbers come in the order of their registers.
+  const bool is_next = next != cells_.end() && key_of(*next) == key;
+  if (!is_next) next = std::lower_bound(cells_.begin(), cells_.end(), key, is_below);
+  for (; next != cells_.end() && key_of(*next) == key; ++next) {
+    const Encoding& encoding = next->place.encoding;
+    if (encoding.slice != place.encoding.slice) continue;
+    next->range = {catalogue::scaled(encoding, Decimal(minimum)),
+                   catalogue::scaled(encoding, Decimal(maximum))};
   }
+  return next;
 }
 
 void RegisterBank::add_mirrors(const catalogue::LimitSpec& facts) {
   constexpr unsigned addresses = 0x10000;
-  const auto show = [this](Place mirror, std::uint16_t offset,
-                           const std::optional<Decimal>& limit) {
-    if (!limit || mirror.end() + offset > addresses) return;
+  // The limit, or where the value has none, what its bits can hold.
+  const auto show = [this](Place mirror, std::uint16_t offset, const std::optional<Decimal>& limit,
+                           Decimal (*extreme)(const Encoding&)) {
+    const bool is_shown = limit || mirror.encoding.is_integer();
+    if (!is_shown || mirror.end() + offset > addresses) return;
     mirror.address = static_cast<std::uint16_t>(mirror.address + offset);
     add_registers(mirror);
-    set_number(mirror, *limit);
-  };
-  for (const auto& [key, cell] : cells_) {
-    const Place& place = cell.place;
-    if (!is_mirrored(cell, facts)) continue;
-    catalogue::Range range = cell.range;
-    if (place.encoding.is_integer()) {
-      const Encoding& encoding = place.encoding;
-      if (!range.minimum) range.minimum = catalogue::scaled(encoding, catalogue::lowest(encoding));
-      if (!range.maximum) range.maximum = catalogue::scaled(encoding, catalogue::highest(encoding));
+    if (limit) {
+      set_number(mirror, *limit);
+    } else {
+      set_stored(mirror, extreme(mirror.encoding));
     }
-    show(place, facts.minimum_offset, range.minimum);
-    show(place, facts.maximum_offset, range.maximum);
+  };
+  for (const Cell& cell : cells_) {
+    if (!is_mirrored(cell, facts)) continue;
+    show(cell.place, facts.minimum_offset, cell.range.minimum, catalogue::lowest);
+    show(cell.place, facts.maximum_offset, cell.range.maximum, catalogue::highest);
   }
 }
 
@@ -383,8 +470,7 @@ void RegisterBank::remove(const catalogue::Area& area,
   for (std::uint32_t number = area.from; number <= area.to; ++number) {
     tables_.of(area.table).erase(static_cast<std::uint16_t>(number));
   }
-  std::erase_if(cells_, [&](const auto& entry) {
-    const auto& [key, cell] = entry;
+  std::erase_if(cells_, [&](const Cell& cell) {
     const Place& place = cell.place;
     if (place.table != area.table || place.address > area.to || place.end() <= area.from) {
       return false;
@@ -428,17 +514,22 @@ void RegisterBank::note_read(RegisterTable table, std::uint16_t first, std::size
 }
 
 bool RegisterBank::has_cells(RegisterTable table) const {
-  const auto first = cells_.lower_bound({table, std::uint16_t{0}});
-  return first != cells_.end() && first->first.first == table;
+  const auto first = cells_from(table, 0);
+  return first != cells_.end() && first->place.table == table;
+}
+
+RegisterBank::Cells::const_iterator RegisterBank::cells_from(RegisterTable table,
+                                                             std::uint16_t address) const {
+  return std::lower_bound(cells_.begin(), cells_.end(), key_of(table, address), is_below);
 }
 
 std::vector<const Cell*> RegisterBank::cells_at(RegisterTable table, std::uint16_t address) const {
   std::vector<const Cell*> found;
   const unsigned back = std::min<unsigned>(address, longest_ - 1);
-  auto at = cells_.lower_bound({table, static_cast<std::uint16_t>(address - back)});
-  for (; at != cells_.end() && at->first <= Key{table, address}; ++at) {
-    const Place& place = at->second.place;
-    if (address < place.written_at() + place.size()) found.push_back(&at->second);
+  auto at = cells_from(table, static_cast<std::uint16_t>(address - back));
+  for (; at != cells_.end() && key_of(*at) <= key_of(table, address); ++at) {
+    const Place& place = at->place;
+    if (address < place.written_at() + place.size()) found.push_back(&*at);
   }
   return found;
 }
@@ -501,6 +592,11 @@ std::optional<Decimal> RegisterBank::number(const Place& place) const {
 }
 
 void RegisterBank::set_number(const Place& place, const Decimal& number) {
+  if (is_plain(place.encoding)) {
+    const auto step = catalogue::nearest_step(place.encoding, number);
+    if (step) put_integer(tables_.of(place.table), place, fitting(place.encoding, *step));
+    return;
+  }
   put(place,
       of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
         return with_number(one, number, same);
@@ -508,22 +604,29 @@ void RegisterBank::set_number(const Place& place, const Decimal& number) {
 }
 
 // A counter begins anew behind its last number.
-void RegisterBank::set_stored(const Place& place, std::int64_t stored) {
-  const bool is_integer = place.encoding.is_integer() && place.encoding.kind != Kind::bcd;
+void RegisterBank::set_stored(const Place& place, const Decimal& stored) {
+  if (is_plain(place.encoding)) {
+    put_integer(tables_.of(place.table), place, to_integer(stored));
+    return;
+  }
   put(place,
       of_each(place.encoding, registers(place), [&](const Encoding& one, const Registers& same) {
-        return is_integer ? with_integer(one, Decimal(stored), same)
-                          : with_number(stored_as(one), Decimal(stored), same);
+        return with_number(stored_as(one), stored, same);
       }));
 }
 
 // ---- names ----
 
+std::vector<std::uint32_t>::const_iterator RegisterBank::names_from(std::string_view name) const {
+  return std::lower_bound(by_name_.begin(), by_name_.end(), name,
+                          [this](std::uint32_t index, std::string_view wanted) {
+                            return named_[index].name.view() < wanted;
+                          });
+}
+
 std::optional<Place> RegisterBank::find(std::string_view name) const {
-  const auto named = std::lower_bound(
-      named_.begin(), named_.end(), name,
-      [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
-  if (named != named_.end() && named->name == name) return named->place;
+  const auto named = names_from(name);
+  if (named != by_name_.end() && named_[*named].name == name) return named_[*named].place;
   if (!numbered_ || !name.starts_with(numbered_->prefix)) return std::nullopt;
   const std::string_view digits = name.substr(numbered_->prefix.size());
   const auto number = parse_unsigned(digits, numbered_->to);
@@ -531,40 +634,6 @@ std::optional<Place> RegisterBank::find(std::string_view name) const {
       number && *number >= numbered_->from && (digits.size() == 1 || digits[0] != '0');
   if (!is_one) return std::nullopt;
   return Place{numbered_->table, static_cast<std::uint16_t>(*number)};
-}
-
-std::vector<Place> RegisterBank::matching(std::string_view pattern) const {
-  const std::string_view head = pattern.substr(0, pattern.find_first_of(pattern_characters));
-  std::vector<Place> found;
-  if (head == pattern) {
-    if (const auto place = find(pattern)) found.push_back(*place);
-    return found;
-  }
-  auto named = std::lower_bound(
-      named_.begin(), named_.end(), head,
-      [](const Named& entry, std::string_view wanted) { return entry.name < wanted; });
-  for (; named != named_.end() && named->name.starts_with(head); ++named) {
-    if (glob_match(pattern, named->name)) found.push_back(named->place);
-  }
-  add_numbered_matching(pattern, found);
-  return found;
-}
-
-void RegisterBank::add_numbered_matching(std::string_view pattern,
-                                         std::vector<Place>& found) const {
-  if (!numbered_) return;
-  const std::string_view head = pattern.substr(0, pattern.find_first_of(pattern_characters));
-  const std::string_view prefix = numbered_->prefix;
-  const std::size_t common = std::min(head.size(), prefix.size());
-  const bool may_match = head.substr(0, common) == prefix.substr(0, common) &&
-                         head.find_first_not_of("0123456789", common) == std::string_view::npos;
-  if (!may_match) return;
-  std::string name(prefix);
-  for (std::uint32_t number = numbered_->from; number <= numbered_->to; ++number) {
-    name.resize(prefix.size());
-    if (!glob_match(pattern, name += std::to_string(number))) continue;
-    found.push_back({numbered_->table, static_cast<std::uint16_t>(number)});
-  }
 }
 
 std::int64_t RegisterBank::get(std::string_view name) const {
@@ -598,7 +667,7 @@ void RegisterBank::copy_parameters(const Tables& from, Tables& into,
              spared->encoding.slice == place.encoding.slice;
     });
   };
-  for (const auto& [key, cell] : cells_) {
+  for (const Cell& cell : cells_) {
     if (!cell.is_parameter || is_spared(cell.place)) continue;
     const RegisterTable table = cell.place.table;
     put_words(into.of(table), cell.place,

@@ -2,11 +2,9 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "spindle/base/bytes.hpp"
@@ -27,8 +25,9 @@ class Words {
   [[nodiscard]] std::uint16_t at(std::uint16_t address) const {
     return has(address) ? words_[address] : std::uint16_t{0};
   }
-  /// Adds a register that holds 0; one that is there stays as it is.
-  void add(std::uint16_t address);
+  /// Adds registers from `first` on that hold 0, up to that with the highest address; those that
+  /// are there stay as they are.
+  void add(std::uint16_t first, std::size_t count);
   /// Nothing happens when there is no such register.
   void put(std::uint16_t address, std::uint16_t word) {
     if (has(address)) words_[address] = word;
@@ -143,7 +142,7 @@ class RegisterBank {
   [[nodiscard]] std::int64_t stored(const Place& place) const {
     return stored_in(place.encoding, registers(place));
   }
-  void set_stored(const Place& place, std::int64_t stored);
+  void set_stored(const Place& place, std::int64_t stored) { set_stored(place, Decimal(stored)); }
 
   /// Empty when the profile does not name it.
   [[nodiscard]] std::optional<Place> find(std::string_view name) const;
@@ -170,31 +169,44 @@ class RegisterBank {
     Place place;
   };
 
-  using Key = std::pair<modbus::RegisterTable, std::uint16_t>;
+  using Cells = std::vector<Cell>;
 
+  /// In the order of their names.
+  [[nodiscard]] std::vector<std::uint32_t>::const_iterator names_from(std::string_view name) const;
   [[nodiscard]] std::vector<const Cell*> cells_at(modbus::RegisterTable table,
                                                   std::uint16_t address) const;
+  /// The first of those that are written by this register, or by one behind it.
+  [[nodiscard]] Cells::const_iterator cells_from(modbus::RegisterTable table,
+                                                 std::uint16_t address) const;
   [[nodiscard]] Change change_of(const Cell& cell, std::uint16_t first, RegisterView values) const;
+  void set_stored(const Place& place, const Decimal& stored);
   void add(const Cell& cell);
+  void sort_names();
   void add_registers(const Place& place);
   void add_parameter(const catalogue::Parameter& parameter, bool is_command);
   void begin(const catalogue::Parameter& parameter, const Cell& cell);
   void add_numbered(const catalogue::NumberedSpec& facts);
   void add_command(const catalogue::Action& action, bool even_pairs, Commands commands);
   void add_events(const catalogue::EventSpec& facts);
-  [[nodiscard]] std::vector<Place> matching(std::string_view pattern) const;
-  void add_numbered_matching(std::string_view pattern, std::vector<Place>& found) const;
-  void limit(const Place& place, std::int64_t minimum, std::int64_t maximum);
+  /// Calls `visit` with each place that has a name like this.
+  template <typename Visit>
+  void for_each_match(std::string_view pattern, Visit visit) const;
+  template <typename Visit>
+  void for_each_number(std::string_view pattern, Visit visit) const;
+  /// Looks at `next` first; what stands behind the cells of this place.
+  Cells::iterator limit(const Place& place, std::int64_t minimum, std::int64_t maximum,
+                        Cells::iterator next);
   void add_mirrors(const catalogue::LimitSpec& facts);
   void remove(const catalogue::Area& area, const std::optional<catalogue::LimitSpec>& limits);
 
-  std::vector<Named> named_ = {};  ///< by name
+  std::vector<Named> named_ = {};            ///< in the profile's order
+  std::vector<std::uint32_t> by_name_ = {};  ///< indexes of `named_`, sorted
   std::optional<catalogue::NumberedSpec> numbered_ = std::nullopt;
   std::optional<catalogue::UnlockSpec> unlock_ = std::nullopt;
   Tables tables_ = {};
-  std::multimap<Key, Cell> cells_ = {};  ///< by the first register that writes them
-  unsigned longest_ = 1;                 ///< registers of the longest of them
-  std::vector<Place> consumed_ = {};     ///< what reading clears
+  Cells cells_ = {};                  ///< by the first register that writes them
+  unsigned longest_ = 1;              ///< registers of the longest of them
+  std::vector<Place> consumed_ = {};  ///< what reading clears
 };
 
 }  // namespace spindle::sim

@@ -15,10 +15,8 @@ namespace {
 /// What tools send unasked, by all profiles: a tool whose profile is not known may be any of them.
 std::vector<link::SpontaneousShape> unasked_shapes(const Environment& environment) {
   std::vector<link::SpontaneousShape> shapes;
-  for (const files::ProfileEntry& entry : environment.profiles.list()) {
-    const auto profile = environment.profiles.load(entry.id);
-    if (!profile || !catalogue::sends_unasked(*profile)) continue;
-    shapes.push_back(device::shape_of(*profile->events));
+  for (const catalogue::Profile& profile : environment.profiles.load_all()) {
+    if (catalogue::sends_unasked(profile)) shapes.push_back(device::shape_of(*profile.events));
   }
   return shapes;
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/decimal.hpp"
@@ -130,11 +132,21 @@ std::uint64_t to_pattern(const Encoding& encoding, RegisterView registers);
 /// The other way round: `present` is what they hold now, as to_pattern() gives it; its bits outside
 /// the slice stay.
 Registers to_registers(const Encoding& encoding, std::uint64_t pattern, std::uint64_t present = 0);
+/// The same where the registers are: their bits outside the slice stay. Requires those of one
+/// element.
+void put_pattern(const Encoding& encoding, std::uint64_t pattern,
+                 std::span<std::uint16_t> registers);
 
 /// An integer of 64 bits, with or without a sign.
 struct Integer {
   Sign sign = Sign::plus;
-  std::uint64_t magnitude = 0;
+  std::uint64_t magnitude = 0;  ///< zero has no sign
+
+  friend constexpr bool operator==(const Integer&, const Integer&) = default;
+  friend constexpr std::strong_ordering operator<=>(const Integer& a, const Integer& b) {
+    if (a.sign != b.sign) return b.sign <=> a.sign;
+    return a.sign == Sign::plus ? a.magnitude <=> b.magnitude : b.magnitude <=> a.magnitude;
+  }
 };
 /// The bits of the slice, as the kind means them.
 Integer to_integer(const Encoding& encoding, std::uint64_t pattern);
