@@ -138,6 +138,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   for (Target& target : targets) {
     target.addressing = options.addressing;
     target.endpoint.claim = link::Claim::beside;
+    target.endpoint.gateway.clear();  // a unit that is not there must not keep the others waiting
   }
   const Context calm = uninterruptible_context(context);
   SharedLines shared(targets, calm);

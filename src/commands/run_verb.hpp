@@ -6,6 +6,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/work/change.hpp"
+#include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
 
@@ -129,8 +130,11 @@ auto VerbRun<V>::take_turn(const Target& target, Context& context) const -> Resu
 template <typename V>
 Result<Outcome> VerbRun<V>::each_alone(const std::vector<Target>& tools) const {
   const auto output = make_output(tools.size(), verb_->live_columns(), context_->renderer);
+  SharedLines lines(tools, *context_, SharedLines::Of::gateways);
+  const device::OpenTransport open = lines.opener();
+  Context sharing = with_lines(*context_, open);
   typename V::AllDone all{.tools = tools.size()};
-  all.done = for_each_told(tools, jobs_, *output, *context_, [&](const auto& target, Context& own) {
+  all.done = for_each_told(tools, jobs_, *output, sharing, [&](const auto& target, Context& own) {
     return take_turn(target, own);
   });
   all.outcome = outcome_of_all(all.done);

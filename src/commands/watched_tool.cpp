@@ -39,6 +39,7 @@ Result<void> WatchedTool::find_profile(const Context& context) {
   if (!tool) return do_without_profile(std::move(tool.error()), context);
   target_ = tool->target;
   target_.profile = tool->profile->id;
+  if (catalogue::sends_unasked(*tool->profile)) target_.endpoint.gateway.clear();
   return adopt_profile(target_.profile);
 }
 

@@ -157,8 +157,11 @@ link::Units units_of(const catalogue::Profile& profile) {
   return profile.id.empty() ? link::Units::identified : link::Units::asked;
 }
 
-link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing) {
-  link::DemuxRules rules{.framing = framing, .units = units_of(profile)};
+link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing framing,
+                             const link::Endpoint& endpoint) {
+  link::DemuxRules rules{.framing = framing,
+                         .units = units_of(profile),
+                         .transactions = endpoint.transactions.value_or(profile.link.transactions)};
   if (catalogue::sends_unasked(profile)) rules.spontaneous.push_back(shape_of(*profile.events));
   return rules;
 }
@@ -174,7 +177,7 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
                                      const link::Endpoint& endpoint, const LinkOptions& options,
                                      TimePoint now) {
   link::SessionOptions session;
-  session.rules = demux_rules(profile, framing_of(endpoint, profile.link));
+  session.rules = demux_rules(profile, framing_of(endpoint, profile.link), endpoint);
   session.unit = endpoint.unit.value_or(modbus::UnitId{profile.link.unit});
   session.answer_timeout = options.answer_timeout.value_or(profile.link.answer);
   session.first_transaction = transaction_at(now);
@@ -194,6 +197,10 @@ link::SessionOptions session_options(const catalogue::Profile& profile,
     const bool is_shared = endpoint.medium == link::Medium::rtu_over_tcp;
     session.late_answers =
         is_shared ? link::SessionOptions::LateAnswers::shared : options.late_answers;
+  }
+  if (session.rules.framing == modbus::Framing::tcp && !has_ids(session.rules)) {
+    session.late_answers = options.late_answers;
+    session.others = link::SessionOptions::Others::possible;  // what a gateway has behind it
   }
   if (profile.link.loopback) session.proof = link::SessionOptions::Proof::loopback;
   return session;
@@ -328,7 +335,9 @@ Result<Device> Device::open(const link::Endpoint& endpoint, const catalogue::Pro
     error.endpoint = endpoint_beside(endpoint, options);
     return tl::unexpected(std::move(error));
   }
-  if (options.reopening == link::Reopening::once && endpoint.medium == link::Medium::tcp) {
+  const bool reopens = options.reopening == link::Reopening::once &&
+                       endpoint.medium == link::Medium::tcp && !(*transport)->is_shared();
+  if (reopens) {
     const auto open = [=, facts = profile.link] {
       return open_transport(endpoint, facts, connect_timeout);
     };
@@ -399,7 +408,7 @@ void Device::set_retries(unsigned retries) {
 void Device::use(const catalogue::Profile& profile, catalogue::Identity identity) {
   profile_ = &profile;
   identity_ = std::move(identity);
-  session_->set_rules(demux_rules(*profile_, session_->options().rules.framing));
+  session_->set_rules(demux_rules(*profile_, session_->options().rules.framing, at_));
   limits_ = read_limits(*profile_, {});
   client_ = link::Client(*session_, limits_, retries_);
   registers_known_ = true;
@@ -1050,11 +1059,12 @@ Result<std::optional<Registers>> Device::last_event() {
 }
 
 Result<Shown> Device::take_event_flag() {
-  if (session_->options().rules.framing == modbus::Framing::rtu) {
+  if (!has_ids(session_->options().rules)) {
     return tl::unexpected(
         located({.code = Errc::usage,
-                 .message = "a flag that reading clears cannot be read on a serial line",
-                 .hint = "connect the tool by Modbus TCP"}));
+                 .message = "a flag that reading clears can only be read where answers carry "
+                            "transaction ids",
+                 .hint = "connect the tool by Modbus TCP, without transaction=ignored"}));
   }
   for (const Parameter& parameter : profile_->parameters) {
     if (parameter.name != profile_->events->flag) continue;

@@ -120,13 +120,6 @@ namespace {
 constexpr auto framing_words =
     enum_table<modbus::Framing>({{"tcp", modbus::Framing::tcp}, {"rtu", modbus::Framing::rtu}});
 constexpr auto pair_words = enum_table<bool>({{"even", true}, {"any", false}});
-/// A tool that does not copy the transaction id cannot be told from its own pushed frames.
-constexpr auto transaction_words = enum_table<bool>({{"echoed", true}, {"", false}});
-
-void read_transaction(const YamlNode& node, LinkSpec&, const Asked& asked) {
-  bool echoed = true;
-  read_word(transaction_words, node, echoed, asked);
-}
 
 void read_write_function(const YamlNode& node, LinkSpec& link, const Asked& asked) {
   constexpr auto single = static_cast<std::uint8_t>(modbus::FunctionCode::write_single_register);
@@ -168,7 +161,7 @@ constexpr Field<LinkSpec> link_fields[] = {
     field<&LinkSpec::port>("port"),
     field<&LinkSpec::unit>("unit"),
     field<&LinkSpec::units>("units"),
-    custom("transaction", Need::optional, "echoed", read_transaction),
+    word<modbus::transaction_words, &LinkSpec::transactions>("transaction"),
     field<&LinkSpec::max_read>("max-read"),
     field<&LinkSpec::max_write>("max-write"),
     field<&LinkSpec::max_read_bits>("max-read-bits"),

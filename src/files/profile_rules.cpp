@@ -492,6 +492,21 @@ void effects_are_of_values(const ProfileDraft& draft, Diagnostics& findings) {
 
 // ---- sections ----
 
+/// What tells answers apart where the transaction id does not.
+void check_ignored_ids(const ProfileDraft& draft, Diagnostics& findings) {
+  const catalogue::LinkSpec& link = draft.profile.link;
+  const auto add = [&](std::string message) {
+    findings.add_once(draft.link.of("transaction"), std::move(message));
+  };
+  if (link.framing == modbus::Framing::rtu) {
+    add("transaction is for TCP: on a serial line answers have no transaction id");
+  } else if (link.any_unit) {
+    add("with any-unit nothing but the transaction id tells whose answer it is");
+  } else if (catalogue::sends_unasked(draft.profile)) {
+    add("only the transaction id tells an answer from an event that is pushed");
+  }
+}
+
 void link_is_usable(const ProfileDraft& draft, Diagnostics& findings) {
   if (draft.link.entry == nullptr || !draft.link.sound) return;
   const catalogue::LinkSpec& link = draft.profile.link;
@@ -505,6 +520,7 @@ void link_is_usable(const ProfileDraft& draft, Diagnostics& findings) {
     findings.add_once(draft.link.of("any-unit"),
                       "any-unit is for TCP: on a serial line the unit tells whose answer it is");
   }
+  if (link.transactions == modbus::TransactionIds::ignored) check_ignored_ids(draft, findings);
   if (!link.units) return;
   // 0 is everybody, and 248 to 255 are reserved on a serial line.
   constexpr unsigned highest_unit = 247;
@@ -570,8 +586,11 @@ void event_source_is_complete(const ProfileDraft& draft, Diagnostics& findings) 
     add("interval", "an interval is above zero");
   }
   // There an answer may be proved by reading again, which would find a flag that is cleared.
-  if (flags && draft.profile.link.framing == modbus::Framing::rtu) {
+  const catalogue::LinkSpec& link = draft.profile.link;
+  if (flags && link.framing == modbus::Framing::rtu) {
     add("source", "a flag that reading clears cannot be read on a serial line");
+  } else if (flags && link.transactions == modbus::TransactionIds::ignored) {
+    add("source", "a flag that reading clears cannot be read with 'transaction: ignored'");
   }
   const Parameter* number = parameter_named(draft, events.number);
   if (number != nullptr && number->encoding.kind != catalogue::Kind::u16) {

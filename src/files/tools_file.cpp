@@ -104,6 +104,7 @@ constexpr Field<Tool> tool_fields[] = {
     custom("timeout", Need::optional, "duration", read_timeout),
     custom("gap", Need::optional, "duration", read_gap),
     custom("retries", Need::optional, "number 0..100", read_retries),
+    word<modbus::transaction_words, &Tool::transactions>("transaction"),
     custom("verified", Need::optional, "list of text", read_verified),
 };
 

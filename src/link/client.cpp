@@ -286,7 +286,7 @@ auto Client::believed(Read read) -> decltype(read()) {
 Result<Registers> Client::read_once(const RegisterRange& range) {
   const auto request = modbus::read_request(range.table, {range.first}, range.count);
   std::vector<OtherRead> others;
-  if (session_->options().rules.framing == modbus::Framing::rtu) {
+  if (!has_ids(session_->options().rules)) {
     others = other_reads(range, limits_, absent_registers());
   }
   return ask(request, retries_, others).map([&](const modbus::Pdu& response) {

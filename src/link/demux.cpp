@@ -15,15 +15,15 @@ bool is_spontaneous(const modbus::Pdu& pdu, const DemuxRules& rules) {
 }
 
 bool is_addressed(const modbus::Adu& outstanding, const modbus::Adu& received,
-                  modbus::Framing framing) {
-  return framing == modbus::Framing::tcp ? outstanding.transaction == received.transaction
-                                         : outstanding.unit == received.unit;
+                  const DemuxRules& rules) {
+  return has_ids(rules) ? outstanding.transaction == received.transaction
+                        : outstanding.unit == received.unit;
 }
 
 /// Whether an answer of this unit counts where the transaction id fits.
 bool is_unit_taken(const modbus::Adu& outstanding, const modbus::Adu& received,
                    const DemuxRules& rules) {
-  if (rules.framing == modbus::Framing::rtu || outstanding.unit == received.unit) return true;
+  if (!has_ids(rules) || outstanding.unit == received.unit) return true;
   const bool identifies =
       outstanding.pdu.function == static_cast<std::uint8_t>(modbus::FunctionCode::report_server_id);
   return rules.units == Units::any || (rules.units == Units::identified && identifies);
@@ -31,19 +31,23 @@ bool is_unit_taken(const modbus::Adu& outstanding, const modbus::Adu& received,
 
 }  // namespace
 
+bool has_ids(const DemuxRules& rules) {
+  return rules.framing == modbus::Framing::tcp &&
+         rules.transactions == modbus::TransactionIds::echoed;
+}
+
 Verdict judge(const modbus::Adu* outstanding, const modbus::Adu& received,
               const DemuxRules& rules) {
   using modbus::Fit;
-  const bool addressed =
-      outstanding != nullptr && is_addressed(*outstanding, received, rules.framing);
+  const bool addressed = outstanding != nullptr && is_addressed(*outstanding, received, rules);
   const Fit fit = addressed ? modbus::fit(outstanding->pdu, received.pdu) : Fit::foreign;
   const bool answers = fit == Fit::answer || fit == Fit::exception_response;
   if (answers && !is_unit_taken(*outstanding, received, rules)) return Verdict::other_unit;
   if (fit == Fit::answer) return Verdict::answer;
   if (fit == Fit::exception_response) return Verdict::exception_response;
   if (is_spontaneous(received.pdu, rules)) return Verdict::spontaneous;
-  // On a serial line other functions from our unit are late answers; on TCP the id is ours alone.
-  const bool ours = addressed && (fit == Fit::wrong_shape || rules.framing == modbus::Framing::tcp);
+  // Without ids other functions from our unit are late answers; an id is ours alone.
+  const bool ours = addressed && (fit == Fit::wrong_shape || has_ids(rules));
   return ours ? Verdict::broken : Verdict::stray;
 }
 

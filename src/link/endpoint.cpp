@@ -307,6 +307,10 @@ Result<void> set_reserved(Endpoint& endpoint, std::string_view value) {
   return set_word(endpoint, "reserved", value, words, endpoint.reserved_units);
 }
 
+Result<void> set_transaction(Endpoint& endpoint, std::string_view value) {
+  return set_word(endpoint, "transaction", value, modbus::transaction_words, endpoint.transactions);
+}
+
 /// Whether the unit may be asked for at all; known only when all options are.
 Result<void> check_unit(const Endpoint& endpoint) {
   if (!endpoint.unit || endpoint.unit->value <= last_unit(endpoint)) return {};
@@ -320,6 +324,7 @@ const std::vector<UrlOption>& url_options() {
   using enum Medium;
   static const std::vector<UrlOption> options = {
       {"unit", {tcp, serial, rtu_over_tcp, simulated}, set_unit},
+      {"transaction", {tcp}, set_transaction},
       {"reserved", {serial, rtu_over_tcp}, set_reserved},
       {"baud", {serial, rtu_over_tcp, simulated}, set_baud},
       {"parity", {serial}, set_parity},

@@ -40,6 +40,9 @@ constexpr Duration::rep trips_listened = 2;
 constexpr Duration trip_margin = std::chrono::milliseconds(20);
 constexpr Duration longest_listening = std::chrono::milliseconds(250);
 
+/// A network may hold back answers for longer than a serial line, and a gateway queues requests.
+constexpr Duration least_gateway_doubt = std::chrono::seconds(30);
+
 // More late answers than these hardly come at once.
 constexpr std::size_t most_unanswered = 8;
 
@@ -56,6 +59,12 @@ modbus::Pdu part_of(const OtherRead& other, const modbus::Pdu& answer, const mod
   return modbus::read_response(read.table, RegisterView(registers).subspan(other.skip, read.count));
 }
 
+bool would_answer(const modbus::Adu& request, const modbus::Adu& received,
+                  const DemuxRules& rules) {
+  const Verdict verdict = judge(&request, received, rules);
+  return verdict == Verdict::answer || verdict == Verdict::exception_response;
+}
+
 /// A frame of any kind within bytes that no client expects.
 bool holds_request(ByteView bytes) {
   if (modbus::whole_rtu_frame(bytes)) return true;
@@ -63,7 +72,10 @@ bool holds_request(ByteView bytes) {
   return std::holds_alternative<modbus::Deframed>(found);
 }
 
-std::string_view sentence_of(Evidence evidence) {
+std::string_view sentence_of(Evidence evidence, modbus::Framing framing) {
+  if (framing == modbus::Framing::tcp) {
+    return "answers come that nothing asked for; each answer is proved";
+  }
   switch (evidence) {
     case Evidence::noise:
       return "bytes come that belong to no answer: noise, or another master is on this line; each "
@@ -145,7 +157,8 @@ struct Session::Outstanding {
   std::optional<modbus::Pdu> answer = std::nullopt;
   std::string broken = {};  ///< what came with our id and was no answer
   std::optional<modbus::UnitId> other_unit = std::nullopt;  ///< that answered with our id
-  std::size_t events = 0;     ///< frames that the tool sent unasked meanwhile
+  std::size_t events = 0;  ///< frames that the tool sent unasked meanwhile
+  std::optional<modbus::TransactionId> other_id = std::nullopt;  ///< of what is else the answer
   std::size_t strangers = 0;  ///< whole frames that answer nothing of ours
   std::string stranger = {};  ///< the last of them
   std::size_t echoes = 0;     ///< copies of the request that came back
@@ -157,7 +170,8 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
       clock_(&clock),
       options_(std::move(options)),
       trace_(std::move(trace)),
-      next_transaction_(std::max(options_.first_transaction, smallest_transaction)),
+      first_transaction_(std::max(options_.first_transaction, smallest_transaction)),
+      next_transaction_(first_transaction_),
       created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
@@ -166,7 +180,7 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
     require_verification(created_);
     others_late_until_ = past_until_ = doubtful_until_;
   }
-  if (is_rtu()) {
+  if (!has_ids(options_.rules)) {
     const TimePoint late = transport_->late_until();
     doubt_.raise(late);
     past_until_ = std::max(past_until_, late);
@@ -194,24 +208,45 @@ Session::~Session() {
   if (trace_.bytes) trace_.bytes(Direction::received, {});
 }
 
-/// The line is ours as long as this lives. Who has it next keeps the silence that we owe.
+/// The line is ours as long as this lives. Who has it next keeps the silence that we owe, and goes
+/// on where the stream of a connection was left.
 class Session::Lease {
  public:
   explicit Lease(Session& session) : session_(&session) {
-    const Transport::BusLease left = session_->transport_->acquire_bus();
+    Transport::BusLease left = session_->transport_->acquire_bus();
     session_->last_activity_ = std::max(session_->last_activity_, left.used_until);
     session_->others_late_until_ = std::max(session_->past_until_, left.late_until);
+    if (left.stream) session_->go_on_with(std::move(*left.stream));
   }
   Lease(const Lease&) = delete;
   Lease& operator=(const Lease&) = delete;
   ~Lease() {
-    session_->transport_->release_bus(
-        {.used_until = session_->last_activity_, .late_until = session_->doubtful_until_});
+    Transport::BusLease left{.used_until = session_->last_activity_,
+                             .late_until = session_->doubtful_until_};
+    if (!session_->is_rtu()) left.stream = session_->stream();
+    session_->transport_->release_bus(left);
   }
 
  private:
   Session* session_;
 };
+
+Transport::Stream Session::stream() const {
+  return {.rest = buffer_,
+          .torn = torn_,
+          .first_transaction = first_transaction_,
+          .next_transaction = next_transaction_,
+          .unanswered = unanswered_,
+          .out_of_step = out_of_step_};
+}
+
+void Session::go_on_with(Transport::Stream stream) {
+  buffer_ = std::move(stream.rest);
+  torn_ = stream.torn;
+  first_transaction_ = stream.first_transaction;
+  next_transaction_ = stream.next_transaction;
+  unanswered_ = std::move(stream.unanswered);
+}
 
 Result<modbus::Pdu> Session::transact(const modbus::Pdu& request, const Others& others) {
   const Lease lease(*this);
@@ -224,7 +259,9 @@ Result<modbus::Pdu> Session::ask(const modbus::Pdu& request, const Others& other
     if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
   }
   if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
-  if (!is_rtu() || is_repeated_by_answer(request) || modbus::is_write(request.function)) {
+  const bool proves_itself = has_ids(options_.rules) || is_repeated_by_answer(request) ||
+                             modbus::is_write(request.function);
+  if (proves_itself) {
     if (auto passed = let_copies_pass(request); !passed) {
       return tl::unexpected(std::move(passed.error()));
     }
@@ -311,10 +348,20 @@ Result<std::optional<modbus::Pdu>> Session::prove(const modbus::Pdu& request,
   const bool is_exception = modbus::exception_of(answer).has_value();
   std::vector<OtherRead> own = is_exception ? std::vector<OtherRead>() : with_own_shapes(others);
   if (!own.empty()) return prove_by_others(request, answer, std::move(own));
-  contested_ = {request};
-  auto again = exchange_contested(request, answer);
-  if (!again) return tl::unexpected(std::move(again.error()));
-  if (*again != answer || refutations_ > 0) return std::nullopt;
+  return prove_by_repeating(request, answer);
+}
+
+/// Answers come in order over TCP. So where some were given up, one more than those has to agree.
+Result<std::optional<modbus::Pdu>> Session::prove_by_repeating(const modbus::Pdu& request,
+                                                               const modbus::Pdu& answer) {
+  constexpr std::size_t once = 1;
+  const std::size_t repetitions = is_rtu() ? once : std::max(once, late_ones_like(answer));
+  for (std::size_t count = 0; count < repetitions; ++count) {
+    contested_ = {request};
+    auto again = exchange_contested(request, answer);
+    if (!again) return tl::unexpected(std::move(again.error()));
+    if (*again != answer || refutations_ > 0) return std::nullopt;
+  }
   if (!has_loopback()) {
     const bool may_lose_ours = !transport_->company().empty();
     return may_lose_ours ? std::nullopt : std::optional(answer);
@@ -385,8 +432,7 @@ void Session::note_refutation(const modbus::Adu& stray) {
       stray.pdu != accepted_ &&
       std::any_of(contested_.begin(), contested_.end(), [&](const auto& request) {
         const modbus::Adu asked{.transaction = {}, .unit = options_.unit, .pdu = request};
-        const Verdict verdict = judge(&asked, stray, options_.rules);
-        return verdict == Verdict::answer || verdict == Verdict::exception_response;
+        return would_answer(asked, stray, options_.rules);
       });
   if (refutes) ++refutations_;
 }
@@ -394,8 +440,10 @@ void Session::note_refutation(const modbus::Adu& stray) {
 /// Those whose answers have a shape that nothing else had here.
 std::vector<OtherRead> Session::with_own_shapes(const Others& others) const {
   std::vector<OtherRead> own;
-  std::copy_if(others.begin(), others.end(), std::back_inserter(own),
-               [&](const OtherRead& other) { return !doubt_.is_shape_taken(other.request); });
+  std::copy_if(others.begin(), others.end(), std::back_inserter(own), [&](const OtherRead& other) {
+    const bool is_late = !is_rtu() && may_be_late_to_like(other.request);
+    return !is_late && !doubt_.is_shape_taken(other.request);
+  });
   return own;
 }
 
@@ -407,7 +455,7 @@ bool Session::answers_come_in_order() const {
 
 /// The copy of the answer to an equal write is no answer to this one.
 Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
-  const bool careful = is_rtu() && modbus::is_write(write.function) &&
+  const bool careful = !has_ids(options_.rules) && modbus::is_write(write.function) &&
                        doubt_.is_raised(clock_->now()) && proves_ == Proves::in_doubt;
   if (!careful) return {};
   const modbus::Pdu answer{.function = write.function,
@@ -418,7 +466,7 @@ Result<void> Session::let_copies_pass(const modbus::Pdu& write) {
 
 /// A line that others may have in use is listened to once, before the first read.
 Result<void> Session::listen_first() {
-  if (heard_ == Heard::line || !expects_others()) return {};
+  if (!is_rtu() || heard_ == Heard::line || !expects_others()) return {};
   heard_ = Heard::line;
   return wait_for_silence(std::max(clock_->now(), last_activity_ + options_.gap) + first_listening);
 }
@@ -457,23 +505,46 @@ bool Session::may_be_late() const {
 bool Session::take_late(const modbus::Adu& stray) {
   const TimePoint now = clock_->now();
   const bool ours = stray.unit == options_.unit;
-  if (ours ? now < past_until_ : now < others_late_until_) return true;
-  if (now >= doubtful_until_) unanswered_.clear();
-  const auto late =
-      std::find_if(unanswered_.begin(), unanswered_.end(), [&](const modbus::Adu& request) {
-        const Verdict verdict = judge(&request, stray, options_.rules);
-        return verdict == Verdict::answer || verdict == Verdict::exception_response;
-      });
-  if (late == unanswered_.end()) return false;
+  const bool expected = ours ? now < past_until_ : now < others_late_until_;
+  if (expected && is_rtu()) return true;
+  if (now >= doubtful_until_ && is_rtu()) unanswered_.clear();
+  const auto late = std::find_if(unanswered_.begin(), unanswered_.end(), [&](const auto& each) {
+    return would_answer(each.request, stray, options_.rules);
+  });
+  if (late == unanswered_.end()) return expected;
   unanswered_.erase(late);
   return true;
+}
+
+/// How many answers that were given up may still come and look like this one.
+std::size_t Session::late_ones_like(const modbus::Pdu& answer) const {
+  const modbus::Adu received{.transaction = {}, .unit = options_.unit, .pdu = answer};
+  const TimePoint now = clock_->now();
+  return static_cast<std::size_t>(
+      std::count_if(unanswered_.begin(), unanswered_.end(), [&](const auto& each) {
+        return now < each.late_until && would_answer(each.request, received, options_.rules);
+      }));
+}
+
+/// Whether an answer to another read of as many registers was given up and may still come.
+bool Session::may_be_late_to_like(const modbus::Pdu& request) const {
+  constexpr std::size_t count_at = 2;
+  const TimePoint now = clock_->now();
+  return std::any_of(unanswered_.begin(), unanswered_.end(), [&](const auto& each) {
+    const modbus::Pdu& other = each.request.pdu;
+    return now < each.late_until && each.request.unit == options_.unit &&
+           other.function == request.function && other.data.size() == request.data.size() &&
+           get_u16(other.data, count_at) == get_u16(request.data, count_at);
+  });
 }
 
 void Session::find(Evidence evidence, std::string_view what) {
   if (evidence == Evidence::noise) ++noises_;
   doubted_ = unproved_;
   decide(Decision::doubt, what);
-  if (doubt_.find(evidence, clock_->now()) && trace_.notice) trace_.notice(sentence_of(evidence));
+  if (doubt_.find(evidence, clock_->now()) && trace_.notice) {
+    trace_.notice(sentence_of(evidence, options_.rules.framing));
+  }
 }
 
 /// Bytes beside the frames: those of another master's request, or noise.
@@ -489,7 +560,11 @@ void Session::judge_noise(ByteView bytes) {
 }
 
 void Session::require_verification(TimePoint since) {
-  doubtful_until_ = since + longest_doubt * options_.answer_timeout;
+  const Duration usual = longest_doubt * options_.answer_timeout;
+  doubtful_until_ = since + (is_rtu() ? usual : std::max(usual, least_gateway_doubt));
+  // Behind a gateway there is hardly a loop-back that could tell a late answer.
+  const bool proves_by_reading = !is_rtu() && !has_ids(options_.rules) && !has_loopback();
+  if (proves_by_reading) doubt_.raise(doubtful_until_);
 }
 
 Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
@@ -499,7 +574,10 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
                           : static_cast<std::uint16_t>(next_transaction_ + 1);
   if (is_rtu() && options_.unit == modbus::UnitId{}) return tl::unexpected(everybody_error());
   Outstanding outstanding{.request = adu, .bytes = modbus::frame(options_.rules.framing, adu)};
-  auto answer = keep_gap().and_then([&] { return send_and_await(outstanding); });
+  auto answer = keep_gap().and_then([&]() -> Result<modbus::Pdu> {
+    if (out_of_step_) return tl::unexpected(*out_of_step_);
+    return send_and_await(outstanding);
+  });
   if (answer) {
     last_round_trip_ = clock_->now() - outstanding.sent;
     longest_round_trip_ = std::max(longest_round_trip_, last_round_trip_);
@@ -521,18 +599,38 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
     outstanding.deadline = std::max(outstanding.sent, last_activity_) + options_.answer_timeout;
     return await(outstanding);
   });
-  if (!is_rtu()) return answer;
+  if (has_ids(options_.rules)) return answer;
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     require_verification(*quarantined_until_);
-    buffer_.clear();
-    if (unanswered_.size() == most_unanswered) unanswered_.erase(unanswered_.begin());
-    unanswered_.push_back(outstanding.request);
+    if (is_rtu()) {
+      buffer_.clear();
+    } else {
+      check_step();
+    }
+    remember_unanswered(outstanding.request);
     const bool mistakable = !is_repeated_by_answer(outstanding.request.pdu);
-    if (mistakable) abandoned_ = outstanding.request;
+    if (mistakable && is_rtu()) abandoned_ = outstanding.request;
   }
-  learn_echo(outstanding);
+  if (is_rtu()) learn_echo(outstanding);
   return answer;
+}
+
+void Session::remember_unanswered(const modbus::Adu& request) {
+  const TimePoint now = clock_->now();
+  const auto is_over = [&](const auto& each) { return each.late_until < now; };
+  if (!is_rtu()) std::erase_if(unanswered_, is_over);
+  if (is_rtu() && unanswered_.size() == most_unanswered) unanswered_.erase(unanswered_.begin());
+  unanswered_.push_back({request, doubtful_until_});
+}
+
+/// TCP without ids: what is left of a frame would become one with the bytes of the next answer, and
+/// nothing would show it.
+void Session::check_step() {
+  if (buffer_.empty() || out_of_step_) return;
+  out_of_step_ = Error{.code = Errc::incomplete_answer,
+                       .message = "only part of an answer came, and what follows cannot be told",
+                       .hint = "the connection has to be opened anew"};
 }
 
 /// An exchange whose echo cannot be taken for its answer shows whether there is one.
@@ -666,12 +764,13 @@ Result<std::optional<modbus::Adu>> Session::take_frame(const Outstanding* outsta
     if (options_.rules.framing == modbus::Framing::tcp) {
       // Left in the buffer: every later attempt on this connection fails alike, until it is
       // reopened.
-      out_of_step_ = true;
-      if (auto foreign = foreign_framing(Framing::tcp, came_)) return tl::unexpected(*foreign);
-      return tl::unexpected(
-          Error{.code = Errc::malformed_answer,
-                .message = fmt::format("what came is not Modbus TCP: {}", junk.reason),
-                .hint = "is this a Modbus TCP port? the connection has to be opened anew"});
+      out_of_step_ = foreign_framing(Framing::tcp, came_)
+                         .value_or(Error{
+                             .code = Errc::malformed_answer,
+                             .message = fmt::format("what came is not Modbus TCP: {}", junk.reason),
+                             .hint = "is this a Modbus TCP port? the connection has to be opened "
+                                     "anew"});
+      return tl::unexpected(*out_of_step_);
     }
     counters_.noise_bytes += junk.size;
     judge_noise(ByteView(buffer_).first(junk.size));
@@ -723,8 +822,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       return;
     case Verdict::exception_response:
       decide(Decision::exception_response, received);
-      outstanding->answer = received.pdu;
-      if (is_rtu()) doubt_.remember(outstanding->request.pdu, received.pdu, clock_->now());
+      take_as_answer(received, *outstanding);
       return;
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
@@ -747,14 +845,34 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
       if (outstanding != nullptr) {
         ++outstanding->strangers;
         outstanding->stranger = describe_frame(received);
+        if (answers_with_other_id(received, *request)) outstanding->other_id = received.transaction;
       }
       return doubt_because_of(received);
   }
 }
 
-/// RTU: a frame that answered nothing.
+/// Whether it would be the answer without its id, which no request of this connection has had.
+bool Session::answers_with_other_id(const modbus::Adu& received, const modbus::Adu& request) const {
+  DemuxRules rules = options_.rules;
+  const bool can_be_ignored =
+      has_ids(rules) && rules.spontaneous.empty() && rules.units != Units::any;
+  if (!can_be_ignored || was_given(received.transaction)) return false;
+  rules.transactions = modbus::TransactionIds::ignored;
+  return would_answer(request, received, rules);
+}
+
+/// Whether a request of this connection has had the id, as far as they have not begun anew.
+bool Session::was_given(modbus::TransactionId id) const {
+  if (id.value < smallest_transaction) return false;
+  const auto behind_first = [&](std::uint16_t value) {
+    return static_cast<std::uint16_t>(value - first_transaction_) % smallest_transaction;
+  };
+  return behind_first(id.value) < behind_first(next_transaction_);
+}
+
+/// Without ids: a frame that answered nothing.
 void Session::doubt_because_of(const modbus::Adu& stray) {
-  if (!is_rtu()) return;
+  if (has_ids(options_.rules)) return;
   note_refutation(stray);
   if (take_late(stray)) return;
   doubt_.note_shape(stray.pdu);
@@ -772,9 +890,14 @@ void Session::accept(const modbus::Adu& received, Outstanding& outstanding) {
     ++outstanding.echoes;
   } else {
     decide(Decision::answer, received);
-    outstanding.answer = received.pdu;
-    if (is_rtu()) doubt_.remember(outstanding.request.pdu, received.pdu, clock_->now());
+    take_as_answer(received, outstanding);
   }
+}
+
+void Session::take_as_answer(const modbus::Adu& received, Outstanding& outstanding) {
+  outstanding.answer = received.pdu;
+  if (has_ids(options_.rules)) return;
+  doubt_.remember(outstanding.request.pdu, received.pdu, clock_->now());
 }
 
 void Session::keep(const modbus::Pdu& pdu) {
@@ -819,6 +942,10 @@ Result<void> Session::wait_for_silence(TimePoint not_before) {
                                   .hint = "another master, noise or a wrong rate?"});
     }
   }
+  if (!is_rtu()) {
+    check_step();
+    return {};
+  }
   note_noise(buffer_);
   buffer_.clear();
   return {};
@@ -831,7 +958,7 @@ void Session::note_noise(ByteView bytes) {
   judge_noise(bytes);
 }
 
-/// RTU has no ids: a late answer would be taken for the next one. Wait until it can no longer come,
+/// Without ids a late answer would be taken for the next one. Wait until it can no longer come,
 /// then prove the line.
 Result<void> Session::leave_quarantine() {
   decide(Decision::resync, "waiting until no late answer can come");
@@ -873,13 +1000,13 @@ std::uint16_t Session::fresh_word() const {
 
 /// Whether the frame has an id that only our own requests have had.
 bool Session::is_late(const modbus::Adu& stray) const {
-  return !is_rtu() && stray.transaction.value >= smallest_transaction;
+  return has_ids(options_.rules) && stray.transaction.value >= smallest_transaction;
 }
 
 /// Whether what is left may be the beginning of the answer, and not that of another frame.
 bool Session::begins_answer(const Outstanding& outstanding) const {
   const Bytes& request = outstanding.bytes;
-  if (!is_rtu()) {  // the id comes first
+  if (has_ids(options_.rules)) {  // the id comes first
     const std::size_t known = std::min<std::size_t>(buffer_.size(), 2);
     return known > 0 &&
            std::equal(request.begin(), request.begin() + static_cast<std::ptrdiff_t>(known),
@@ -941,6 +1068,12 @@ Error Session::with_evidence(Error error, const Outstanding& outstanding) const 
                      ? "is another master on the line, or does another unit answer? --verbose "
                        "shows every frame"
                      : "does another unit answer, or one too late? --verbose shows every frame";
+    if (outstanding.other_id) {
+      error.hint = fmt::format(
+          "the answer has transaction id {:04X} instead of {:04X}: for a gateway that does not "
+          "repeat ids, give transaction=ignored in the URL",
+          outstanding.other_id->value, outstanding.request.transaction.value);
+    }
   } else if (outstanding.events > 0) {
     error.message =
         fmt::format("{}, but {} meanwhile", begin, counted(outstanding.events, "event"));

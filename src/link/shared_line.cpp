@@ -22,16 +22,24 @@ class SharedLine::Share : public Transport {
   Share& operator=(const Share&) = delete;
   ~Share() override {
     const std::lock_guard lock(line_->mutex_);
-    if (opened_ == line_->opened_ && --line_->shares_ == 0) line_->transport_.reset();
+    const bool is_last = opened_ == line_->opened_ && --line_->shares_ == 0;
+    if (is_last && !line_->stays_open()) line_->transport_.reset();
   }
 
   BusLease acquire_bus() override {
     turn_ = std::unique_lock(line_->turn_);
-    return line_->left_;
+    BusLease left = line_->left_;
+    if (line_->left_by_ != opened_) left.stream.reset();  // that of a connection that is over
+    return left;
   }
   void release_bus(const BusLease& left) override {
     line_->left_.used_until = std::max(line_->left_.used_until, left.used_until);
     line_->left_.late_until = std::max(line_->left_.late_until, left.late_until);
+    if (opened_ >= line_->left_by_) {
+      line_->left_.stream = left.stream;
+      line_->left_by_ = opened_;
+    }
+    if (left.stream && left.stream->out_of_step) end_with(*left.stream->out_of_step);
     turn_.unlock();
   }
 
@@ -41,18 +49,25 @@ class SharedLine::Share : public Transport {
   }
   [[nodiscard]] TimePoint late_until() const override {
     const std::lock_guard lock(line_->mutex_);
-    return line_->transport_ ? line_->transport_->late_until() : TimePoint();
+    if (!line_->transport_) return {};
+    return std::max(line_->transport_->late_until(), line_->late_until_);
   }
   void leave_late(TimePoint until) override {
     const std::lock_guard lock(line_->mutex_);
-    if (opened_ == line_->opened_ && line_->transport_) line_->transport_->leave_late(until);
+    if (opened_ != line_->opened_ || !line_->transport_) return;
+    line_->transport_->leave_late(until);
+    if (line_->stays_ != Stays::while_shared) {
+      line_->late_until_ = std::max(line_->late_until_, until);
+    }
   }
   [[nodiscard]] bool is_private() const override {
     const std::lock_guard lock(line_->mutex_);
     return line_->transport_ && line_->transport_->is_private();
   }
+  [[nodiscard]] bool is_shared() const override { return true; }
 
   Result<void> send(ByteView bytes, TimePoint deadline) override {
+    note_answering(false);
     return transport().and_then(
         [&](Transport* open) { return judged(open->send(bytes, deadline)); });
   }
@@ -61,8 +76,10 @@ class SharedLine::Share : public Transport {
     if (!turn_.owns_lock()) {  // what comes now is for another session
       return line_->clock_->sleep_until(deadline).map([] { return std::size_t{0}; });
     }
-    return transport().and_then(
+    auto received = transport().and_then(
         [&](Transport* open) { return judged(open->receive(into, deadline)); });
+    if (received && *received > 0) note_answering(true);
+    return received;
   }
 
   void set_uninterruptible() override {}
@@ -77,11 +94,21 @@ class SharedLine::Share : public Transport {
 
   template <typename Value>
   Result<Value> judged(Result<Value> done) {
-    if (done || !ends_line(done.error())) return done;
-    const std::lock_guard lock(line_->mutex_);
-    line_->broken_ = done.error();
-    line_->transport_.reset();
+    if (!done && ends_line(done.error())) end_with(done.error());
     return done;
+  }
+
+  /// For all who share this opening.
+  void end_with(const Error& error) {
+    const std::lock_guard lock(line_->mutex_);
+    if (opened_ != line_->opened_ || !line_->transport_) return;
+    line_->broken_ = error;
+    line_->transport_.reset();
+  }
+
+  void note_answering(bool is_answering) {
+    const std::lock_guard lock(line_->mutex_);
+    line_->is_answering_ = is_answering;
   }
 
   SharedLine* line_;
@@ -96,6 +123,8 @@ Result<std::unique_ptr<Transport>> SharedLine::join(const Open& open) {
     if (!opened) return opened;
     transport_ = std::move(*opened);
     shares_ = 0;
+    is_answering_ = true;
+    late_until_ = {};
     ++opened_;
   }
   return std::make_unique<Share>(*this);

@@ -52,6 +52,9 @@ constexpr std::array kinds = {
              "wrong-unit[=N]", "the answer carries unit identifier N (77)"},
     KindInfo{FaultKind::wrong_transaction, "wrong-transaction", Argument::number, 1, 1, word_limit,
              "wrong-transaction[=N]", "the answer's transaction id is N (1) too large (TCP)"},
+    KindInfo{FaultKind::fixed_transaction, "fixed-transaction", Argument::number, 0, 0, word_limit,
+             "fixed-transaction[=N]",
+             "the answer's transaction id is N (0), whatever that of the request is (TCP)"},
     KindInfo{FaultKind::wrong_protocol, "wrong-protocol", Argument::number, 1, 0, word_limit,
              "wrong-protocol[=N]", "protocol identifier N (1) instead of 0 (TCP)"},
     KindInfo{FaultKind::wrong_echo, "wrong-echo", Argument::none, 0, 0, 0, "wrong-echo",
@@ -183,6 +186,7 @@ std::string_view to_text(FaultKind kind) { return info_of(kind).name; }
 FaultNeed need_of(FaultKind kind) {
   switch (kind) {
     case FaultKind::wrong_transaction:
+    case FaultKind::fixed_transaction:
     case FaultKind::wrong_protocol:
     case FaultKind::wrong_header_length:
       return FaultNeed::network;

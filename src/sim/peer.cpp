@@ -106,6 +106,9 @@ void spoil_addressing(modbus::Adu& adu, const ActiveFaults& active) {
   if (const Fault* fault = active.find(FaultKind::wrong_transaction)) {
     adu.transaction.value = static_cast<std::uint16_t>(adu.transaction.value + number_of(*fault));
   }
+  if (const Fault* fault = active.find(FaultKind::fixed_transaction)) {
+    adu.transaction.value = number_of(*fault);
+  }
 }
 
 void spoil_header(Bytes& bytes, const ActiveFaults& active) {

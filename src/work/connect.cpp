@@ -69,6 +69,20 @@ Result<Bytes> ask_identity(OpenTool& tool) {
       tool.target));
 }
 
+/// Without ids an answer is told by its unit, and has to come because it was asked for.
+Result<void> check_transactions(const Target& target, const catalogue::Profile& profile) {
+  const bool ignored = target.endpoint.transactions == modbus::TransactionIds::ignored;
+  const bool sends_unasked = catalogue::sends_unasked(profile);
+  if (!ignored || !(sends_unasked || profile.link.any_unit)) return {};
+  return tl::unexpected(with_target(
+      Error{.code = Errc::usage,
+            .message = fmt::format("transaction=ignored is not for a {}: {}", profile.series,
+                                   sends_unasked ? "only the id tells an answer from its events"
+                                                 : "it answers with any unit identifier"),
+            .hint = "leave it out"},
+      target));
+}
+
 /// A tool whose profile was not named: ask it, and go on with what its answer fits.
 Result<void> find_profile(OpenTool& tool, const Environment& environment) {
   auto answer = ask_identity(tool);
@@ -83,6 +97,8 @@ Result<void> find_profile(OpenTool& tool, const Environment& environment) {
                                                 fmt::join(identification->identity.notes, "; "))),
                     tool.target));
   }
+  const auto told_apart = check_transactions(tool.target, *identification->matched);
+  if (!told_apart) return tl::unexpected(told_apart.error());
   // Products that their answer does not tell apart share the register map of their common base.
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
   tool.device.use(*tool.profile, std::move(identification->identity));
@@ -151,6 +167,9 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
                                       link::SessionOptions::LateAnswers late_answers) {
   if (auto meant = check_addressing(target, profile); !meant) {
     return tl::unexpected(std::move(meant.error()));
+  }
+  if (auto told_apart = check_transactions(target, profile); !told_apart) {
+    return tl::unexpected(std::move(told_apart.error()));
   }
   device::LinkOptions options = link_options(target, profile, environment);
   options.late_answers = late_answers;

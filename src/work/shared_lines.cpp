@@ -4,26 +4,49 @@
 
 #include <utility>
 
+#include "spindle/link/reopening_transport.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/side_by_side.hpp"
+#include "spindle/work/trace.hpp"
 
 namespace spindle::work {
 
-SharedLines::SharedLines(const std::vector<Target>& targets, const Environment& environment)
-    : open_(&environment.open) {
+SharedLines::SharedLines(const std::vector<Target>& targets, const Environment& environment, Of of)
+    : environment_(&environment), of_(of) {
+  const auto stays = [&](const link::Endpoint& endpoint) {
+    if (endpoint.gateway.empty()) return link::Stays::while_shared;
+    return of == Of::gateways ? link::Stays::while_it_lives : link::Stays::while_answering;
+  };
   for (const auto& line : by_line(targets)) {
-    if (line.size() == 1) continue;
-    lines_.emplace(shared_line(targets[line.front()].endpoint),
-                   std::make_unique<link::SharedLine>(environment.clock));
+    const link::Endpoint& first = targets[line.front()].endpoint;
+    if (line.size() == 1 || (of == Of::gateways && first.gateway.empty())) continue;
+    lines_.emplace(shared_connection(first),
+                   std::make_unique<link::SharedLine>(environment.clock, stays(first)));
   }
+}
+
+/// One unit after the other cannot know that the gateway has hung up behind the one before.
+link::SharedLine::Open SharedLines::reopening(const link::Endpoint& endpoint,
+                                              const link::SharedLine::Open& open) const {
+  return [this, open, gateway = endpoint.gateway]() -> Result<std::unique_ptr<link::Transport>> {
+    auto opened = open();
+    if (!opened) return opened;
+    return std::make_unique<link::ReopeningTransport>(
+        std::move(*opened), open, environment_->clock,
+        make_trace(gateway, modbus::Framing::tcp, *environment_));
+  };
 }
 
 device::OpenTransport SharedLines::opener() {
   return [this](const link::Endpoint& endpoint, const catalogue::LinkSpec& facts,
                 Duration connect_timeout) {
-    const auto open = [&] { return (*open_)(endpoint, facts, connect_timeout); };
-    const auto line = lines_.find(shared_line(endpoint));
-    return line == lines_.end() ? open() : line->second->join(open);
+    const link::SharedLine::Open open = [open = &environment_->open, endpoint, facts,
+                                         connect_timeout] {
+      return (*open)(endpoint, facts, connect_timeout);
+    };
+    const auto line = lines_.find(shared_connection(endpoint));
+    if (line == lines_.end()) return open();
+    return line->second->join(of_ == Of::gateways ? reopening(endpoint, open) : open);
   };
 }
 
@@ -34,6 +57,7 @@ Result<void> check_same_settings(const std::vector<Target>& targets,
     return std::pair(link::serial_settings(endpoint, facts[index].serial.line), endpoint.switching);
   };
   for (const auto& line : by_line(targets)) {
+    if (!targets[line.front()].endpoint.gateway.empty()) continue;  // it sets its line itself
     for (const std::size_t index : line) {
       if (settings(index) == settings(line.front())) continue;
       return tl::unexpected(

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <utility>
 
 #include "spindle/base/text.hpp"
@@ -53,6 +55,7 @@ Result<Target> target_of_tool(const files::Tool& tool, const Environment& enviro
   if (tool.timeout) target->endpoint.timeout = tool.timeout;
   if (tool.gap) target->endpoint.gap = tool.gap;
   if (tool.retries) target->endpoint.retries = tool.retries;
+  if (tool.transactions) target->endpoint.transactions = tool.transactions;
   if (environment.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
   target->torque_unit = tool.torque_unit;
   target->verified = tool.verified;
@@ -90,6 +93,41 @@ void add_named(const std::string& name, const Environment& environment, Resoluti
   for (Result<Target>& found : named_targets(name, environment)) add(std::move(found), resolution);
 }
 
+/// Where a tool is one of several units behind a gateway, as far as its URL says so. A tool that
+/// sends unasked has a connection of its own, whatever unit it is.
+std::optional<std::string> gateway_of(const Target& target, const Environment& environment) {
+  catalogue::LinkSpec facts;
+  if (!target.profile.empty()) {
+    const auto profile = environment.profiles.load(target.profile);
+    if (!profile || catalogue::sends_unasked(*profile)) return std::nullopt;
+    facts = profile->link;
+  }
+  return link::to_url(
+      {.host = target.endpoint.host, .port = target.endpoint.port.value_or(facts.port)});
+}
+
+/// Units that are named behind one host and port share its connection.
+void share_gateways(std::vector<Target>& targets, const Environment& environment) {
+  std::map<std::string, std::vector<Target*>> hosts;
+  for (Target& target : targets) {
+    const link::Endpoint& endpoint = target.endpoint;
+    if (endpoint.medium == link::Medium::tcp && endpoint.unit) {
+      hosts[endpoint.host].push_back(&target);
+    }
+  }
+  std::map<std::string, std::vector<Target*>> gateways;
+  for (const auto& [host, units] : hosts) {
+    if (units.size() == 1) continue;
+    for (Target* unit : units) {
+      if (const auto gateway = gateway_of(*unit, environment)) gateways[*gateway].push_back(unit);
+    }
+  }
+  for (const auto& [gateway, units] : gateways) {
+    if (units.size() == 1) continue;
+    for (Target* unit : units) unit->endpoint.gateway = gateway;
+  }
+}
+
 }  // namespace
 
 Error with_target(Error error, const Target& target) {
@@ -112,6 +150,10 @@ std::string shared_line(const link::Endpoint& endpoint) {
   std::error_code unreadable;  // then the path as it is
   const auto port = std::filesystem::weakly_canonical(endpoint.device, unreadable);
   return unreadable ? endpoint.device : port.string();
+}
+
+std::string shared_connection(const link::Endpoint& endpoint) {
+  return endpoint.gateway.empty() ? shared_line(endpoint) : endpoint.gateway;
 }
 
 Error unproven(const Target& target) {
@@ -146,6 +188,7 @@ Resolution resolve_each_target(const std::vector<std::string>& texts,
           {.code = Errc::bad_file, .message = fmt::format("'{}' names no tools", text)});
     }
   }
+  share_gateways(resolution.targets, environment);
   return resolution;
 }
 

@@ -189,6 +189,24 @@ inline Reaction say(Duration after, Bytes bytes) {
   };
 }
 
+/// Answers one request after the other, and none before it is no longer held up.
+class Queue {
+ public:
+  Queue(const FakeClock& clock, TimePoint held_up_until, std::function<Bytes(ByteView)> response)
+      : clock_(&clock), free_at_(held_up_until), response_(std::move(response)) {}
+
+  std::vector<Arrival> answer(ByteView request) {
+    constexpr Duration takes = std::chrono::milliseconds(3);
+    free_at_ = std::max(free_at_, clock_->now()) + takes;
+    return {{free_at_ - clock_->now(), response_(request)}};
+  }
+
+ private:
+  const FakeClock* clock_;
+  TimePoint free_at_;
+  std::function<Bytes(ByteView)> response_;
+};
+
 inline Reaction silence() {
   return [](ByteView) { return std::vector<Arrival>(); };
 }

@@ -147,18 +147,25 @@ std::vector<Bad> bad_urls() {
       {"rtu+tcp://h:1?unit=255&reserved=false", "unit=255: unit is a number from 0 to 247",
        "units from 248 are reserved; with &reserved=true they are asked"},
       {"tcp://h?unit=250&reserved=true", "unknown option 'reserved'"},
+      {"tcp://h?transaction=0", "transaction=0: transaction is echoed or ignored"},
+      {"tcp://h?transaction=Ignored", "transaction=Ignored: transaction is echoed or ignored"},
+      {"rtu:///d?transaction=ignored", "unknown option 'transaction'"},
+      {"rtu+tcp://h:1?transaction=ignored", "unknown option 'transaction'"},
       {"tcp://h?unit", "'unit' has no value"},
       {"tcp://h?unit=1&unit=1", "'unit' is given twice"},
       {"rtu:///d?baud=9600&unit=1&baud=9600", "'baud' is given twice"},
       {"tcp://h?unti=1", "unknown option 'unti'", "did you mean 'unit'?"},
-      {"tcp://h?speed=1", "unknown option 'speed'", "here there is unit, timeout, retries"},
-      {"tcp://h?baud=9600", "unknown option 'baud'", "here there is unit, timeout, retries"},
+      {"tcp://h?speed=1", "unknown option 'speed'",
+       "here there is unit, transaction, timeout, retries"},
+      {"tcp://h?baud=9600", "unknown option 'baud'",
+       "here there is unit, transaction, timeout, retries"},
       {"sim:doga-bm?parity=even", "unknown option 'parity'",
        "here there is unit, baud, timeout, retries"},
       {"rtu+tcp://h:1?stop=1", "unknown option 'stop'"},
       {"rtu+tcp://h:1?rs485=true", "unknown option 'rs485'",
        "here there is unit, reserved, baud, gap, timeout, retries, echo"},
-      {"tcp://h?gap=5ms", "unknown option 'gap'", "here there is unit, timeout, retries"},
+      {"tcp://h?gap=5ms", "unknown option 'gap'",
+       "here there is unit, transaction, timeout, retries"},
       {"sim:doga-bm?echo=true", "unknown option 'echo'"},
       {"rtu:///d?gap=5", "gap=5: gap is a time up to 1s"},
       {"rtu:///d?gap=", "gap=: gap is a time up to 1s"},
@@ -276,4 +283,11 @@ TEST_CASE("a network endpoint becomes a URL again") {
     CAPTURE(url);
     CHECK(to_url(parse_endpoint(url).value()) == url);
   }
+}
+
+TEST_CASE("whether transaction ids tell answers apart is left to the profile unless it is said") {
+  using modbus::TransactionIds;
+  CHECK(parse_endpoint("tcp://h?unit=1")->transactions == std::nullopt);
+  CHECK(parse_endpoint("tcp://h?transaction=ignored")->transactions == TransactionIds::ignored);
+  CHECK(parse_endpoint("tcp://h?transaction=echoed")->transactions == TransactionIds::echoed);
 }

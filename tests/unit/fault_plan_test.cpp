@@ -83,6 +83,7 @@ TEST_CASE("a number that is not given is the kind's own") {
       {"split", 1},
       {"wrong-unit", 77},
       {"wrong-transaction", 1},
+      {"fixed-transaction", 0},
       {"wrong-protocol", 1},
       {"wrong-length", 1},
       {"garbage", 16},

@@ -135,6 +135,8 @@ TEST_CASE("one read over TCP, under every fault") {
           {{"wrong-unit=9"}, {{0ms, hex("8002 0000 0005 09 03 02 010F")}}},
           {{"wrong-transaction"}, {{0ms, hex("8003 0000 0005 00 03 02 010F")}}},
           {{"wrong-transaction=0x8000"}, {{0ms, hex("0002 0000 0005 00 03 02 010F")}}},
+          {{"fixed-transaction"}, {{0ms, hex("0000 0000 0005 00 03 02 010F")}}},
+          {{"fixed-transaction=7"}, {{0ms, hex("0007 0000 0005 00 03 02 010F")}}},
           {{"wrong-protocol"}, {{0ms, hex("8002 0001 0005 00 03 02 010F")}}},
           {{"wrong-echo"}, {{0ms, answer}}},
           {{"wrong-length"}, {{0ms, hex("8002 0000 0007 00 03 04 010F 0000")}}},

@@ -8,6 +8,8 @@
 #include "spindle/posix/disk.hpp"
 #include "spindle/work/connect.hpp"
 #include "spindle/work/identification.hpp"
+#include "spindle/work/shared_lines.hpp"
+#include "spindle/work/side_by_side.hpp"
 #include "support/rig.hpp"
 
 using namespace spindle;
@@ -234,4 +236,74 @@ TEST_CASE("an answer is matched against all profiles, or against one") {
   const auto foreign = match_identity(Bytes{1, 2, 3}, {}, context);
   CHECK(foreign->generation == catalogue::Generation::unknown);
   CHECK(foreign->identity.raw == Bytes{1, 2, 3});
+}
+
+// ---- gateways ----
+
+namespace {
+
+std::vector<std::string> gateways(const std::vector<std::string>& texts, Bench& bench) {
+  const auto targets = resolve_targets(texts, bench.context());
+  REQUIRE(targets.has_value());
+  std::vector<std::string> names;
+  for (const Target& target : *targets) names.push_back(target.endpoint.gateway);
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("units that are named behind one host and port share its connection") {
+  Bench bench;
+  using Names = std::vector<std::string>;
+  const auto at = [](const std::string& rest) { return "tcp://g" + rest; };
+  CHECK(gateways({at("?unit=1"), at("?unit=2"), at(":502?unit=3")}, bench) ==
+        Names{"tcp://g:502", "tcp://g:502", "tcp://g:502"});
+  CHECK(gateways({at(":1?unit=1"), at(":2?unit=1"), at(":1?unit=2"), at(":1?unit=1")}, bench) ==
+        Names{"tcp://g:1", "", "tcp://g:1"});  // the last one is the first
+  CHECK(gateways({at("?unit=1")}, bench) == Names{""});
+  CHECK(gateways({at("?unit=1"), at("")}, bench) == Names{"", ""});
+  CHECK(gateways({at("?unit=1"), "tcp://h?unit=2"}, bench) == Names{"", ""});
+  CHECK(gateways({"rtu+tcp://g:502?unit=1", at("?unit=2"), at("?unit=3")}, bench) ==
+        Names{"", "tcp://g:502", "tcp://g:502"});
+
+  const auto targets = resolve_targets({at("?unit=1"), at("?unit=2"), "tcp://h"}, bench.context());
+  CHECK(by_line(*targets) == std::vector<std::vector<std::size_t>>{{0, 1}, {2}});
+  CHECK(check_same_settings(*targets, std::vector<catalogue::LinkSpec>(3)));
+}
+
+TEST_CASE("the port of a profile counts, and what pushes its events has its own connection") {
+  Bench bench;
+  using Names = std::vector<std::string>;
+  const auto add = [&](const std::string& name, const std::string& url,
+                       const std::string& profile) {
+    bench.tools.tools.push_back({.name = name, .url = url, .profile = profile});
+  };
+  add("one", "tcp://g?unit=1", "kolver-kducer");
+  add("two", "tcp://g:502?unit=2", "kolver-kducer");
+  add("three", "tcp://g:5000?unit=3", "doga-bm");
+  add("four", "tcp://g:5000?unit=4", "doga-bm");
+  add("five", "tcp://g:5000?unit=5", "");
+  CHECK(gateways({"one", "two", "three", "four", "five"}, bench) ==
+        Names{"tcp://g:502", "tcp://g:502", "", "", ""});
+}
+
+TEST_CASE("where ids are ignored a tool must be told by its unit, and send nothing unasked") {
+  Bench bench;
+  bench.tools.tools.push_back({.name = "deaf",
+                               .url = "tcp://192.168.10.23?transaction=echoed",
+                               .profile = "doga-bm",
+                               .transactions = modbus::TransactionIds::ignored});
+  const auto target = resolve_target("deaf", bench.context());
+  CHECK(target->endpoint.transactions == modbus::TransactionIds::ignored);
+  const auto tool = open("deaf", Need::named_registers, bench);
+  REQUIRE_FALSE(tool);
+  CHECK(tool.error().code == Errc::usage);
+  CHECK(message_of(tool.error()).find("only the id tells an answer from its events") !=
+        std::string::npos);
+  CHECK(bench.opened.empty());
+  // Found out by its answer.
+  const auto found =
+      open("tcp://192.168.10.23:5000?transaction=ignored", Need::named_registers, bench);
+  REQUIRE_FALSE(found);
+  CHECK(found.error().code == Errc::usage);
 }

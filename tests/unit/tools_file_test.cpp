@@ -108,6 +108,10 @@ TEST_CASE("faults are told with their place") {
       {"tools: {a: {url: x}}\ngroups: {g: a}\n",
        "2:13: a list is expected here, not a single value"},
       {"tools: {a: {url: x}}\ngroups: {g/h: [a]}\n", "2:10: name 'g/h' is not made of the letters"},
+      {"tools:\n  a: {url: x, transaction: zero}\n",
+       "2:28: unknown transaction 'zero'; known: echoed, ignored"},
+      {"tools:\n  a: {url: x, transaction: ignore}\n",
+       "2:28: unknown transaction 'ignore'; did you mean 'ignored'?"},
       {"tools: {a: {url: x}\n", "not valid YAML here: a '}' is missing"},
       {"tools: {a: {url: x}}\n---\nmore: 1\n", "3:1: a second document has no meaning here"},
   };

@@ -92,14 +92,14 @@ inline auto fields(const UnitRange& v) {
 }
 
 inline auto fields(const LinkSpec& v) {
-  const auto& [framing, port, unit, units, max_read, max_write, max_read_bits, write_function,
-               max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect, retries, settle,
-               loopback, any_unit, word_order, byte_order, even_pairs, serial, contiguous, absent] =
-      v;
-  return std::tie(framing, port, unit, units, max_read, max_write, max_read_bits, write_function,
-                  max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect, retries,
-                  settle, loopback, any_unit, word_order, byte_order, even_pairs, serial,
-                  contiguous, absent);
+  const auto& [framing, port, unit, transactions, units, max_read, max_write, max_read_bits,
+               write_function, max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect,
+               retries, settle, loopback, any_unit, word_order, byte_order, even_pairs, serial,
+               contiguous, absent] = v;
+  return std::tie(framing, port, unit, transactions, units, max_read, max_write, max_read_bits,
+                  write_function, max_gap, busy, busy_every, busy_limit, keep_alive, answer,
+                  connect, retries, settle, loopback, any_unit, word_order, byte_order, even_pairs,
+                  serial, contiguous, absent);
 }
 
 inline auto fields(const Arming& v) {

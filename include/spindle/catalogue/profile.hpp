@@ -55,6 +55,7 @@ struct LinkSpec {
   modbus::Framing framing = modbus::Framing::tcp;
   std::uint16_t port = 502;
   std::uint8_t unit = 0;
+  modbus::TransactionIds transactions = modbus::TransactionIds::echoed;
   /// Those that the product can have; another one is asked all the same. Empty: not known.
   std::optional<UnitRange> units = std::nullopt;
   std::uint16_t max_read = 125;

@@ -10,6 +10,7 @@
 #include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
+#include "spindle/modbus/types.hpp"
 
 namespace spindle::files {
 
@@ -24,7 +25,8 @@ struct Tool {
   std::optional<Duration> timeout = std::nullopt;       ///< for one answer; else as the URL says
   std::optional<Duration> gap = std::nullopt;           ///< silence before a request; likewise
   std::optional<std::uint32_t> retries = std::nullopt;  ///< of reads; likewise
-  std::vector<std::string> verified = {};               ///< actions that were checked on this tool
+  std::optional<modbus::TransactionIds> transactions = std::nullopt;  ///< tcp; likewise
+  std::vector<std::string> verified = {};  ///< actions that were checked on this tool
   SourceLocation url_at = {};
   SourceLocation profile_at = {};
   SourceLocation verified_at = {};

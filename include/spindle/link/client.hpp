@@ -105,7 +105,8 @@ class Client {
   /// and with the device's own where the limits say where it stands: it is read right after it.
   Result<Registers> read(const RegisterRange& range);
 
-  /// One request for what reading clears: never repeated, not even where no answer came. TCP only.
+  /// One request for what reading clears: never repeated, not even where no answer came. Needs
+  /// answers with ids, as others may be proved by asking again.
   Result<Registers> read_once_ever(const RegisterRange& range);
 
   /// All wanted ranges in the fewest requests. A block that is refused with exception 02, 03 or 04

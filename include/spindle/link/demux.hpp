@@ -24,11 +24,16 @@ enum class Units : std::uint8_t {
 /// How answers are told from everything else on one connection.
 struct DemuxRules {
   /// TCP: the transaction id decides, and the unit as `units` says.
-  /// RTU: the unit identifier decides, there is no id.
+  /// RTU, and where ids are ignored: the unit identifier decides.
   modbus::Framing framing = modbus::Framing::tcp;
   std::vector<SpontaneousShape> spontaneous = {};
   Units units = Units::asked;
+  modbus::TransactionIds transactions = modbus::TransactionIds::echoed;
 };
+
+/// Whether an answer carries an id that proves whose answer it is. Else it may be a late one of the
+/// same shape.
+bool has_ids(const DemuxRules& rules);
 
 enum class Verdict : std::uint8_t {
   answer,              ///< id (or unit), function and shape fit the outstanding request

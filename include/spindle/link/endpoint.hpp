@@ -42,6 +42,9 @@ struct Endpoint {
   std::optional<unsigned> retries = std::nullopt;  ///< of reads; else the profile's
   LineSwitching switching = LineSwitching::adapter;
   LocalEcho echo = LocalEcho::automatic;
+  std::optional<modbus::TransactionIds> transactions = std::nullopt;  ///< tcp; else the profile's
+  /// tcp: names the connection that it shares with other units of one command; empty: its own.
+  std::string gateway = {};
   Claim claim = Claim::alone;
 };
 
@@ -54,7 +57,7 @@ inline constexpr Duration longest_timeout = std::chrono::minutes(10);
 inline constexpr unsigned most_retries = 100;
 inline constexpr Duration longest_gap = std::chrono::seconds(1);
 
-/// Parses tcp://HOST[:PORT][?unit=N],
+/// Parses tcp://HOST[:PORT][?unit=N&transaction=],
 /// rtu:///PATH[?unit=&reserved=&baud=&parity=&stop=&gap=&rs485=&echo=],
 /// rtu+tcp://HOST:PORT[?unit=&reserved=&baud=&gap=&echo=] and sim:PROFILE[?unit=&baud=], each also
 /// with timeout= and retries=. IPv6 addresses stand in brackets. Error `bad_target` names the part

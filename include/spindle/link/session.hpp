@@ -35,7 +35,7 @@ struct SessionOptions {
   LocalEcho echo = LocalEcho::automatic;
   /// RTU: until when others may have used the line; the first gap counts from then.
   TimePoint in_use_until = {};
-  /// RTU: whether a late answer may come that an earlier session on this line did not wait for, or
+  /// Without ids: whether a late answer may come that an earlier session did not wait for, or
   /// other clients use the line that cannot be seen.
   enum class LateAnswers : std::uint8_t { none, possible, shared };
   LateAnswers late_answers = LateAnswers::none;
@@ -76,6 +76,10 @@ struct SessionCounters {
 /// until it was quiet for a while. On a doubtful line each answer is proved: by another read that
 /// holds the same registers, by FC 08 behind it, or by the same read again. What cannot be proved
 /// is `no_answer`. That others are on the line is told once, by the trace's `notice`.
+///
+/// TCP where transaction ids are ignored: what is said of late and proved answers on RTU holds
+/// here, too, and doubt behind a timeout lasts longer. After part of a frame only a new connection
+/// helps.
 class Session {
  public:
   Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOptions options,
@@ -109,7 +113,7 @@ class Session {
   /// answer takes, because behind the answer to another master's request comes that to ours.
   Result<bool> is_undisturbed_since(const Mark& mark);
   /// TCP: whether the stream has lost its frame boundaries, so that only a new connection helps.
-  [[nodiscard]] bool is_out_of_step() const { return out_of_step_; }
+  [[nodiscard]] bool is_out_of_step() const { return out_of_step_.has_value(); }
 
   /// RTU: sends to unit 0, and keeps the pause behind it. No unit answers, so success means "sent",
   /// never "done".
@@ -167,7 +171,12 @@ class Session {
   Result<std::optional<modbus::Pdu>> prove_by_others(const modbus::Pdu& request,
                                                      const modbus::Pdu& answer,
                                                      std::vector<OtherRead> reads);
+  Result<std::optional<modbus::Pdu>> prove_by_repeating(const modbus::Pdu& request,
+                                                        const modbus::Pdu& answer);
   Result<std::optional<modbus::Pdu>> prove_by_loopback(const modbus::Pdu& answer);
+  [[nodiscard]] std::size_t late_ones_like(const modbus::Pdu& answer) const;
+  [[nodiscard]] bool may_be_late_to_like(const modbus::Pdu& request) const;
+  void remember_unanswered(const modbus::Adu& request);
   Result<modbus::Pdu> exchange_contested(const modbus::Pdu& request, const modbus::Pdu& accepted);
   void note_refutation(const modbus::Adu& stray);
   [[nodiscard]] std::vector<OtherRead> with_own_shapes(const Others& others) const;
@@ -200,6 +209,13 @@ class Session {
   Result<void> find_echo(const modbus::Pdu& request);
   Result<void> sort_buffered(Outstanding* outstanding);
   void sort(const modbus::Adu& received, Outstanding* outstanding);
+  void take_as_answer(const modbus::Adu& received, Outstanding& outstanding);
+  [[nodiscard]] bool answers_with_other_id(const modbus::Adu& received,
+                                           const modbus::Adu& request) const;
+  [[nodiscard]] bool was_given(modbus::TransactionId id) const;
+  void check_step();
+  [[nodiscard]] Transport::Stream stream() const;
+  void go_on_with(Transport::Stream stream);
   void keep(const modbus::Pdu& pdu);
   Result<void> keep_gap();
   Result<void> wait_for_silence(TimePoint not_before);
@@ -224,6 +240,7 @@ class Session {
   Bytes came_ = {};  ///< since the last request, the beginning of it as it came
   std::deque<Spontaneous> queue_ = {};
   std::function<void(const Spontaneous&)> handle_spontaneous_ = {};
+  std::uint16_t first_transaction_;  ///< of this connection
   std::uint16_t next_transaction_;
   TimePoint created_;
   TimePoint last_activity_;
@@ -234,8 +251,8 @@ class Session {
   enum class Proves : std::uint8_t { in_doubt, never } proves_ = Proves::in_doubt;
   /// RTU: the last request whose answer may still come and be mistaken.
   std::optional<modbus::Adu> abandoned_ = std::nullopt;
-  /// RTU: what was asked without an answer, as long as it may come late.
-  std::vector<modbus::Adu> unanswered_ = {};
+  /// Without ids: what was asked without an answer, as long as it may come late.
+  std::vector<Transport::Unanswered> unanswered_ = {};
   Bytes sent_ = {};  ///< the last request as it was sent
   /// RTU: until when a late answer to another session of this program may come.
   TimePoint others_late_until_ = {};
@@ -253,7 +270,7 @@ class Session {
   std::uint64_t refutations_ = 0;
   enum class Heard : std::uint8_t { nothing, line } heard_ = Heard::nothing;
   Duration longest_round_trip_ = {};
-  bool out_of_step_ = false;
+  std::optional<Error> out_of_step_ = std::nullopt;  ///< TCP: why nothing can be asked any more
   std::size_t torn_ = 0;  ///< TCP: bytes of a frame whose rest did not come in time
   LocalEcho echo_;        ///< as far as it is known
   Duration last_round_trip_ = {};

@@ -1,14 +1,19 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
+#include "spindle/modbus/types.hpp"
 
 namespace spindle::link {
 
-/// Bytes to and from one server, before a deadline. Knows nothing of Modbus.
+/// Bytes to and from one server, before a deadline. Knows nothing of what they mean.
 class Transport {
  public:
   Transport() = default;
@@ -29,10 +34,27 @@ class Transport {
   /// (disarm, stop).
   virtual void set_uninterruptible() = 0;
 
+  /// A request that was given up, and until when its answer may come.
+  struct Unanswered {
+    modbus::Adu request;
+    TimePoint late_until;
+  };
+
+  /// Where the stream of a Modbus TCP connection stands between two requests.
+  struct Stream {
+    Bytes rest = {};       ///< received, and no whole frame yet
+    std::size_t torn = 0;  ///< bytes of it that did not come in time
+    std::uint16_t first_transaction = 0;
+    std::uint16_t next_transaction = 0;
+    std::vector<Unanswered> unanswered = {};
+    std::optional<Error> out_of_step = std::nullopt;  ///< why the connection is of no use any more
+  };
+
   /// How a line is left to the others of this program who have it, too.
   struct BusLease {
     TimePoint used_until = {};  ///< when the last byte was sent or received
     TimePoint late_until = {};  ///< until when an answer may come that was given up
+    std::optional<Stream> stream = std::nullopt;  ///< empty: it has not begun, or there is none
   };
 
   /// Where others of this program have the same line: waits until none of them awaits an answer,
@@ -53,6 +75,9 @@ class Transport {
 
   /// Whether nothing but this program can be on the line.
   [[nodiscard]] virtual bool is_private() const { return false; }
+
+  /// Whether others of this program have it, too, so that it is not for one of them to open anew.
+  [[nodiscard]] virtual bool is_shared() const { return false; }
 };
 
 }  // namespace spindle::link

@@ -109,6 +109,16 @@ struct TransactionId {
   friend auto operator<=>(const TransactionId&, const TransactionId&) = default;
 };
 
+/// Modbus TCP: what the transaction ids of answers say. Some gateways do not copy them.
+enum class TransactionIds : std::uint8_t {
+  echoed,   ///< an answer has that of its request
+  ignored,  ///< nothing: an answer is told by unit, function and shape
+};
+
+/// As in profiles, tools files and URLs.
+inline constexpr auto transaction_words = enum_table<TransactionIds>(
+    {{"echoed", TransactionIds::echoed}, {"ignored", TransactionIds::ignored}});
+
 /// Function code and data, without addressing and checksum (1.1b3, section 4.1).
 struct Pdu {
   std::uint8_t function = 0;

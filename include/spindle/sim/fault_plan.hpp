@@ -22,6 +22,7 @@ enum class FaultKind : std::uint8_t {
   half,                 ///< only the first half of the frame, then nothing
   wrong_unit,           ///< unit identifier N (default 77)
   wrong_transaction,    ///< transaction id plus N (default 1)
+  fixed_transaction,    ///< transaction id N (default 0)
   wrong_protocol,       ///< MBAP protocol identifier N (default 1)
   wrong_echo,           ///< a write's echo names another value; a read's data is untouched
   wrong_length,         ///< byte count and data N (default 1) registers too long, header consistent

@@ -10,20 +10,30 @@
 
 namespace spindle::work {
 
-/// The serial lines on which several tools of one command are, so that all of them can be connected
-/// at the same time. Must outlive what it opens.
+/// The serial lines and gateways on which several tools of one command are, so that all of them can
+/// be connected at the same time. Must outlive what it opens.
 class SharedLines {
  public:
+  /// Which tools get a share.
+  enum class Of : std::uint8_t {
+    all,       ///< they are connected at the same time
+    gateways,  ///< only those, one after the other; a connection that a gateway closes is reopened
+  };
+
   /// Opens nothing. Every other target has a line of its own.
-  SharedLines(const std::vector<Target>& targets, const Environment& environment);
+  SharedLines(const std::vector<Target>& targets, const Environment& environment, Of of = Of::all);
 
   /// Like `open` of the environment; on a shared line all get a share of one opening, with the
   /// settings of the one that came first.
   [[nodiscard]] device::OpenTransport opener();
 
  private:
+  [[nodiscard]] link::SharedLine::Open reopening(const link::Endpoint& endpoint,
+                                                 const link::SharedLine::Open& open) const;
+
   std::map<std::string, std::unique_ptr<link::SharedLine>> lines_ = {};
-  const device::OpenTransport* open_;
+  const Environment* environment_;
+  Of of_;
 };
 
 /// Refuses two tools of one line that do not mean the same rate, parity and stop bits. `facts` are

@@ -26,7 +26,7 @@ std::vector<std::vector<std::size_t>> by_line(const std::vector<std::string>& li
 template <typename Item>
 std::vector<std::vector<std::size_t>> by_line(const std::vector<Item>& items) {
   std::vector<std::string> lines;
-  for (const Item& item : items) lines.push_back(shared_line(target_of(item).endpoint));
+  for (const Item& item : items) lines.push_back(shared_connection(target_of(item).endpoint));
   return by_line(lines);
 }
 
@@ -52,8 +52,9 @@ class FinishedCounter {
 
 /// Calls `handle(item)` for every item, at most `jobs` (from 1) at a time, each in a thread of its
 /// own when there are several, and returns the results in the order of the items. `target_of(item)`
-/// is the tool that it is about: the units of one serial line take turns, as only one at a time can
-/// have it. Threads share nothing that changes but the place of the next line, and `tell`.
+/// is the tool that it is about: the units of one serial line or gateway take turns, as only one at
+/// a time can have it. Threads share nothing that changes but the place of the next line, and
+/// `tell`.
 template <typename Item, typename Handle>
 auto side_by_side(const std::vector<Item>& items, std::size_t jobs, Handle handle,
                   OnFinished tell = {}) {

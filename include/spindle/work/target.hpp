@@ -63,6 +63,10 @@ Result<Target> resolve_target(const std::string& text, const Environment& enviro
 /// its own.
 std::string shared_line(const link::Endpoint& endpoint);
 
+/// The same for the units behind a gateway, too, which share one connection although each could
+/// have its own.
+std::string shared_connection(const link::Endpoint& endpoint);
+
 /// Whether a target's text names a group.
 bool names_group(std::string_view text);
 
