@@ -63,4 +63,13 @@ std::size_t plain_prefix(std::string_view text) {
   return static_cast<std::size_t>(end - text.begin());
 }
 
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const CodePoint character = first_code_point(text);
+    if (!character.well_formed) return false;
+    text.remove_prefix(character.length);
+  }
+  return true;
+}
+
 }  // namespace spindle

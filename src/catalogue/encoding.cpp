@@ -156,6 +156,18 @@ std::optional<Decimal> quotient(Sign sign, Wide dividend, int exponent, std::uin
   return narrowed(sign, whole, exponent - tens);
 }
 
+/// Exact, or nothing. What is rounded in any case has as many digits as fit.
+std::optional<Decimal> with_offset(const Encoding& encoding, const Decimal& number) {
+  const bool is_rounded = encoding.decimals || encoding.divisor != 1;
+  auto sum = number.plus(encoding.offset);
+  if (!is_rounded) return sum;
+  const int fewest = encoding.decimals.value_or(0);
+  for (int decimals = most_decimals_of_fraction; !sum && decimals >= fewest; --decimals) {
+    sum = number.with_decimals(decimals).plus(encoding.offset);
+  }
+  return sum;
+}
+
 }  // namespace
 
 bool Encoding::is_integer() const {
@@ -244,7 +256,7 @@ std::optional<Decimal> scaled(const Encoding& encoding, const Decimal& stored) {
   const auto number = encoding.divisor == 1 ? narrowed(sign, product, exponent)
                                             : quotient(sign, product, exponent, encoding.divisor);
   if (!number || encoding.offset.magnitude() == 0) return number;
-  return number->plus(encoding.offset);
+  return with_offset(encoding, *number);
 }
 
 std::optional<Decimal> unscaled(const Encoding& encoding, const Decimal& number) {

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "spindle/base/text.hpp"
+
 namespace spindle::catalogue {
 
 std::vector<std::string> to_strings(const List<Text>& texts) {
@@ -32,6 +34,15 @@ Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value) 
   }
   parameter.bits = std::move(counting);
   parameter.bits_by = {};
+  if (parameter.part.empty()) return parameter;
+  for (const BitName& name : parameter.bits) {
+    if (!same_ignoring_case(name.text, parameter.part)) continue;
+    const std::string whole(parameter.name.view().substr(
+        0, parameter.name.view().size() - parameter.part.view().size() - 1));
+    parameter.name = whole;
+    parameter.part = {};
+    return part_of(parameter, name);
+  }
   return parameter;
 }
 

@@ -181,11 +181,11 @@ std::optional<Result<Parameter>> find_bit(const Profile& profile, std::string_vi
     for (const BitName& bit : parameter.bits) {
       if (!same_ignoring_case(bit.text, name.substr(whole.size() + 1))) continue;
       if (!bit.when) return part_of(parameter, bit);
-      return tl::unexpected(
-          Error{.code = Errc::usage,
-                .message = fmt::format("which bit it is depends on {}", parameter.bits_by),
-                .hint = fmt::format("'{}' shows the names of all that are set", whole),
-                .name = std::string(name)});
+      Parameter part = parameter;
+      part.name = fmt::format("{}.{}", whole, bit.text);
+      part.title = fmt::format("{}: {}", parameter.title, bit.text);
+      part.part = bit.text;
+      return part;
     }
   }
   return std::nullopt;

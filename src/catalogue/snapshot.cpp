@@ -268,13 +268,17 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
                                 .name = parameter.name,
                                 .register_address = parameter.address.value});
   }
+  if (!wanted.value.is_number()) return {};
   return check_own_limits(parameter, number, present.minimum, present.maximum, profile);
 }
 
 /// As the profile says what has to be written before what.
 std::vector<PlannedWrite> in_order(std::vector<PlannedWrite> writes) {
   std::vector<Parameter> parameters;
-  for (const PlannedWrite& write : writes) parameters.push_back(write.parameter);
+  for (const PlannedWrite& write : writes) {
+    parameters.push_back(write.parameter);
+    parameters.back().scale_by = write.needs;
+  }
   std::vector<PlannedWrite> ordered;
   for (const std::size_t index : write_order(parameters)) {
     ordered.push_back(std::move(writes[index]));
@@ -292,6 +296,150 @@ std::optional<Skip> skip_of(const SnapshotEntry& wanted, const SnapshotEntry* pr
   if (belongs_to_one && destination == Destination::other_tool) return Skip::not_cloned;
   return std::nullopt;
 }
+
+/// A restore while it is planned.
+class Planner {
+ public:
+  Planner(const Snapshot& backup, const Snapshot& present, const Profile& profile,
+          const Selection& selection, Destination destination, UnitRule units)
+      : backup_(&backup),
+        present_(&present),
+        profile_(&profile),
+        selection_(&selection),
+        destination_(destination),
+        units_(units) {}
+
+  RestorePlan run() {
+    for (const Parameter& parameter : backup_->dangerous) {
+      if (selection_->contains(parameter)) plan_.skipped.push_back({parameter, Skip::dangerous});
+    }
+    for (const Parameter& parameter : stored_parameters(*profile_)) {
+      const SnapshotEntry* wanted = backup_->find(parameter.name);
+      if (wanted == nullptr || !selection_->contains(parameter)) continue;
+      const SnapshotEntry* now = present_->find(parameter.name);
+      if (parameter.scale_by.empty() || now == nullptr) {
+        take(parameter, *wanted, now, {});
+      } else {
+        take_scaled(parameter, *wanted, *now);
+      }
+    }
+    unit_findings_.tell(plan_.findings);
+    plan_.writes = in_order(std::move(plan_.writes));
+    return std::move(plan_);
+  }
+
+ private:
+  [[nodiscard]] Sides sides() const {
+    return destination_ == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
+  }
+
+  void take(const Parameter& parameter, const SnapshotEntry& wanted, const SnapshotEntry* now,
+            std::string_view needs) {
+    const bool comparable = units_ == UnitRule::ignored || now == nullptr ||
+                            units_of(parameter, wanted.unit, now->unit, sides()) == Units::same;
+    if (const auto skip = skip_of(wanted, now, destination_, comparable)) {
+      plan_.skipped.push_back({parameter, *skip});
+      return;
+    }
+    if (!comparable) {
+      unit_findings_.add(wanted, *now);
+      return;
+    }
+    if (auto allowed = check_write(wanted, *now, *profile_); !allowed) {
+      refuse(parameter, std::move(allowed.error()));
+    }
+    Parameter written = needs.empty() ? parameter : wanted.parameter;
+    plan_.writes.push_back(
+        {std::move(written), now->value, wanted.value, now->unit, std::string(needs)});
+  }
+
+  void refuse(const Parameter& parameter, Error finding) {
+    finding.name = parameter.name;
+    finding.register_address = parameter.address.value;
+    plan_.findings.push_back(std::move(finding));
+  }
+
+  /// Whether the plan writes what the backup has of this parameter.
+  [[nodiscard]] bool changes(std::string_view name) const {
+    const SnapshotEntry* wanted = backup_->find(name);
+    return wanted != nullptr && selection_->contains(wanted->parameter) &&
+           !skip_of(*wanted, present_->find(name), destination_, true);
+  }
+
+  /// Whether this parameter is as in the backup when the restore is done.
+  [[nodiscard]] bool will_be(std::string_view name) const {
+    const SnapshotEntry* wanted = backup_->find(name);
+    const SnapshotEntry* now = present_->find(name);
+    const bool is_equal = wanted != nullptr && now != nullptr && wanted->value == now->value;
+    return is_equal || changes(name);
+  }
+
+  /// What a step is worth when the restore is done; empty: it is not known.
+  [[nodiscard]] std::optional<Decimal> step_after(const Parameter& parameter,
+                                                  const SnapshotEntry& now) const {
+    if (!changes(parameter.scale_by)) return now.step;
+    const auto power = power_of(backup_->find(parameter.scale_by.view())->value);
+    if (!power) return std::nullopt;
+    return with_power(parameter, *power).encoding.scale;
+  }
+
+  /// A number of steps is written only where a step is worth the same; a quantity is counted anew.
+  void take_scaled(const Parameter& parameter, const SnapshotEntry& wanted,
+                   const SnapshotEntry& now) {
+    const auto step = step_after(parameter, now);
+    Parameter counted = wanted.parameter;
+    if (step) counted.encoding.scale = *step;
+    const bool is_same = wanted.step ? wanted.step == step : will_be(parameter.scale_by);
+    if (!is_same && (!wanted.step || !step)) {
+      return refuse(parameter, {.code = Errc::mismatch,
+                                .message = fmt::format("what its steps are worth is not known, "
+                                                       "which {} should say",
+                                                       parameter.scale_by)});
+    }
+    auto then = counted_as(counted, now);
+    auto after = is_same ? wanted : counted_anew(counted, wanted);
+    then.unit = step == now.step ? now.unit : wanted.unit;
+    if (!wanted.step) after.parameter.range = {};  // it is of the quantity, which is not known
+    if (after.raw.empty()) {
+      return refuse(
+          parameter,
+          {.code = Errc::mismatch,
+           .message = fmt::format("the backup has {} in steps of {}, and this tool counts in steps "
+                                  "of {}, as {} says, which cannot hold it",
+                                  with_unit(wanted.value, wanted.unit), wanted.step->to_string(),
+                                  step->to_string(), parameter.scale_by)});
+    }
+    take(parameter, after, &then, parameter.scale_by);
+  }
+
+  /// What a tool holds, with steps of another worth.
+  static SnapshotEntry counted_as(const Parameter& parameter, SnapshotEntry entry) {
+    entry.parameter = parameter;
+    if (auto value = decode_or_raw(parameter, entry.raw)) entry.value = std::move(*value);
+    return entry;
+  }
+
+  /// The same quantity in steps of another worth; without registers where they cannot hold it.
+  static SnapshotEntry counted_anew(const Parameter& parameter, SnapshotEntry entry) {
+    if (entry.value.content == Content::none) return entry;
+    Value quantity = entry.value;
+    quantity.held = {};
+    entry.raw = encode(parameter, quantity).value_or(Registers());
+    if (entry.raw.empty()) return entry;
+    entry = counted_as(parameter, std::move(entry));
+    if (entry.value.number != quantity.number) entry.raw = {};
+    return entry;
+  }
+
+  const Snapshot* backup_;
+  const Snapshot* present_;
+  const Profile* profile_;
+  const Selection* selection_;
+  Destination destination_;
+  UnitRule units_;
+  UnitFindings unit_findings_ = {};
+  RestorePlan plan_ = {};
+};
 
 }  // namespace
 
@@ -331,8 +479,10 @@ Snapshot snapshot_of_defaults(const Profile& profile) {
     auto raw = encode(parameter, {*parameter.default_value},
                       Registers(register_count(parameter.encoding)));
     if (!raw) continue;  // the loader of profiles refuses such a default
-    auto value = decode(parameter, *raw);
+    auto value = decode_or_raw(parameter, *raw);
     if (!value) continue;
+    // How many steps a default is depends on the tool.
+    if (!parameter.scale_by.empty()) value->held = {};
     std::string unit = parameter.unit == torque_unit ? std::string() : parameter.unit.to_string();
     snapshot.entries.push_back({.parameter = std::move(parameter),
                                 .raw = std::move(*raw),
@@ -408,38 +558,19 @@ std::size_t RestorePlan::count(Skip why) const {
 
 RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const Profile& profile,
                          const Selection& selection, Destination destination, UnitRule units) {
-  RestorePlan plan;
-  const Sides sides = destination == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
-  UnitFindings unit_findings;
-  for (const Parameter& parameter : backup.dangerous) {
-    if (selection.contains(parameter)) plan.skipped.push_back({parameter, Skip::dangerous});
-  }
-  for (const Parameter& parameter : stored_parameters(profile)) {
-    const SnapshotEntry* wanted = backup.find(parameter.name);
-    if (wanted == nullptr || !selection.contains(parameter)) continue;
-    const SnapshotEntry* now = present.find(parameter.name);
-    const bool comparable = units == UnitRule::ignored || now == nullptr ||
-                            units_of(parameter, wanted->unit, now->unit, sides) == Units::same;
-    if (const auto skip = skip_of(*wanted, now, destination, comparable)) {
-      plan.skipped.push_back({parameter, *skip});
-      continue;
-    }
-    if (!comparable) {
-      unit_findings.add(*wanted, *now);
-      continue;
-    }
-    auto allowed = check_write(*wanted, *now, profile);
-    if (!allowed) {
-      Error finding = std::move(allowed.error());
-      finding.name = parameter.name;
-      finding.register_address = parameter.address.value;
-      plan.findings.push_back(std::move(finding));
-    }
-    plan.writes.push_back({parameter, now->value, wanted->value, now->unit});
-  }
-  unit_findings.tell(plan.findings);
-  plan.writes = in_order(std::move(plan.writes));
-  return plan;
+  return Planner(backup, present, profile, selection, destination, units).run();
+}
+
+SnapshotEntry with_step_of(SnapshotEntry entry, const Parameter& parameter,
+                           const PlannedWrite& write) {
+  const bool is_scaled =
+      !parameter.scale_by.empty() && write.parameter.name == parameter.scale_by.view();
+  const auto power = is_scaled ? power_of(write.after) : std::nullopt;
+  if (!power) return entry;
+  entry.parameter = with_power(parameter, *power);
+  entry.step = entry.parameter.encoding.scale;
+  if (auto value = decode_or_raw(entry.parameter, entry.raw)) entry.value = std::move(*value);
+  return entry;
 }
 
 Result<void> check_own_limits(const Parameter& parameter, const Decimal& number,

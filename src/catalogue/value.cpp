@@ -8,6 +8,7 @@
 
 #include "codec.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/base/utf8.hpp"
 
 namespace spindle::catalogue {
 namespace {
@@ -15,6 +16,21 @@ namespace {
 Error fault(Errc code, const Parameter& parameter, std::string message, std::string hint = {}) {
   return {
       .code = code, .message = std::move(message), .hint = std::move(hint), .name = parameter.name};
+}
+
+/// Numbers of many zeros, as floating-point numbers may be, are shown with an exponent.
+std::string readable(const Decimal& number) {
+  constexpr int most_zeros = 12;
+  const std::string digits = std::to_string(number.magnitude());
+  const int place = static_cast<int>(digits.size()) + number.exponent();
+  const bool is_small = place <= -most_zeros;
+  const bool is_large = number.exponent() >= most_zeros;
+  if (number.magnitude() == 0 || !(is_small || is_large)) return number.to_string();
+  std::string text = number.sign() == Sign::minus ? "-" : "";
+  text += digits.front();
+  const std::string_view rest = std::string_view(digits).substr(1, digits.find_last_not_of('0'));
+  if (!rest.empty()) text.append(".").append(rest);
+  return fmt::format("{}e{}", text, place - 1);
 }
 
 const Label* label_of(const Parameter& parameter, std::int64_t number) {
@@ -160,8 +176,17 @@ bool closed_enumeration(const Parameter& parameter) {
   return !parameter.labels.empty() && !parameter.range.minimum && !parameter.range.maximum;
 }
 
-Error scale_does_not_fit(const Parameter& parameter) {
-  return fault(Errc::internal, parameter, "its scale does not fit its encoding");
+/// Of a number that has no exact value with this scale and offset, as far as 64 bits go.
+Error too_many_digits(const Parameter& parameter, const Decimal& number) {
+  return fault(Errc::bad_value, parameter,
+               fmt::format("{} with scale {} and offset {} has too many digits to be exact",
+                           readable(number), step_in_words(parameter.encoding),
+                           readable(parameter.encoding.offset)));
+}
+
+Error not_known_which(const Parameter& parameter) {
+  return fault(Errc::usage, parameter,
+               fmt::format("which bit it is depends on {}", parameter.bits_by));
 }
 
 Error beyond(const Parameter& parameter, const Decimal& number, std::string_view side,
@@ -199,7 +224,7 @@ Result<Value> decode_float(const Parameter& parameter, std::uint64_t pattern) {
   auto [number, word] = float_of(parameter.encoding.kind, pattern);
   if (!number) return none(std::move(word));
   const auto value = scaled(parameter.encoding, *number);
-  if (!value) return tl::unexpected(scale_does_not_fit(parameter));
+  if (!value) return tl::unexpected(too_many_digits(parameter, *number));
   return Value{.number = *value, .decimals = parameter.encoding.decimals};
 }
 
@@ -237,8 +262,9 @@ Result<Value> decode_number(const Parameter& parameter, RegisterView registers) 
   if (encoding.is_float()) return decode_float(parameter, pattern);
   const auto integer = stored_integer(parameter, pattern);
   if (!integer) return tl::unexpected(integer.error());
-  const auto number = scaled(encoding, Decimal(integer->sign, integer->magnitude, 0));
-  if (!number) return tl::unexpected(scale_does_not_fit(parameter));
+  const Decimal stored(integer->sign, integer->magnitude, 0);
+  const auto number = scaled(encoding, stored);
+  if (!number) return tl::unexpected(too_many_digits(parameter, stored));
   return Value{.number = *number,
                .label = words_for(parameter, plain(*integer)),
                .decimals = shown_decimals(encoding)};
@@ -247,8 +273,10 @@ Result<Value> decode_number(const Parameter& parameter, RegisterView registers) 
 Result<Registers> encode_float(const Parameter& parameter, const Decimal& number) {
   const Encoding& encoding = parameter.encoding;
   const auto stored = has_plain_scale(encoding) ? number : unscaled(encoding, number);
-  const auto pattern = stored ? float_pattern(encoding.kind, *stored) : std::nullopt;
-  if (pattern) return to_registers(encoding, *pattern);
+  if (!stored) return tl::unexpected(too_many_digits(parameter, number));
+  if (const auto pattern = float_pattern(encoding.kind, *stored)) {
+    return to_registers(encoding, *pattern);
+  }
   return tl::unexpected(fault(
       Errc::out_of_range, parameter,
       fmt::format("{} is more than {} can hold", number.to_string(), to_text(encoding.kind))));
@@ -258,16 +286,18 @@ Result<Integer> integer_for(const Parameter& parameter, const Decimal& number) {
   const Encoding& encoding = parameter.encoding;
   auto smallest = scaled(encoding, lowest(encoding));
   auto largest = scaled(encoding, highest(encoding));
-  if (!smallest || !largest) return tl::unexpected(scale_does_not_fit(parameter));
-  if (*smallest > *largest) std::swap(smallest, largest);
-  if (number < *smallest) {
+  if (encoding.scale.sign() == Sign::minus) std::swap(smallest, largest);
+  if (smallest && number < *smallest) {
     return tl::unexpected(beyond(parameter, number, "below", smallest->to_string(), "least"));
   }
-  if (number > *largest) {
+  if (largest && number > *largest) {
     return tl::unexpected(beyond(parameter, number, "above", largest->to_string(), "most"));
   }
   const auto step = nearest_step(encoding, number);
-  if (!step) return tl::unexpected(scale_does_not_fit(parameter));
+  const auto stored = step ? std::optional(Decimal(step->sign, step->magnitude, 0)) : std::nullopt;
+  if (!stored || *stored < lowest(encoding) || *stored > highest(encoding)) {
+    return tl::unexpected(too_many_digits(parameter, number));
+  }
   return *step;
 }
 
@@ -303,9 +333,10 @@ Result<Decimal> nearest(const Parameter& parameter, const Decimal& number) {
   if (!encoding.is_float()) {
     const auto integer = integer_for(parameter, number);
     if (!integer) return tl::unexpected(integer.error());
-    const auto stored = scaled(encoding, Decimal(integer->sign, integer->magnitude, 0));
-    if (!stored) return tl::unexpected(scale_does_not_fit(parameter));
-    return *stored;
+    const Decimal stored(integer->sign, integer->magnitude, 0);
+    const auto shown = scaled(encoding, stored);
+    if (!shown) return tl::unexpected(too_many_digits(parameter, stored));
+    return *shown;
   }
   const auto registers = encode_float(parameter, number);
   if (!registers) return tl::unexpected(registers.error());
@@ -397,6 +428,24 @@ Result<Value> parse_text(const Parameter& parameter, std::string_view text) {
   return decode(parameter, *registers);
 }
 
+/// Whether all texts of a value are such.
+bool is_text(const Value& value) {
+  return is_utf8(value.text) && std::all_of(value.elements.begin(), value.elements.end(), is_text);
+}
+
+std::string_view what_it_is_not(const Encoding& encoding) {
+  switch (encoding.kind) {
+    case Kind::date:
+      return "not a date";
+    case Kind::bcd:
+      return "no decimal digits";
+    case Kind::text:
+      return "not UTF-8";
+    default:
+      return "too many digits to be exact";
+  }
+}
+
 bool means_no_number(std::string_view text) {
   if (text.starts_with('-') || text.starts_with('+')) text.remove_prefix(1);
   return same_ignoring_case(text, "nan") || same_ignoring_case(text, "inf") ||
@@ -423,25 +472,6 @@ Result<Decimal> typed_number(const Parameter& parameter, std::string_view text) 
 
 }  // namespace
 
-namespace {
-
-/// Numbers of many zeros, as floating-point numbers may be, are shown with an exponent.
-std::string readable(const Decimal& number) {
-  constexpr int most_zeros = 12;
-  const std::string digits = std::to_string(number.magnitude());
-  const int place = static_cast<int>(digits.size()) + number.exponent();
-  const bool is_small = place <= -most_zeros;
-  const bool is_large = number.exponent() >= most_zeros;
-  if (number.magnitude() == 0 || !(is_small || is_large)) return number.to_string();
-  std::string text = number.sign() == Sign::minus ? "-" : "";
-  text += digits.front();
-  const std::string_view rest = std::string_view(digits).substr(1, digits.find_last_not_of('0'));
-  if (!rest.empty()) text.append(".").append(rest);
-  return fmt::format("{}e{}", text, place - 1);
-}
-
-}  // namespace
-
 std::string Value::to_string() const {
   if (!label.empty()) return label;
   switch (content) {
@@ -455,6 +485,7 @@ std::string Value::to_string() const {
       return fmt::format("{}", fmt::join(words, ","));
     }
     case Content::none:
+    case Content::raw:
       break;
   }
   return "-";
@@ -468,13 +499,35 @@ std::string Value::exact() const {
   return fmt::format("{}", fmt::join(words, ","));
 }
 
+bool Value::is_rounded() const {
+  return typed || std::any_of(elements.begin(), elements.end(),
+                              [](const Value& element) { return element.is_rounded(); });
+}
+
 bool operator==(const Value& a, const Value& b) {
-  return a.content == b.content && a.number == b.number && a.text == b.text &&
-         a.elements == b.elements;
+  // Those of another length are of a part of it, such as its low half.
+  const bool knows_registers = !a.held.empty() && a.held.size() == b.held.size();
+  if (a.content == Content::raw || b.content == Content::raw) {
+    return knows_registers && a.held == b.held;
+  }
+  if (a.content != b.content) return false;
+  switch (a.content) {
+    case Content::number:
+      return a.number == b.number && (!knows_registers || a.held == b.held);
+    case Content::text:
+      return a.text == b.text;
+    case Content::list:
+      return a.elements == b.elements;
+    case Content::none:
+    case Content::raw:
+      break;
+  }
+  return a.label == b.label;
 }
 
 Result<Value> decode(const Parameter& parameter, RegisterView registers) {
   const Encoding& encoding = parameter.encoding;
+  if (!parameter.part.empty()) return tl::unexpected(not_known_which(parameter));
   if (registers.size() != register_count(encoding)) {
     return tl::unexpected(fault(Errc::internal, parameter,
                                 fmt::format("{} registers cannot be decoded as {}",
@@ -482,13 +535,23 @@ Result<Value> decode(const Parameter& parameter, RegisterView registers) {
   }
   if (encoding.count > 1) return decode_list(parameter, registers);
   if (encoding.kind == Kind::text) {
-    return Value{.content = Content::text, .text = text_of(encoding, registers)};
+    return Value{.content = Content::text,
+                 .text = text_of(encoding, registers),
+                 .held = Registers(registers.begin(), registers.end())};
   }
   auto value = encoding.kind == Kind::date ? decode_date(parameter, registers)
                                            : decode_number(parameter, registers);
-  const bool is_none = value && value->content == Content::none && !encoding.is_part();
-  if (is_none) value->held.assign(registers.begin(), registers.end());
+  if (value && !encoding.is_part()) value->held.assign(registers.begin(), registers.end());
   return value;
+}
+
+Result<Value> decode_or_raw(const Parameter& parameter, RegisterView registers) {
+  auto value = decode(parameter, registers);
+  if (value ? is_text(*value) : value.error().code != Errc::bad_value) return value;
+  return Value{.label = fmt::format("{}: {:04X}", what_it_is_not(parameter.encoding),
+                                    fmt::join(registers, " ")),
+               .content = Content::raw,
+               .held = Registers(registers.begin(), registers.end())};
 }
 
 std::optional<std::int64_t> power_of(const Value& value) {
@@ -500,6 +563,9 @@ std::optional<std::int64_t> power_of(const Value& value) {
 }
 
 Result<Registers> encode(const Parameter& parameter, const Value& value, RegisterView present) {
+  if (!parameter.part.empty()) return tl::unexpected(not_known_which(parameter));
+  const bool is_whole = value.held.size() == register_count(parameter.encoding);
+  if (is_whole && !parameter.encoding.is_part()) return value.held;
   switch (value.content) {
     case Content::number:
       return encode_number(parameter, value.number, present);
@@ -508,7 +574,7 @@ Result<Registers> encode(const Parameter& parameter, const Value& value, Registe
     case Content::list:
       return encode_list(parameter, value, present);
     case Content::none:
-      if (value.held.size() == register_count(parameter.encoding)) return value.held;
+    case Content::raw:
       break;
   }
   return tl::unexpected(
@@ -539,6 +605,11 @@ Result<void> check_range(const Parameter& parameter, const Value& value) {
 }
 
 std::string rounding_in_words(const Parameter& parameter, const Value& value) {
+  std::vector<std::string> parts;
+  for (const Value& element : value.elements) {
+    if (element.typed) parts.push_back(rounding_in_words(parameter, element));
+  }
+  if (!parts.empty()) return fmt::format("{}", fmt::join(parts, "; "));
   if (!value.typed) return {};
   const std::string steps = parameter.encoding.is_float()
                                 ? fmt::format("not a value of {}", to_text(parameter.encoding.kind))
@@ -585,7 +656,11 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
 
 Result<Value> parse_exact_value(const Parameter& parameter, std::string_view text) {
   auto value = parse_value(parameter, text);
-  if (value && value->typed) return tl::unexpected(between_steps(parameter, *value->typed));
+  if (!value) return value;
+  if (value->typed) return tl::unexpected(between_steps(parameter, *value->typed));
+  for (const Value& element : value->elements) {
+    if (element.typed) return tl::unexpected(between_steps(parameter, *element.typed));
+  }
   return value;
 }
 

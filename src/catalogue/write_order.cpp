@@ -14,13 +14,14 @@ bool names(const List<Text>& patterns, const Parameter& parameter) {
 }
 
 bool waits_for(const Parameter& one, const Parameter& other) {
-  return names(one.after, other) || names(other.before, one);
+  const bool is_scaled_by = !one.scale_by.empty() && other.name == one.scale_by.view();
+  return is_scaled_by || names(one.after, other) || names(other.before, one);
 }
 
 /// Whether any of them says when it is written.
 bool have_order(const std::vector<Parameter>& parameters) {
   return std::any_of(parameters.begin(), parameters.end(), [](const Parameter& parameter) {
-    return !parameter.before.empty() || !parameter.after.empty();
+    return !parameter.before.empty() || !parameter.after.empty() || !parameter.scale_by.empty();
   });
 }
 

@@ -278,7 +278,8 @@ void add_set(CLI::App& app, ParseState& draft) {
   add_command(app, draft, words, draft.options.set, commands::set,
               [](Binder& bind, commands::SetOptions& options) {
                 bind.required("TARGET", options.target, target_words);
-                bind.required("NAME=VALUE", options.assignments, "what to write");
+                bind.required("NAME=VALUE", options.assignments,
+                              "what to write; a number may have its unit behind it: 1.5kW");
                 bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
                           "check and show everything, write nothing");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);

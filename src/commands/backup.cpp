@@ -66,9 +66,13 @@ class Backup final : public Verb<std::monostate, Saved> {
   Backup(const BackupOptions& options, const BackupPaths& paths)
       : options_(&options), paths_(&paths) {}
 
-  Result<Plan> plan(const catalogue::Profile& /*profile*/,
-                    const Target& /*target*/) const override {
-    return Plan();
+  Result<Plan> plan(const catalogue::Profile& profile, const Target& /*target*/) const override {
+    if (!catalogue::stored_parameters(profile).empty()) return Plan();
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message =
+            fmt::format("profile {} has no settings, so there is nothing to save", profile.id),
+        .hint = "'spindle dump' saves registers as they are"});
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& /*plan*/, Context& context) const override {

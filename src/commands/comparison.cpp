@@ -1,10 +1,12 @@
 #include "comparison.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "records.hpp"
@@ -39,19 +41,30 @@ std::string units_in_words(const Difference& difference) {
   return fmt::format("{} / {}", shown(difference.unit_a), shown(difference.unit_b));
 }
 
+/// One side. Values that differ only in decimals that are not shown have them shown, or their
+/// registers.
+report::Field side_field(std::string key, const std::optional<catalogue::Value>& value,
+                         const Difference& difference) {
+  if (!value) return {std::move(key), report::Cell(), "-"};
+  const auto& [a, b] = std::tie(difference.a, difference.b);
+  const bool looks_same =
+      a && b && difference.units == catalogue::Units::same && a->to_string() == b->to_string();
+  if (!looks_same) return {std::move(key), value_cell(*value), value->to_string()};
+  const bool has_decimals = a->exact() != b->exact() || value->held.empty();
+  if (has_decimals && value->is_number()) return {std::move(key), value->number, value->exact()};
+  if (has_decimals) return {std::move(key), value_cell(*value), value->exact()};
+  return {std::move(key), fmt::format("{} ({:04X})", value->exact(), fmt::join(value->held, " "))};
+}
+
 report::Record difference_record(const Difference& difference, const std::string& target,
                                  const Clock& clock) {
-  const auto side = [](std::string key, const std::optional<catalogue::Value>& value) {
-    return value ? report::Field{std::move(key), value_cell(*value), value->to_string()}
-                 : report::Field{std::move(key), report::Cell(), "-"};
-  };
   return {.type = "diff",
           .target = target,
           .time = clock.wall(),
           .fields = {{"name", difference.parameter.name},
                      {"register", number(difference.parameter.address.value)},
-                     side("a", difference.a),
-                     side("b", difference.b),
+                     side_field("a", difference.a, difference),
+                     side_field("b", difference.b, difference),
                      {"unit", text_or_null(units_in_words(difference))},
                      {"unit_a", text_or_null(difference.unit_a)},
                      {"unit_b", text_or_null(difference.unit_b)}}};

@@ -16,6 +16,7 @@
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/meaning.hpp"
 #include "spindle/work/register_survey.hpp"
 
 namespace spindle::commands {
@@ -89,17 +90,17 @@ Parameter unnamed(const Place& place, const Profile& profile) {
 /// The value on one side; nothing where the side does not say it: its scale may stand elsewhere.
 std::optional<catalogue::Value> value_of(const Parameter& parameter, const Registers& registers,
                                          const Image& image, const Profile& profile) {
-  Parameter meant = parameter;
-  if (!parameter.scale_by.empty()) {
-    const auto decider = profile.find(parameter.scale_by);
-    const auto power = decider ? registers_of(*decider, image) : std::nullopt;
-    const auto value = power ? catalogue::decode(*decider, *power) : Result<catalogue::Value>();
-    const auto exponent = power && value ? catalogue::power_of(*value) : std::nullopt;
-    if (!exponent) return std::nullopt;
-    meant = catalogue::with_power(std::move(meant), *exponent);
-  }
-  auto value = catalogue::decode(meant, registers);
-  return value ? std::optional(*std::move(value)) : std::nullopt;
+  const auto other = [&](std::string_view name) {
+    return profile.find(name).and_then([&](const Parameter& decider) -> Result<catalogue::Value> {
+      const auto held = registers_of(decider, image);
+      if (!held) return tl::unexpected(Error{.code = Errc::mismatch});
+      return catalogue::decode(decider, *held);
+    });
+  };
+  const auto value = catalogue::meant_by_others(parameter, other).and_then([&](const auto& meant) {
+    return catalogue::decode_or_raw(meant, registers);
+  });
+  return value ? std::optional(*value) : std::nullopt;
 }
 
 /// Every register of either side, under the name of its parameter where that is whole on a side.

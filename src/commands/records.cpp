@@ -136,6 +136,8 @@ Cell value_cell(const catalogue::Value& value) {
       }
       return texts.empty() ? Cell(numbers) : Cell(texts);
     }
+    case catalogue::Content::raw:
+      return value.label;
     case catalogue::Content::none:
       break;
   }

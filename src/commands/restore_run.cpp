@@ -40,14 +40,26 @@ std::string command_for(const Target& target, const Context& context, const std:
 }
 
 /// What the tool should hold after the restore: what it held before, with the plan laid over it.
-Snapshot expected_after(const RestoreTask& task) {
+Snapshot expected_after(const RestoreTask& task, const catalogue::Profile& profile) {
   Snapshot expected = task.present;
-  for (catalogue::SnapshotEntry& entry : expected.entries) {
-    const auto write = std::find_if(task.plan.writes.begin(), task.plan.writes.end(),
-                                    [&](const PlannedWrite& planned) {
-                                      return planned.parameter.name == entry.parameter.name;
-                                    });
-    if (write != task.plan.writes.end()) entry.value = write->after;
+  const auto entry_of = [&](std::string_view name) {
+    return std::find_if(expected.entries.begin(), expected.entries.end(),
+                        [&](const auto& entry) { return entry.parameter.name == name; });
+  };
+  for (const PlannedWrite& write : task.plan.writes) {
+    const auto entry = entry_of(write.parameter.name);
+    if (entry == expected.entries.end()) continue;
+    entry->raw = catalogue::encode(write.parameter, write.after, entry->raw).value_or(entry->raw);
+    entry->parameter = write.parameter;
+    entry->value = write.after;
+  }
+  for (const Parameter& parameter : profile.parameters) {
+    if (parameter.scale_by.empty()) continue;
+    const auto entry = entry_of(parameter.name);
+    if (entry == expected.entries.end()) continue;
+    for (const PlannedWrite& write : task.plan.writes) {
+      *entry = catalogue::with_step_of(*entry, parameter, write);
+    }
   }
   return expected;
 }
@@ -120,8 +132,18 @@ work::Step RestoreRun::write_one(const PlannedWrite& write) {
     fail(context_->interrupt.error());
     return work::Step::ended;
   }
+  if (is_missing(write.needs)) {
+    refused_.insert_or_assign(
+        &write, device::Written{device::WriteResult::refused, write.before,
+                                about(write.parameter,
+                                      fmt::format("{} was not written, which says what its steps "
+                                                  "are worth",
+                                                  write.needs))});
+    return work::Step::refused;
+  }
   device::Written written = changer_.make(write.parameter, write.before, write.after);
   if (written.done()) {
+    refused_.erase(&write);
     note(write.parameter, write.before, Ending::written, *written.now);
     progress_.advance({.what = tool_->target.shown + ": writing",
                        .done = ++counts_.written,
@@ -133,6 +155,12 @@ work::Step RestoreRun::write_one(const PlannedWrite& write) {
   if (is_refused) return work::Step::refused;
   give_up(write);
   return work::Step::ended;
+}
+
+/// Whether what a write needs was to be written, and was not.
+bool RestoreRun::is_missing(const std::string& name) const {
+  return std::any_of(refused_.begin(), refused_.end(),
+                     [&](const auto& refused) { return refused.first->parameter.name == name; });
 }
 
 void RestoreRun::give_up(const PlannedWrite& write) {
@@ -159,7 +187,8 @@ void RestoreRun::compare_everything() {
     return roll_back();
   }
   for (const Error& error : now->unreadable) fail(error);
-  const auto changed = catalogue::compare(expected_after(*task_), now->snapshot, {});
+  const auto changed =
+      catalogue::compare(expected_after(*task_, tool_->device.profile()), now->snapshot, {});
   for (const catalogue::Difference& difference : changed.differences) {
     if (changes_by_itself(difference.parameter)) continue;
     Error error = about(difference.parameter,
@@ -240,7 +269,7 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
     return;
   }
   for (std::size_t index = 0; index < readings->size(); ++index) {
-    const auto& value = (*readings)[index].value;
+    const auto value = (*readings)[index].held();
     const Value& before = task_->present.entries[index].value;
     if (!value || *value == before || changes_by_itself(parameters[index])) continue;
     Error error = about(parameters[index],

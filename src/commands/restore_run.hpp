@@ -36,6 +36,7 @@ class RestoreRun {
   Result<void> save_present();
   void write_all();
   work::Step write_one(const catalogue::PlannedWrite& write);
+  [[nodiscard]] bool is_missing(const std::string& name) const;
   /// Of a write that did not succeed.
   void give_up(const catalogue::PlannedWrite& write);
   void verify();

@@ -74,6 +74,20 @@ std::string why_skipped(const catalogue::Parameter& parameter, Skip why, const P
   return danger->effect() + (remedy.empty() ? "" : "; ") + remedy;
 }
 
+/// What is counted in steps that a write makes worth something else, and is not restored with it.
+std::vector<std::string> left_behind(const catalogue::PlannedWrite& write, const RestoreTask& task,
+                                     const Profile& profile) {
+  std::vector<std::string> names;
+  for (const catalogue::Parameter& parameter : profile.parameters) {
+    const bool is_setting = parameter.access == catalogue::Access::read_write;
+    if (!is_setting || write.parameter.name != parameter.scale_by.view()) continue;
+    const auto* entry = task.backup.find(parameter.name);
+    const bool is_restored = entry != nullptr && task.selection.contains(parameter);
+    if (!is_restored) names.push_back(parameter.name);
+  }
+  return names;
+}
+
 /// What the writes themselves bring with them, and what is not written.
 void warn_of_plan(const RestoreTask& task, const Profile& profile,
                   std::vector<std::string>& warnings) {
@@ -86,6 +100,12 @@ void warn_of_plan(const RestoreTask& task, const Profile& profile,
                     named(task.backup.find(other->parameter.name)->unit), named(other->unit)));
   }
   for (const auto& write : task.plan.writes) {
+    for (const std::string& name : left_behind(write, task, profile)) {
+      warnings.push_back(
+          fmt::format("{} will be another quantity, as {} says what its steps are "
+                      "worth",
+                      name, write.parameter.name));
+    }
     if (write.parameter.risk.empty()) continue;
     warnings.push_back(fmt::format("{}: {}", write.parameter.name, write.parameter.risk));
   }

@@ -33,8 +33,8 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
-  Result<Plan> plan(const Profile& profile, const Target& /*target*/) const override {
-    return parse_assignments(options_->assignments, profile, options_->raw)
+  Result<Plan> plan(const Profile& profile, const Target& target) const override {
+    return parse_assignments(options_->assignments, profile, target, options_->raw)
         .and_then([&](std::vector<Assignment> assignments) {
           return check_storing(options_->storing, profile).map([&] {
             return SetPlan{.assignments = std::move(assignments)};
@@ -49,6 +49,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     if (!steps) return tl::unexpected(std::move(steps.error()));
     plan.steps = std::move(*steps);
     plan.serial = serial_of(tool.device);
+    tell_other_steps(plan.steps, tool.device.profile(), tool.target, context);
     tell_roundings(plan.steps, tool.target, context);
     return plan;
   }

@@ -7,10 +7,13 @@
 #include <iterator>
 #include <utility>
 
+#include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/snapshot.hpp"
+#include "spindle/catalogue/unit.hpp"
 #include "spindle/catalogue/write_order.hpp"
 #include "spindle/work/change.hpp"
+#include "spindle/work/snapshot.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -63,8 +66,55 @@ Result<void> check_access(const Parameter& parameter, const Profile& profile, Ra
   return check_danger(parameter, profile);
 }
 
+/// Whether a unit may stand behind what is typed: a label, and a name of bits, are what they are.
+bool takes_unit(const Parameter& parameter, std::string_view text) {
+  const bool is_number = parameter.encoding.is_integer() || parameter.encoding.is_float();
+  const bool is_label = std::any_of(
+      parameter.labels.begin(), parameter.labels.end(),
+      [&](const catalogue::Label& label) { return same_ignoring_case(label.text, text); });
+  return is_number && !is_label && parameter.bits.empty();
+}
+
+/// The numbers in the unit of the parameter, and what was converted.
+Result<Assignment> with_numbers(Assignment assignment, const Target& target) {
+  const Parameter& parameter = assignment.parameter;
+  if (!takes_unit(parameter, assignment.text)) return assignment;
+  const std::string unit = unit_of(parameter, target);
+  const bool is_list = parameter.encoding.count > 1;
+  std::vector<std::string> numbers;
+  std::vector<std::string> notes;
+  for (const std::string_view text :
+       is_list ? split(assignment.text, ',') : std::vector<std::string_view>{assignment.text}) {
+    auto converted = catalogue::convert_typed(text, unit);
+    if (!converted) {
+      if (unit.empty() && parameter.unit == catalogue::torque_unit) {
+        converted.error().hint = "'torque-unit' in the tools file says the unit of a tool";
+      }
+      return tl::unexpected(std::move(converted.error()));
+    }
+    numbers.push_back(std::move(converted->text));
+    if (!converted->note.empty()) notes.push_back(std::move(converted->note));
+  }
+  assignment.text = fmt::format("{}", fmt::join(numbers, ","));
+  assignment.converted = fmt::format("{}", fmt::join(notes, ", "));
+  return assignment;
+}
+
+/// What stands behind NAME=; what is meant by some of it is known once the tool was read.
+Result<Assignment> with_value(Assignment assignment, const Target& target) {
+  return with_numbers(std::move(assignment), target).and_then([](Assignment made) {
+    const Parameter& parameter = made.parameter;
+    const bool waits = !parameter.scale_by.empty() || !parameter.part.empty();
+    if (waits) return Result<Assignment>(std::move(made));
+    return catalogue::parse_value(parameter, made.text).map([&](Value value) {
+      made.value = std::move(value);
+      return std::move(made);
+    });
+  });
+}
+
 Result<Assignment> parse_assignment(const std::string& text, const Profile& profile,
-                                    RawWrites raw) {
+                                    const Target& target, RawWrites raw) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     return tl::unexpected(Error{.code = Errc::usage,
@@ -81,21 +131,23 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
     fits.error().register_address = parameter->address.value;
     return tl::unexpected(std::move(fits.error()));
   }
-  // What is meant by it is known once the tool was read.
-  if (!parameter->scale_by.empty()) {
-    return Assignment{std::move(*parameter), {}, text.substr(equals + 1)};
-  }
-  auto value = catalogue::parse_value(*parameter, std::string_view(text).substr(equals + 1));
-  if (!value) {
-    value.error().name = parameter->name;
-    value.error().register_address = parameter->address.value;
-    return tl::unexpected(std::move(value.error()));
-  }
-  return Assignment{std::move(*parameter), std::move(*value), text.substr(equals + 1)};
+  return with_value({*parameter, {}, text.substr(equals + 1)}, target).map_error([&](Error error) {
+    error.name = parameter->name;
+    error.register_address = parameter->address.value;
+    return error;
+  });
 }
 
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
   return value ? std::optional(value->number) : std::nullopt;
+}
+
+Error assigned_twice(const Parameter& parameter) {
+  return {.code = Errc::usage,
+          .message = "its register is assigned twice",
+          .hint = "give it one value",
+          .name = parameter.name,
+          .register_address = parameter.address.value};
 }
 
 /// The tool's own limits; a parameter whose limits should exist but cannot be read is not written.
@@ -117,20 +169,44 @@ Result<void> resolve_by_tool(Assignment& assignment, const device::Reading& read
   return {};
 }
 
-/// A value cannot be counted in steps that the same command changes.
-Result<void> check_scales_stay(const std::vector<Assignment>& assignments) {
-  for (const Assignment& assignment : assignments) {
-    const catalogue::Text& power = assignment.parameter.scale_by;
-    const bool changes =
-        !power.empty() &&
-        std::any_of(assignments.begin(), assignments.end(),
-                    [&](const Assignment& other) { return other.parameter.name == power.view(); });
-    if (!changes) continue;
+/// Whether a parameter of this name is about to be changed.
+bool is_changed(const catalogue::Text& name, const std::vector<SetStep>& steps) {
+  return !name.empty() && std::any_of(steps.begin(), steps.end(), [&](const SetStep& step) {
+    return step.assignment.parameter.name == name.view() && step.changes();
+  });
+}
+
+/// What a value means is not changed by the same command: between the two writes the tool would
+/// hold, and act on, a quantity that is neither the old one nor the new one.
+Result<void> check_meanings_stay(const std::vector<Parameter>& parameters,
+                                 const std::vector<SetStep>& steps) {
+  for (std::size_t index = 0; index < parameters.size(); ++index) {
+    const Parameter& parameter = parameters[index];
+    const bool scales = is_changed(parameter.scale_by, steps);
+    const bool has_names = !parameter.part.empty() || !Decimal::parse(steps[index].assignment.text);
+    if (!scales && !(has_names && is_changed(parameter.bits_by, steps))) continue;
+    const catalogue::Text& decider = scales ? parameter.scale_by : parameter.bits_by;
     return tl::unexpected(
         Error{.code = Errc::usage,
-              .message = fmt::format("its steps are worth what {} says, which is set, too", power),
-              .hint = fmt::format("set {} first, and this one in a command behind it", power),
-              .name = assignment.parameter.name});
+              .message = scales ? fmt::format("its steps are worth what {} says, which this "
+                                              "command changes, too: between the two writes it "
+                                              "would be another quantity",
+                                              decider)
+                                : fmt::format("what its bits mean depends on {}, which this "
+                                              "command changes, too",
+                                              decider),
+              .hint = fmt::format("set {} first, and this one in a command behind it", decider),
+              .name = parameter.name});
+  }
+  return {};
+}
+
+Result<void> check_once(const std::vector<SetStep>& steps) {
+  for (auto step = steps.begin(); step != steps.end(); ++step) {
+    const bool is_twice = std::any_of(steps.begin(), step, [&](const SetStep& earlier) {
+      return catalogue::share_bits(earlier.assignment.parameter, step->assignment.parameter);
+    });
+    if (is_twice) return tl::unexpected(assigned_twice(step->assignment.parameter));
   }
   return {};
 }
@@ -156,7 +232,8 @@ Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
     const SetStep& step = now.steps[index];
     const SetStep& planned = plan.steps[index];
     const bool same =
-        step.before == planned.before && step.assignment.value == planned.assignment.value;
+        step.before == planned.before && step.assignment.value == planned.assignment.value &&
+        step.assignment.parameter.encoding.slice == planned.assignment.parameter.encoding.slice;
     if (same) continue;
     return tl::unexpected(work::changed_meanwhile(
         fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
@@ -178,8 +255,7 @@ std::string serial_of(const device::Device& device) {
 }
 
 Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device) {
-  SetPlan now;
-  for (const SetStep& step : plan.steps) now.assignments.push_back(step.assignment);
+  SetPlan now{.assignments = plan.assignments};
   auto steps = check_against_tool(now.assignments, device);
   if (!steps) return tl::unexpected(std::move(steps.error()));
   now.steps = std::move(*steps);
@@ -197,18 +273,17 @@ std::string raw_in_words(const std::vector<std::string>& assignments) {
 }
 
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
-                                                  const Profile& profile, RawWrites raw) {
+                                                  const Profile& profile, const Target& target,
+                                                  RawWrites raw) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
-    auto assignment = parse_assignment(text, profile, raw);
+    auto assignment = parse_assignment(text, profile, target, raw);
     if (!assignment) return tl::unexpected(std::move(assignment.error()));
     for (const Assignment& earlier : assignments) {
+      // Which bits these are is known once the tool was read.
+      if (!earlier.parameter.part.empty() || !assignment->parameter.part.empty()) continue;
       if (!catalogue::share_bits(earlier.parameter, assignment->parameter)) continue;
-      return tl::unexpected(Error{.code = Errc::usage,
-                                  .message = "its register is assigned twice",
-                                  .hint = "give it one value",
-                                  .name = assignment->parameter.name,
-                                  .register_address = assignment->parameter.address.value});
+      return tl::unexpected(assigned_twice(assignment->parameter));
     }
     assignments.push_back(std::move(*assignment));
   }
@@ -217,9 +292,6 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
 
 Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
                                                 device::Device& device) {
-  if (auto stay = check_scales_stay(assignments); !stay) {
-    return tl::unexpected(std::move(stay.error()));
-  }
   std::vector<Parameter> parameters;
   parameters.reserve(assignments.size());
   for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
@@ -228,14 +300,19 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   std::vector<SetStep> steps;
   for (std::size_t index = 0; index < assignments.size(); ++index) {
     const device::Reading& reading = (*readings)[index];
-    if (!reading.value) return tl::unexpected(reading.value.error());
+    const auto before = reading.held();
+    if (!before) return tl::unexpected(before.error());
     if (auto known = resolve_by_tool(assignments[index], reading); !known) {
       return tl::unexpected(std::move(known.error()));
     }
     auto allowed = check_own_limits(assignments[index], reading, device.profile());
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    steps.push_back({std::move(assignments[index]), *reading.value});
+    steps.push_back({std::move(assignments[index]), *before});
   }
+  if (auto stay = check_meanings_stay(parameters, steps); !stay) {
+    return tl::unexpected(std::move(stay.error()));
+  }
+  if (auto once = check_once(steps); !once) return tl::unexpected(std::move(once.error()));
   return in_order(std::move(steps));
 }
 
@@ -249,7 +326,7 @@ Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignm
                                       "tool, and none can be asked",
                                   .name = assignment.parameter.name});
     }
-    if (assignment.parameter.encoding.is_part()) {
+    if (assignment.parameter.encoding.is_part() || !assignment.parameter.part.empty()) {
       return tl::unexpected(Error{.code = Errc::usage,
                                   .message = "what stands beside it in its register is not known, "
                                              "and none can be asked",

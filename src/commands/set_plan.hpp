@@ -15,7 +15,8 @@ namespace spindle::commands {
 struct Assignment {
   catalogue::Parameter parameter;
   catalogue::Value value;
-  std::string text;  ///< as typed: names of bits may mean others once the tool was read
+  std::string text;            ///< as typed: names of bits may mean others once the tool was read
+  std::string converted = {};  ///< "1.5 kW is 1500 W"; empty: it was typed in its unit
 };
 
 /// One assignment with what the tool holds now.
@@ -44,9 +45,11 @@ bool is_raw(const std::string& assignment);
 /// "write @holding:4=17, of which it may not be known what it does"; empty where none is raw.
 std::string raw_in_words(const std::vector<std::string>& assignments);
 
-/// What can be known from the profile: names, access, types, ranges, and that none starts a motor.
+/// What can be known from the profile and the target's torque unit: names, access, types, units,
+/// ranges, and that none starts a motor.
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const catalogue::Profile& profile,
+                                                  const Target& target,
                                                   RawWrites raw = RawWrites::refuse);
 
 /// What only the tool can say: its present values, its own limits, and which bits have names. Reads

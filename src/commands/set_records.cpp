@@ -47,6 +47,16 @@ std::string_view effect_words(const std::optional<catalogue::Effect>& effect) {
   return "";
 }
 
+/// What was typed, also of the elements of a list that are as they were typed.
+report::Cell typed_cell(const Value& value) {
+  if (value.content != catalogue::Content::list) return *value.typed;
+  report::Numbers numbers;
+  for (const Value& element : value.elements) {
+    numbers.push_back(element.typed.value_or(element.number));
+  }
+  return numbers;
+}
+
 }  // namespace
 
 Ending ending_of(device::WriteResult result) {
@@ -83,7 +93,7 @@ report::Record change_record(const Parameter& parameter, const std::optional<Val
                     before ? before->to_string() : std::string()},
                    {"new", value_cell(now), now.to_string()},
                    {"unit", text_or_null(unit_of(parameter, target))}};
-  if (now.typed) record.fields.push_back({"typed", *now.typed});
+  if (now.is_rounded()) record.fields.push_back({"typed", typed_cell(now)});
   if (planned) {
     const bool changes = before != now;
     record.fields.push_back({"changes", changes, changes ? "yes" : "no"});
@@ -147,11 +157,30 @@ void tell_effects(const std::vector<SetStep>& steps, const Target& target, const
   }
 }
 
+void tell_other_steps(const std::vector<SetStep>& steps, const catalogue::Profile& profile,
+                      const Target& target, const Context& context) {
+  for (const SetStep& step : steps) {
+    const Parameter& changed = step.assignment.parameter;
+    for (const Parameter& parameter : profile.parameters) {
+      const bool is_meant = changed.name == parameter.scale_by.view() && step.changes() &&
+                            parameter.access == catalogue::Access::read_write;
+      if (!is_meant) continue;
+      context.renderer.note(
+          fmt::format("{}: {} will be another quantity, as {} says what its "
+                      "steps are worth",
+                      target.shown, parameter.name, changed.name));
+    }
+  }
+}
+
 void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
                     const Context& context) {
   for (const SetStep& step : steps) {
-    const auto& [parameter, value, text] = step.assignment;
-    if (!value.typed) continue;
+    const auto& [parameter, value, text, converted] = step.assignment;
+    if (!converted.empty()) {
+      context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name, converted));
+    }
+    if (!value.is_rounded()) continue;
     context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name,
                                       catalogue::rounding_in_words(parameter, value)));
   }

@@ -71,7 +71,12 @@ void tell_risks(const std::vector<SetStep>& steps, const Target& target, const C
 /// When what was written acts, where that is not at once.
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);
 
-/// Tells which values are not what was typed, because that lies between two steps.
+/// Tells what means another quantity from now on, as the steps that it is counted in change.
+void tell_other_steps(const std::vector<SetStep>& steps, const catalogue::Profile& profile,
+                      const Target& target, const Context& context);
+
+/// Tells which values are not what was typed, because that is in another unit or lies between two
+/// steps.
 void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
                     const Context& context);
 

@@ -49,7 +49,7 @@ void SetWriter::fail(const Error& error) {
 }
 
 void SetWriter::send_one(const SetStep& step) {
-  const auto& [parameter, value, text] = step.assignment;
+  const auto& [parameter, value, text, converted] = step.assignment;
   work::LoggedChange change =
       work::logged(parameter, value, value, ending_words.text(Ending::sent));
   change.old_value.reset();
@@ -74,11 +74,11 @@ work::Step SetWriter::write_one(const SetStep& step) {
     succeed(step, Ending::unchanged, *step.before);
     return work::Step::unchanged;
   }
-  const auto& [parameter, value, text] = step.assignment;
+  const auto& [parameter, value, text, converted] = step.assignment;
   device::Written written = changer_.make(parameter, *step.before, value);
   if (written.done()) {
     Value now = *written.now;
-    now.typed = value.typed;
+    if (value.is_rounded()) now = value;
     succeed(step, Ending::written, now);
     return work::Step::done;
   }
@@ -90,7 +90,7 @@ work::Step SetWriter::write_one(const SetStep& step) {
 }
 
 void SetWriter::give_up(const SetStep& step) {
-  const auto& [parameter, value, text] = step.assignment;
+  const auto& [parameter, value, text, converted] = step.assignment;
   const device::Written& written = refused_.at(&step);
   ++result_.counts.failed;
   note(step, ending_of(written.result), written.now.value_or(value));

@@ -55,7 +55,7 @@ Result<PutBackReport> Rollback::try_once(Attempt& attempt) {
   PutBackReport report{.write = write};
   const auto readings = device_->read_each({write.parameter}, Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
-  const auto& value = readings->front().value;
+  const auto value = readings->front().held();
   if (!value) {
     report.result = RollbackResult::refused;
     report.trouble = message_of(value.error());

@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "files/document_form.hpp"
 #include "files/fields.hpp"
 #include "files/identity_lines.hpp"
 #include "files/known_keys.hpp"
@@ -31,8 +32,6 @@ using catalogue::SnapshotEntry;
 using catalogue::SnapshotIdentity;
 using catalogue::Value;
 
-/// The only format there is; a later one gets a number of its own.
-constexpr std::string_view known_format = "1";
 constexpr std::string_view kind = "spindle-backup";
 constexpr std::uint64_t last_register = std::numeric_limits<std::uint16_t>::max();
 /// The longest value that any encoding has.
@@ -68,22 +67,14 @@ std::string value_in_file(const Value& value) {
   return value.is_number() ? value.exact() : quoted(value.exact());
 }
 
-/// Bytes that are no characters have no place in YAML; then the registers say it all.
-bool is_readable(std::string_view text) {
-  while (!text.empty()) {
-    const CodePoint character = first_code_point(text);
-    if (!character.well_formed) return false;
-    text.remove_prefix(character.length);
-  }
-  return true;
-}
-
 std::string line_of(const SnapshotEntry& entry) {
   std::string line =
       fmt::format("  - {{{}, raw: {}", place_of(entry.parameter), to_text(entry.raw));
-  if (is_readable(entry.value.exact())) {
+  // Bytes that are no characters have no place in YAML; then the registers say it all.
+  if (entry.value.content != catalogue::Content::raw && is_utf8(entry.value.exact())) {
     line += fmt::format(", value: {}", value_in_file(entry.value));
   }
+  if (entry.step) line += fmt::format(", step: {}", entry.step->to_string());
   if (!entry.unit.empty()) line += fmt::format(", unit: {}", scalar(entry.unit));
   if (entry.minimum) line += fmt::format(", minimum: {}", entry.minimum->to_string());
   if (entry.maximum) line += fmt::format(", maximum: {}", entry.maximum->to_string());
@@ -142,6 +133,7 @@ void read_value(const YamlNode& node, BackupLine& line, const Asked& asked) {
 constexpr Field<BackupLine> entry_fields[] = {
     custom("raw", Need::optional, "one register, or a list of them", read_raw_value),
     custom("value", Need::optional, "text", read_value),
+    field<&BackupLine::step>("step"),
     field<&BackupLine::unit>("unit"),
     field<&BackupLine::minimum>("minimum"),
     field<&BackupLine::maximum>("maximum"),
@@ -231,24 +223,6 @@ void check_count(const YamlNode& end, std::string_view key, std::optional<std::u
                fmt::format("{} lines of '{}' were written, but {} are there", *count, key, lines));
 }
 
-bool has_form(const YamlNode& document, Diagnostics& findings) {
-  if (!expect(document, YamlNode::Kind::map, findings)) return false;
-  const YamlNode* named = document.find("kind");
-  if (named == nullptr || named->text != kind) {
-    findings.add(
-        named == nullptr ? document.at : named->at,
-        fmt::format(
-            "this is no backup: it does not say 'kind: {}', as those of 'spindle backup' do",
-            kind));
-    return false;
-  }
-  const YamlNode* format = document.find("format");
-  if (format != nullptr && format->text == known_format) return true;
-  findings.add(format == nullptr ? document.at : format->at,
-               fmt::format("this version reads backups of format {}", known_format));
-  return false;
-}
-
 SourceLocation end_of(std::string_view text, std::size_t file) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   return {file, static_cast<int>(lines) + 1, 1};
@@ -256,7 +230,7 @@ SourceLocation end_of(std::string_view text, std::size_t file) {
 
 void read_document(const YamlNode& document, std::string_view text, BackupFile& file,
                    Diagnostics& findings) {
-  if (!has_form(document, findings)) return;
+  if (!has_form(document, "backup", findings)) return;
   if (document.find("end") == nullptr) {
     findings.add(end_of(text, document.at.file),
                  "the end marker is missing: the file is cut off; take another backup");
@@ -342,9 +316,19 @@ class Names {
   std::map<std::pair<modbus::RegisterTable, std::uint16_t>, const Parameter*> by_register_ = {};
 };
 
+/// Whether a text is how a bit field is shown while any of its names count.
+bool names_bits(std::string_view text, const Registers& raw, const Parameter& parameter) {
+  return std::any_of(
+      parameter.bits.begin(), parameter.bits.end(), [&](const catalogue::BitName& bit) {
+        const auto shown = catalogue::decode(catalogue::with_bits_for(parameter, bit.when), raw);
+        return shown && text == shown->label;
+      });
+}
+
 /// Whether a text says this value: its label in any case, or the same number.
 bool says(std::string_view text, const Value& value, const Parameter& parameter) {
   if (!value.label.empty() && text == value.label) return true;
+  if (names_bits(text, value.held, parameter)) return true;
   if (value.content == catalogue::Content::none) return text == no_value;
   if (!value.is_number()) return text == value.exact();
   if (const auto number = Decimal::parse(text)) return *number == value.number;
@@ -356,10 +340,12 @@ bool says(std::string_view text, const Value& value, const Parameter& parameter)
 std::optional<Registers> registers_of(const BackupLine& line, const Parameter& parameter,
                                       const SourceLocation& at, Diagnostics& findings) {
   if (!line.raw) {
+    // Of names that only count at times it is not known which bits are meant.
+    const Parameter meant = catalogue::with_bits_for(parameter, std::nullopt);
     auto registers =
-        catalogue::parse_exact_value(parameter, *line.value).and_then([&](const Value& value) {
-          return catalogue::encode(parameter, value,
-                                   Registers(catalogue::register_count(parameter.encoding)));
+        catalogue::parse_exact_value(meant, *line.value).and_then([&](const Value& value) {
+          return catalogue::encode(meant, value,
+                                   Registers(catalogue::register_count(meant.encoding)));
         });
     if (registers) return *std::move(registers);
     const std::string hint = hint_of(registers.error());
@@ -367,7 +353,7 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
                                  hint.empty() ? "" : "; ", hint));
     return std::nullopt;
   }
-  const auto value = catalogue::decode(parameter, *line.raw);
+  const auto value = catalogue::decode_or_raw(parameter, *line.raw);
   if (!value) {
     findings.add(at, fmt::format("{}: {} registers, but {} has {}", line.name, line.raw->size(),
                                  catalogue::to_text(parameter.encoding.kind),
@@ -381,6 +367,14 @@ std::optional<Registers> registers_of(const BackupLine& line, const Parameter& p
     return std::nullopt;
   }
   return line.raw;
+}
+
+/// The parameter with steps of this worth, where that is not in the profile; counted in steps where
+/// it is not known.
+Parameter with_step(Parameter parameter, const std::optional<Decimal>& step) {
+  if (step) parameter.encoding.scale = *step;
+  parameter.scale_by = {};
+  return parameter;
 }
 
 class BackupResolver {
@@ -412,16 +406,31 @@ class BackupResolver {
       snapshot_.missing.push_back({*parameter, *line.missing});
       return;
     }
-    auto raw = registers_of(line, names_.as_written(line, *parameter), line.value_at, findings_);
+    const bool has_step = line.step.has_value();
+    if (has_step && (parameter->scale_by.empty() || *line.step == Decimal(0))) {
+      findings_.add(line.at, fmt::format("{}: its steps are not worth {} in profile {}", line.name,
+                                         line.step->to_string(), snapshot_.profile));
+      return;
+    }
+    if (!has_step && !parameter->scale_by.empty() && !line.raw) {
+      findings_.add(line.at, fmt::format("{}: key 'step' is missing, which says what a step of it "
+                                         "is worth",
+                                         line.name));
+      return;
+    }
+    const Parameter meant = with_step(*parameter, line.step);
+    auto raw = registers_of(line, with_step(names_.as_written(line, *parameter), line.step),
+                            line.value_at, findings_);
     if (!raw) return;
-    auto value = catalogue::decode(*parameter, *raw);
+    auto value = catalogue::decode_or_raw(meant, *raw);
     if (!value) return;  // it has as many registers under both names
-    snapshot_.entries.push_back({.parameter = *parameter,
+    snapshot_.entries.push_back({.parameter = meant,
                                  .raw = std::move(*raw),
                                  .value = std::move(*value),
                                  .unit = line.unit,
                                  .minimum = line.minimum,
-                                 .maximum = line.maximum});
+                                 .maximum = line.maximum,
+                                 .step = line.step});
   }
 
   Names names_;

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "files/document_form.hpp"
 #include "files/fields.hpp"
 #include "files/identity_lines.hpp"
 #include "files/known_keys.hpp"
@@ -17,8 +18,6 @@
 namespace spindle::files {
 namespace {
 
-/// The only format there is; a later one gets a number of its own.
-constexpr std::string_view known_format = "1";
 constexpr std::string_view kind = "spindle-dump";
 constexpr std::size_t values_a_line = 16;
 constexpr std::size_t all_registers = 0x10000;
@@ -102,23 +101,6 @@ constexpr Field<DumpDocument> document_fields[] = {
     field<&DumpDocument::end>("end", Need::required).with(keys_of<count_fields>),
 };
 
-void check_form(const YamlNode& document, Diagnostics& findings) {
-  if (!expect(document, YamlNode::Kind::map, findings)) return;
-  const YamlNode* named = document.find("kind");
-  const YamlNode* format = document.find("format");
-  if (named == nullptr || named->text != kind) {
-    findings.add(named == nullptr ? document.at : named->at,
-                 fmt::format("this is no dump: it does not say 'kind: {}', as those of 'spindle "
-                             "dump' do",
-                             kind));
-  } else if (format == nullptr || format->text != known_format) {
-    findings.add(format == nullptr ? document.at : format->at,
-                 fmt::format("this version reads dumps of format {}", known_format));
-  } else if (document.find("end") == nullptr) {
-    findings.add(document.at, "the end marker is missing: the file is cut off; take another dump");
-  }
-}
-
 void check_count(const YamlNode& end, std::string_view key, std::optional<std::uint32_t> written,
                  std::size_t there, Diagnostics& findings) {
   if (!written || *written == there) return;
@@ -145,8 +127,11 @@ void read_runs(const YamlNode& list, Dump& dump, Diagnostics& findings) {
 }
 
 Dump read_document(const YamlNode& document, Diagnostics& findings) {
-  check_form(document, findings);
-  if (!findings.empty()) return {};
+  if (!has_form(document, "dump", findings)) return {};
+  if (document.find("end") == nullptr) {
+    findings.add(document.at, "the end marker is missing: the file is cut off; take another dump");
+    return {};
+  }
   DumpDocument parts;
   read_map(document_fields, document, parts, findings);
   if (parts.runs == nullptr || parts.end == nullptr) return {};

@@ -348,11 +348,35 @@ void check_repetition(YamlMap& map, Template& entry) {
   if (!entry.repeated) map.findings().add(map.node().at, "key 'n' needs a 'stride' above zero");
 }
 
-/// Bits that are the value's, of what was written down as a number.
-void set_nulls(Parameter& parameter) {
-  if (parameter.nulls.empty()) return;
+/// Whether a number can stand there: as the bits of an unsigned integer, or negative.
+bool fits(const catalogue::Encoding& encoding, std::uint64_t number) {
+  const auto bits =
+      16U * catalogue::register_count(encoding) / std::max<unsigned>(encoding.count, 1);
+  const unsigned width = encoding.is_part() ? encoding.slice.width : bits;
+  if (width >= 64 || number >> width == 0) return true;
+  const Decimal negative(static_cast<std::int64_t>(number));
+  if (negative.sign() == Sign::plus) return false;
+  return encoding.is_float() || negative >= catalogue::lowest(encoding);
+}
+
+/// Bits that are the value's, of what was written down as a number. Of a floating-point number it
+/// may be the number itself.
+void set_nulls(Parameter& parameter, const YamlNode& node, Diagnostics& findings) {
+  if (!parameter.encoding.is_integer() && !parameter.encoding.is_float()) return;
   std::vector<std::uint64_t> nulls;
   for (const std::uint64_t number : parameter.nulls) {
+    if (!fits(parameter.encoding, number)) {
+      const auto written = static_cast<std::int64_t>(number);
+      findings.add(node.at,
+                   fmt::format("{}: null {} does not fit {}", parameter.name,
+                               written < 0 ? std::to_string(written) : std::to_string(number),
+                               catalogue::to_text(parameter.encoding.kind)));
+      continue;
+    }
+    if (parameter.encoding.is_float()) {
+      nulls.push_back(number);
+      continue;
+    }
     const std::uint64_t pattern =
         catalogue::to_pattern(parameter.encoding, catalogue::Integer{Sign::plus, number});
     nulls.push_back(pattern);
@@ -361,12 +385,13 @@ void set_nulls(Parameter& parameter) {
 }
 
 /// What an encoding means without being told.
-void complete(Parameter& parameter) {
+void complete(Parameter& parameter, const YamlMap& map) {
   catalogue::Encoding& encoding = parameter.encoding;
   const bool is_half = encoding.kind == catalogue::Kind::u8 || encoding.kind == catalogue::Kind::i8;
   if (is_half && encoding.slice.is_whole()) encoding.slice = {0, bits_per_byte};
   if (encoding.kind == catalogue::Kind::bcd && encoding.length == 0) encoding.length = 2;
-  set_nulls(parameter);
+  const YamlNode* null = map.find("null", true);
+  if (null != nullptr && !parameter.nulls.empty()) set_nulls(parameter, *null, map.findings());
 }
 
 Template read_template(YamlMap& map, const YamlNode* group, const ProfileDraft& draft) {
@@ -377,7 +402,7 @@ Template read_template(YamlMap& map, const YamlNode* group, const ProfileDraft& 
   if (prefix != nullptr && map.node().find("name") != nullptr) entry.parameter.name = prefix->text;
   read_fields(parameter_fields, map, entry.parameter);
   read_fields(template_fields, map, entry);
-  complete(entry.parameter);
+  complete(entry.parameter, map);
   check_repetition(map, entry);
   map.finish();
   return entry;

@@ -10,7 +10,8 @@ namespace spindle::work {
 
 namespace {
 
-/// Of what is no number its text; nothing where there is no value.
+/// Of what is no number its text, or its registers where that is none; nothing where there is no
+/// value.
 std::optional<files::LoggedValue> logged_value(const catalogue::Value& value) {
   if (value.is_number()) return value.number;
   if (value.content == catalogue::Content::none) return std::nullopt;

@@ -21,31 +21,35 @@ bool is_absent(const Error& error) {
   return error.exception == static_cast<std::uint8_t>(modbus::ExceptionCode::illegal_data_address);
 }
 
-/// What a value counts in where its scale stands in another register: another tool may have
-/// another scale there.
-constexpr std::string_view steps = "steps";
+/// What one step is worth, where that stands in another register and could be read.
+std::optional<Decimal> step_of(const device::Reading& reading, const catalogue::Parameter& stored) {
+  const bool is_known = !stored.scale_by.empty() && reading.parameter.scale_by.empty();
+  return is_known ? std::optional(reading.parameter.encoding.scale) : std::nullopt;
+}
 
-/// Sorts one reading into values, holes and troubles. A value whose scale stands in another
-/// register is kept as it is stored.
+/// Sorts one reading into values, holes and troubles. A value of which it is not known what its
+/// steps are worth is kept as it is stored.
 void add(device::Reading reading, const catalogue::Parameter& stored, const Target& target,
          Secrets secrets, ToolSnapshot& taken) {
-  if (!stored.scale_by.empty() && reading.registers) {
-    reading.parameter = stored;
-    reading.parameter.unit = steps;
-    reading.value = decode(stored, *reading.registers);
+  const auto step = step_of(reading, stored);
+  if (!stored.scale_by.empty() && !step && reading.registers) {
+    reading.parameter.unit = {};
+    reading.parameter.scale_by = {};
+    reading.value = decode_or_raw(stored, *reading.registers);
   }
   const bool is_secret = reading.parameter.secrecy == catalogue::Secrecy::secret;
   if (is_secret && secrets == Secrets::leave_out) {
     taken.snapshot.missing.push_back({reading.parameter, Missing::left_out});
     return;
   }
-  if (reading.value) {
+  if (const auto held = reading.held()) {
     taken.snapshot.entries.push_back({.parameter = reading.parameter,
                                       .raw = *reading.registers,
-                                      .value = *reading.value,
+                                      .value = *held,
                                       .unit = unit_of(reading.parameter, target),
                                       .minimum = number_of(reading.minimum),
-                                      .maximum = number_of(reading.maximum)});
+                                      .maximum = number_of(reading.maximum),
+                                      .step = step});
     return;
   }
   const bool absent = is_absent(reading.value.error());

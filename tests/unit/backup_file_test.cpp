@@ -367,3 +367,114 @@ TEST_CASE("a name of another version of the profile is found by its register") {
   REQUIRE_FALSE(part.has_value());
   CHECK(part.error().message.starts_with("b.yaml:13:5: 'p300' is part of another parameter"));
 }
+
+namespace {
+
+/// A clock, a name, digits, and a power whose steps another parameter says the worth of.
+Profile hard_profile() {
+  Profile profile;
+  profile.id = "hard";
+  const auto add = [&](std::string name, std::uint16_t address, catalogue::Encoding encoding) {
+    catalogue::Parameter made;
+    made.name = std::move(name);
+    made.address = {address};
+    made.encoding = encoding;
+    made.access = catalogue::Access::read_write;
+    if (made.name == "power") made.scale_by = "exponent";
+    test::append(profile.parameters, made);
+  };
+  using catalogue::Kind;
+  add("clock", 0, {.kind = Kind::date, .date = catalogue::DateLayout::bytes});
+  add("line", 3, {.kind = Kind::text, .length = 4});
+  add("digits", 5, {.kind = Kind::bcd, .length = 2});
+  add("power", 6, {});
+  add("exponent", 7, {.kind = Kind::i16});
+  return profile;
+}
+
+std::string with_lines(const std::string& lines, std::size_t count) {
+  Snapshot empty{.time = "t", .version = "v", .target = "x", .profile = "hard", .fingerprint = "f"};
+  std::string text = render_backup(empty);
+  text.replace(text.find("parameters: []"), 14, "parameters:\n" + lines);
+  text.replace(text.find("{parameters: 0"), 14, "{parameters: " + std::to_string(count));
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("what is no value of its encoding is kept as registers, and comes back") {
+  const Profile profile = hard_profile();
+  Snapshot snapshot{
+      .time = "t", .version = "v", .target = "x", .profile = "hard", .fingerprint = "f"};
+  const auto add_raw = [&](const std::string& name, const Registers& raw) {
+    const auto parameter = profile.find(name).value();
+    snapshot.entries.push_back({.parameter = parameter,
+                                .raw = raw,
+                                .value = catalogue::decode_or_raw(parameter, raw).value()});
+  };
+  add_raw("clock", {0xFFFF, 0xFFFF, 0});
+  add_raw("line", {0x41FF, 0});
+  add_raw("digits", {0x12A4});
+  const std::string text = render_backup(snapshot);
+  CHECK(text.find(", value: ") == std::string::npos);
+  const auto loaded = load(text, profile);
+  REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
+  REQUIRE(loaded->entries.size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(loaded->entries[i].raw == snapshot.entries[i].raw);
+    CHECK(loaded->entries[i].value == snapshot.entries[i].value);
+  }
+  CHECK(render_backup(*loaded) == text);
+}
+
+TEST_CASE("a value whose steps another parameter says the worth of has that worth beside it") {
+  const Profile profile = hard_profile();
+  const auto loaded = load(
+      with_lines("  - {name: power, register: 6, raw: 50, value: 5000, step: 100, unit: W}\n", 1),
+      profile);
+  REQUIRE_MESSAGE(loaded.has_value(), describe(loaded.error()));
+  CHECK(loaded->entries[0].step == Decimal(100));
+  CHECK(loaded->entries[0].value.number == Decimal(5000));
+  const std::string again = render_backup(*loaded);
+  CAPTURE(again);
+  CHECK(again.find("{name: power, register: 6, raw: 50, value: 5000, step: 100, unit: \"W\"}") !=
+        std::string::npos);
+  const auto edited =
+      load(with_lines("  - {name: power, register: 6, value: 5100, step: 100}\n", 1), profile);
+  REQUIRE(edited.has_value());
+  CHECK(edited->entries[0].raw == Registers{51});
+
+  const auto fault = [&](const std::string& line) {
+    const auto refused = load(with_lines("  - " + line + "\n", 1), profile);
+    return refused ? std::string("none") : describe(refused.error());
+  };
+  CHECK(fault("{name: power, register: 6, value: 5100}").find("key 'step' is missing") !=
+        std::string::npos);
+  CHECK(fault("{name: power, register: 6, value: 5150, step: 100}").find("between two steps") !=
+        std::string::npos);
+  CHECK(fault("{name: digits, register: 5, raw: 1, step: 100}").find("are not worth 100") !=
+        std::string::npos);
+  CHECK(fault("{name: power, register: 6, raw: 1, step: 0}").find("are not worth 0") !=
+        std::string::npos);
+}
+
+TEST_CASE("names of bits are those that counted when the backup was made") {
+  Profile profile;
+  profile.id = "hard";
+  catalogue::Parameter word;
+  word.name = "word";
+  word.access = catalogue::Access::read_write;
+  word.bits = {{15, "always"}, {0, "start", 0}, {1, "stop", 0}, {0, "ready", 1}, {1, "start", 1}};
+  word.bits_by = "mode";
+  test::append(profile.parameters, word);
+  const auto raw_of = [&](const std::string& line) {
+    const auto loaded =
+        load(with_lines("  - {name: word, register: 0, " + line + "}\n", 1), profile);
+    return loaded ? loaded->entries[0].raw : Registers();
+  };
+  CHECK(raw_of("raw: 32769, value: start always") == Registers{32769});
+  CHECK(raw_of("raw: 32769, value: ready always") == Registers{32769});
+  CHECK(raw_of("raw: 32769, value: stop always").empty());
+  CHECK(raw_of("value: always") == Registers{32768});
+  CHECK(raw_of("value: start").empty());  // bit 0, or bit 1
+}

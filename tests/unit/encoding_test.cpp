@@ -305,3 +305,121 @@ TEST_CASE("a floating-point number that means none, as a number or as its bits")
   CHECK(decode(parameter, Registers{0x7F7F, 0xFFFF})->content == Content::none);
   CHECK(decode(parameter, Registers{0x4479, 0xC000})->to_string() == "999");
 }
+
+namespace {
+
+std::string hex(const Registers& registers) {
+  std::string text;
+  for (const std::uint16_t word : registers) text += std::to_string(word) + " ";
+  return text;
+}
+
+/// Whether registers come back as they were from what they are decoded to.
+bool comes_back(const Parameter& parameter, const Registers& registers) {
+  const auto value = decode_or_raw(parameter, registers);
+  return value && encode(parameter, *value).value_or(Registers()) == registers;
+}
+
+}  // namespace
+
+TEST_CASE("whatever stands in registers is put back to the last bit, and tells itself apart") {
+  std::mt19937_64 random(20261130);
+  const Encoding kinds[] = {
+      {.kind = Kind::u64, .scale = Decimal(20), .divisor = 32768},
+      {.kind = Kind::u64, .scale = Decimal(20), .divisor = 32768, .offset = Decimal(5, -1)},
+      {.kind = Kind::i64, .scale = Decimal(1), .divisor = 3},
+      {.kind = Kind::f64, .scale = Decimal(1), .divisor = 3},
+      {.kind = Kind::f32, .offset = Decimal(-40)},
+      {.kind = Kind::f32, .offset = Decimal(-40), .decimals = 1},
+      {.kind = Kind::f64, .offset = Decimal(1, -1)},
+      {.kind = Kind::bcd, .length = 4},
+      {.kind = Kind::date, .date = DateLayout::bytes},
+      {.kind = Kind::text, .length = 6},
+      {.kind = Kind::i16, .scale = Decimal(5, -1), .count = 3},
+  };
+  for (const Encoding& encoding : kinds) {
+    const Parameter parameter = with(encoding);
+    for (int i = 0; i < 2000; ++i) {
+      Registers registers(register_count(encoding));
+      for (std::uint16_t& word : registers) word = static_cast<std::uint16_t>(random());
+      CAPTURE(to_text(encoding.kind));
+      CAPTURE(hex(registers));
+      REQUIRE(comes_back(parameter, registers));
+      const bool is_pattern = encoding.is_integer() || encoding.is_float();
+      if (!is_pattern) continue;
+      Registers neighbour = registers;
+      neighbour.back() ^= 1U;
+      const auto one = decode_or_raw(parameter, registers);
+      const auto other = decode_or_raw(parameter, neighbour);
+      REQUIRE((one->content == Content::none || !(*one == *other)));
+    }
+  }
+}
+
+TEST_CASE(
+    "a number and an offset that have no exact sum are told, and are no fault of the program") {
+  const Parameter exact = with({.kind = Kind::f32, .offset = Decimal(-40)});
+  const auto tiny = decode(exact, Registers{0x0DA2, 0x4260});
+  REQUIRE_FALSE(tiny);
+  CHECK(tiny.error().code == Errc::bad_value);
+  CHECK(message_of(tiny.error()) ==
+        "1e-30 with scale 1 and offset -40 has too many digits to be exact");
+  CHECK(decode_or_raw(exact, Registers{0x0DA2, 0x4260})->to_string() ==
+        "too many digits to be exact: 0DA2 4260");
+  for (const std::string_view text : {"1e38", "1e-38", "123456789012345678901"}) {
+    const auto value = parse_value(exact, text);
+    REQUIRE_FALSE(value);
+    CHECK(value.error().code == Errc::bad_value);
+  }
+  // Where only some decimals are shown, the others need not be kept: the registers are.
+  const Parameter rounded = with({.kind = Kind::f32, .offset = Decimal(-40), .decimals = 1});
+  CHECK(decode(rounded, Registers{0x0DA2, 0x4260})->to_string() == "-40.0");
+
+  const Parameter wide =
+      with({.kind = Kind::u64, .scale = Decimal(1, -3), .offset = Decimal(1, -5)});
+  const auto most = decode(wide, Registers{0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF});
+  REQUIRE_FALSE(most);
+  CHECK(most.error().code == Errc::bad_value);
+  CHECK(parse_value(wide, "0.00101")->number == number("0.00101"));
+  CHECK(
+      why(wide, "18446744073709551.615") ==
+      "18446744073709551.615 with scale 0.001 and offset 0.00001 has too many digits to be exact");
+}
+
+TEST_CASE("what is no value of its encoding is raw, and equal to the same registers only") {
+  const Parameter clock = with({.kind = Kind::date, .date = DateLayout::bytes});
+  const auto broken = decode_or_raw(clock, Registers{0xFFFF, 0xFFFF, 0});
+  REQUIRE(broken);
+  CHECK(broken->content == Content::raw);
+  CHECK(broken->to_string() == "not a date: FFFF FFFF 0000");
+  CHECK(*broken == *decode_or_raw(clock, Registers{0xFFFF, 0xFFFF, 0}));
+  CHECK_FALSE(*broken == *decode_or_raw(clock, Registers{0xFFFF, 0xFFFF, 1}));
+  CHECK_FALSE(*broken == *decode_or_raw(clock, Registers{0x1A0B, 0x160A, 0x0F1E}));
+  CHECK(check_range(clock, *broken));
+  CHECK(decode_or_raw(with({.kind = Kind::bcd, .length = 2}), Registers{0x12A4})->to_string() ==
+        "no decimal digits: 12A4");
+  const Parameter text = with({.kind = Kind::text, .length = 4});
+  CHECK(decode_or_raw(text, Registers{0x41FF, 0})->to_string() == "not UTF-8: 41FF 0000");
+  CHECK(decode_or_raw(text, Registers{0x4142, 0})->to_string() == "AB");
+  // As it is typed in another character set.
+  CHECK(*parse_value(text, "A\xFF") == *decode_or_raw(text, Registers{0x41FF, 0}));
+}
+
+TEST_CASE("what means that there is no value is told apart by its words") {
+  const Parameter single = with({.kind = Kind::f32});
+  CHECK_FALSE(*decode(single, Registers{0x7FC0, 0}) == *decode(single, Registers{0x7F80, 0}));
+  CHECK(*decode(single, Registers{0x7FC0, 0}) == *decode(single, Registers{0x7FC0, 1}));
+}
+
+TEST_CASE("every element of a list that is rounded is told, and none is where it is not typed") {
+  const Parameter list = with({.kind = Kind::i16, .scale = Decimal(5, -1), .count = 3});
+  const auto value = parse_value(list, "1.1,2,3.3");
+  REQUIRE(value);
+  CHECK(value->is_rounded());
+  CHECK(rounding_in_words(list, *value) ==
+        "1.1 is between two steps of 0.5, so it is 1.0; 3.3 is between two steps of 0.5, so it is "
+        "3.5");
+  CHECK_FALSE(parse_value(list, "1,2,3.5")->is_rounded());
+  CHECK_FALSE(parse_exact_value(list, "1.1,2,3.3"));
+  CHECK(parse_exact_value(list, "1,2,3.5"));
+}

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "spindle/catalogue/meaning.hpp"
 #include "support/edit_list.hpp"
 
 using namespace spindle;
@@ -323,7 +324,30 @@ TEST_CASE("a bit by name is where its field is") {
   const auto mode = profile.find("half.mode").value();
   CHECK(mode.encoding.kind == Kind::u16);
   CHECK(mode.encoding.slice.first == 12);
-  const auto go = profile.find("moving.go");
-  REQUIRE(!go.has_value());
-  CHECK(go.error().message == "which bit it is depends on mode");
+}
+
+TEST_CASE("which bit a name means may depend on another parameter") {
+  Profile profile;
+  Parameter moving = named("moving", RegisterTable::holding, 91, Kind::u16, Access::read_write);
+  moving.bits = {{3, "go", 0, 1}, {5, "go", 1, 1}, {7, "halt", 1, 1}};
+  moving.bits_by = "mode";
+  profile.parameters = {moving};
+  const auto go = profile.find("moving.go").value();
+  // Before that is known it is never taken for the register.
+  CHECK(decode(go, Registers{8}).error().message == "which bit it is depends on mode");
+  CHECK_FALSE(encode(go, {Decimal(1)}, Registers{0}));
+  const auto while_mode = [&](const Parameter& parameter, std::int64_t mode) {
+    return meant_by_others(parameter, [&](std::string_view) { return Value{Decimal(mode)}; });
+  };
+  CHECK(while_mode(go, 0)->encoding.slice == BitSlice{3, 1});
+  CHECK(while_mode(go, 1)->encoding.slice == BitSlice{5, 1});
+  CHECK(while_mode(go, 1)->name == "moving.go");
+  const auto halt = while_mode(profile.find("moving.halt").value(), 0);
+  REQUIRE_FALSE(halt);
+  CHECK(halt.error().message == "it has no bit 'halt' while mode is 0");
+  CHECK(halt.error().hint == "it has go now");
+  const auto unread = meant_by_others(go, [](std::string_view) -> Result<Value> {
+    return tl::unexpected(Error{.code = Errc::no_answer});
+  });
+  CHECK(unread.error().code == Errc::no_answer);
 }

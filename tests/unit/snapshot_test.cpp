@@ -350,3 +350,135 @@ TEST_CASE("a pair that cannot be written is told before anything is") {
   REQUIRE(plan().findings.size() == 1);
   CHECK(plan().findings[0].status() == ExitStatus::usage);
 }
+
+namespace {
+
+/// A power that is counted in steps of 10^exponent W.
+Profile power_profile(Access of_exponent = Access::read_write) {
+  Profile profile;
+  profile.id = "power";
+  Parameter power = parameter("power", 10);
+  power.unit = "W";
+  power.scale_by = "exponent";
+  power.range = {Decimal(0), Decimal(9000)};
+  Parameter exponent = parameter("exponent", 11, of_exponent);
+  exponent.encoding.kind = Kind::i16;
+  profile.parameters = {power, exponent};
+  return profile;
+}
+
+/// What a tool holds, or a backup has of it.
+Snapshot power_snapshot(const Profile& profile, std::uint16_t raw, int exponent) {
+  Snapshot made;
+  const Parameter power = with_power(profile.find("power").value(), exponent);
+  made.entries.push_back({.parameter = power,
+                          .raw = {raw},
+                          .value = decode(power, Registers{raw}).value(),
+                          .unit = "W",
+                          .step = power.encoding.scale});
+  const Parameter decider = profile.find("exponent").value();
+  if (decider.access == Access::read_only) return made;
+  const auto word = static_cast<std::uint16_t>(exponent);
+  made.entries.push_back(
+      {.parameter = decider, .raw = {word}, .value = decode(decider, Registers{word}).value()});
+  return made;
+}
+
+std::vector<std::uint16_t> words(const RestorePlan& plan) {
+  std::vector<std::uint16_t> all;
+  for (const PlannedWrite& write : plan.writes) {
+    all.push_back(encode(write.parameter, write.after).value().front());
+  }
+  return all;
+}
+
+using Words = std::vector<std::uint16_t>;
+
+}  // namespace
+
+TEST_CASE("steps are restored behind what says what they are worth") {
+  const Profile profile = power_profile();
+  const auto plan = plan_restore(power_snapshot(profile, 50, 2), power_snapshot(profile, 7, 0),
+                                 profile, {}, Destination::other_tool);
+  CHECK(plan.findings.empty());
+  CHECK(shown(plan) == Lines{"exponent: 0 -> 2", "power: 700 -> 5000"});
+  CHECK(words(plan) == Words{2, 50});
+  CHECK(plan.writes[1].needs == "exponent");
+  // As many steps of another worth are right once they are worth the same.
+  const auto steps = plan_restore(power_snapshot(profile, 50, 2), power_snapshot(profile, 50, 0),
+                                  profile, {}, Destination::other_tool);
+  CHECK(shown(steps) == Lines{"exponent: 0 -> 2"});
+  CHECK(steps.count(Skip::equal) == 1);
+}
+
+TEST_CASE("where the worth of a step stays another one, the quantity is counted anew or refused") {
+  for (const Access access : {Access::read_write, Access::read_only}) {
+    const Profile profile = power_profile(access);
+    const Selection power = select({"power"}, {}, profile);
+    const auto plan = plan_restore(power_snapshot(profile, 50, 2), power_snapshot(profile, 7, 0),
+                                   profile, power, Destination::other_tool, UnitRule::ignored);
+    CHECK(plan.findings.empty());
+    CHECK(shown(plan) == Lines{"power: 7 -> 5000"});
+    CHECK(words(plan) == Words{5000});
+
+    const auto between = plan_restore(power_snapshot(profile, 50, 2), power_snapshot(profile, 7, 3),
+                                      profile, power, Destination::other_tool);
+    CHECK(words(between) == Words{5});
+    const auto refused = plan_restore(power_snapshot(profile, 55, 2), power_snapshot(profile, 7, 3),
+                                      profile, power, Destination::other_tool, UnitRule::ignored);
+    CHECK(refused.writes.empty());
+    REQUIRE(refused.findings.size() == 1);
+    CHECK(refused.findings[0].message ==
+          "the backup has 5500 W in steps of 100, and this tool counts in steps of 1000, as "
+          "exponent says, which cannot hold it");
+    // The range is that of the quantity.
+    const auto beyond = plan_restore(power_snapshot(profile, 91, 2), power_snapshot(profile, 7, 2),
+                                     profile, power, Destination::other_tool);
+    REQUIRE(beyond.findings.size() == 1);
+    CHECK(beyond.findings[0].code == Errc::out_of_range);
+  }
+}
+
+TEST_CASE("steps of a worth that is not known are only restored with what says it") {
+  const Profile profile = power_profile();
+  Snapshot backup = power_snapshot(profile, 50, 2);
+  backup.entries[0].step.reset();
+  const Snapshot present = power_snapshot(profile, 7, 0);
+  const auto refused = plan_restore(backup, present, profile, select({"power"}, {}, profile),
+                                    Destination::same_tool);
+  CHECK(refused.writes.empty());
+  CHECK(refused.findings.size() == 1);
+  CHECK(words(plan_restore(backup, present, profile, {}, Destination::same_tool)) == Words{2, 50});
+}
+
+TEST_CASE("an entry is read anew once the worth of its steps was written") {
+  const Profile profile = power_profile();
+  const auto plan = plan_restore(power_snapshot(profile, 7, 2), power_snapshot(profile, 7, 0),
+                                 profile, {}, Destination::other_tool);
+  REQUIRE(plan.writes.size() == 1);
+  const SnapshotEntry entry = power_snapshot(profile, 7, 0).entries[0];
+  const auto then = with_step_of(entry, profile.find("power").value(), plan.writes[0]);
+  CHECK(then.value.to_string() == "700");
+  CHECK(then.step == Decimal(100));
+  CHECK(with_step_of(entry, profile.find("exponent").value(), plan.writes[0]).value == entry.value);
+}
+
+TEST_CASE("values that are one number in 64 bits are told apart by their registers") {
+  Profile profile;
+  Parameter charge = parameter("charge", 0);
+  charge.encoding = {.kind = Kind::u64, .scale = Decimal(20), .divisor = 32768};
+  profile.parameters = {charge};
+  const auto holding = [&](const Registers& raw) {
+    Snapshot made;
+    made.entries.push_back({.parameter = charge, .raw = raw, .value = decode(charge, raw).value()});
+    return made;
+  };
+  const Snapshot backup = holding({0xFFFF, 0xFFFF, 0xFFFF, 0xFFFE});
+  const Snapshot present = holding({0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF});
+  REQUIRE(backup.entries[0].value.number == present.entries[0].value.number);
+  CHECK(compare(backup, present, {}).differences.size() == 1);
+  CHECK(compare(backup, backup, {}).differences.empty());
+  const auto plan = plan_restore(backup, present, profile, {}, Destination::same_tool);
+  REQUIRE(plan.writes.size() == 1);
+  CHECK(*encode(charge, plan.writes[0].after) == backup.entries[0].raw);
+}

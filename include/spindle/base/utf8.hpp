@@ -18,6 +18,9 @@ struct CodePoint {
 /// Substitution of Maximal Subparts").
 CodePoint first_code_point(std::string_view text);
 
+/// Whether all of a text is well-formed.
+bool is_utf8(std::string_view text);
+
 /// Appends the first character of `text`, which is `first`, or U+FFFD for what is none.
 void append_first(std::string& out, const CodePoint& first, std::string_view text);
 

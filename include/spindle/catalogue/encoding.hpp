@@ -153,8 +153,9 @@ Integer to_integer(const Encoding& encoding, std::uint64_t pattern);
 /// The other way round. Requires an integer that fits.
 std::uint64_t to_pattern(const Encoding& encoding, const Integer& integer);
 
-/// What is stored times scale and plus offset; rounded where the divisor leaves no end of decimals.
-/// Empty when it does not fit a Decimal.
+/// What is stored times scale and plus offset; rounded where the divisor leaves no end of decimals,
+/// or the offset more than fit and only some of them are shown. Empty when it does not fit a
+/// Decimal.
 std::optional<Decimal> scaled(const Encoding& encoding, const Decimal& stored);
 
 /// The integer whose scaled value is nearest, a half away from zero. Empty when it does not fit 64

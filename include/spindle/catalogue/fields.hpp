@@ -45,12 +45,13 @@ inline auto fields(const BitName& v) {
 
 inline auto fields(const Parameter& v) {
   const auto& [name, title, table, address, encoding, unit, range, except, default_value, labels,
-               bits, bits_by, notation, access, cloning, secrecy, reading, evidence, source, note,
-               effect, risk, settle, hazard, nulls, scale_by, write_address, before, after] = v;
+               bits, bits_by, part, notation, access, cloning, secrecy, reading, evidence, source,
+               note, effect, risk, settle, hazard, nulls, scale_by, write_address, before, after] =
+      v;
   return std::tie(name, title, table, address, encoding, unit, range, except, default_value, labels,
-                  bits, bits_by, notation, access, cloning, secrecy, reading, evidence, source,
-                  note, effect, risk, settle, hazard, nulls, scale_by, write_address, before,
-                  after);
+                  bits, bits_by, part, notation, access, cloning, secrecy, reading, evidence,
+                  source, note, effect, risk, settle, hazard, nulls, scale_by, write_address,
+                  before, after);
 }
 
 inline auto fields(const Slice& v) {

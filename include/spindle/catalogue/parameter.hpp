@@ -111,6 +111,9 @@ struct Parameter {
   List<Label> labels = {};
   List<BitName> bits = {};  ///< of a bit field
   Text bits_by = {};        ///< parameter whose value decides between names; may be empty
+  /// Name of the bits that are meant, where only `bits_by` says which these are: until
+  /// with_bits_for() they are all that the register holds. Empty in a profile.
+  Text part = {};
   Notation notation = Notation::decimal;
   Access access = Access::read_only;
   Cloning cloning = Cloning::allowed;
@@ -144,7 +147,8 @@ struct Parameter {
 std::vector<std::string> to_strings(const List<Text>& texts);
 
 /// The bit field with only the names that count while `bits_by` has this value; empty: not known,
-/// so only names that always count.
+/// so only names that always count. Where only a `part` is meant, that part; with its `part` still
+/// there when it does not count.
 Parameter with_bits_for(Parameter parameter, std::optional<std::int64_t> value);
 
 /// The bits of a bit field that have this name, as a parameter of their own: "control.start". Its

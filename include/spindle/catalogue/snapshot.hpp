@@ -20,6 +20,9 @@ struct SnapshotEntry {
   std::string unit = {};  ///< as shown; empty when it has none or it is not known
   std::optional<Decimal> minimum = std::nullopt;
   std::optional<Decimal> maximum = std::nullopt;
+  /// What one step was worth, where that stands in another register. Empty: the profile says it, or
+  /// it was not known, and the value is counted in steps.
+  std::optional<Decimal> step = std::nullopt;
 };
 
 /// Why a parameter has no value in a snapshot.
@@ -145,6 +148,9 @@ struct PlannedWrite {
   Value before;
   Value after;
   std::string unit = {};
+  /// Parameter that says what its steps are worth, where that is written, too; may be empty. The
+  /// value must not be written unless that was.
+  std::string needs = {};
 };
 
 struct SkippedEntry {
@@ -167,6 +173,11 @@ struct RestorePlan {
 RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const Profile& profile,
                          const Selection& selection, Destination destination,
                          UnitRule units = UnitRule::strict);
+
+/// The entry as it is read once `write` is done, where that says what its steps are worth; as it is
+/// otherwise. `parameter` is that of the profile.
+SnapshotEntry with_step_of(SnapshotEntry entry, const Parameter& parameter,
+                           const PlannedWrite& write);
 
 /// `out_of_range` when a value is outside the limits that the tool itself reports; the message
 /// names the limit and its register. An absent limit allows everything.

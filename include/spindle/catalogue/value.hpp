@@ -17,11 +17,12 @@ enum class Content : std::uint8_t {
   text,
   list,  ///< several, one behind the other
   none,  ///< the device says that there is none, or what it sends is no number
+  raw,   ///< registers that hold what the encoding does not have, and nothing else is known of it
 };
 
 /// A decoded value: an exact number with its label when the parameter is an enumeration that names
 /// it, the names of its bits ("M1 FWD") when it is a bit field, or "30h" when it is a code; a text;
-/// or none, with a label that says why ("NaN").
+/// none, with a label that says why ("NaN"); or raw, with a label such as "not a date: FFFF 0000".
 struct Value {
   Decimal number = {};
   std::string label = {};  ///< empty when there is none
@@ -32,10 +33,13 @@ struct Value {
   std::vector<Value> elements = {};
   /// What was typed, where the nearest step is another number.
   std::optional<Decimal> typed = std::nullopt;
-  /// Of `none`: what stood there, so that it can be put back.
-  std::vector<std::uint16_t> held = {};
+  /// The registers that it was decoded from: they tell values apart that a number of 64 bits does
+  /// not, and are what is put back. Empty where they are not known, or hold more than the value.
+  Registers held = {};
 
   [[nodiscard]] bool is_number() const { return content == Content::number; }
+  /// Whether it, or one of its elements, is another number than was typed.
+  [[nodiscard]] bool is_rounded() const;
   /// The number with the decimals that are shown.
   [[nodiscard]] Decimal shown_number() const {
     return decimals ? number.with_decimals(*decimals) : number;
@@ -44,7 +48,7 @@ struct Value {
   [[nodiscard]] std::string to_string() const;
   /// Enough to make the same value of it again: the number with all its decimals.
   [[nodiscard]] std::string exact() const;
-  /// Of what is stored, however it is shown.
+  /// Of what is stored, however it is shown: of numbers also the registers, where both are known.
   friend bool operator==(const Value& a, const Value& b);
 };
 
@@ -52,10 +56,14 @@ struct Value {
 /// Error `bad_value` where they hold what the encoding does not have, such as a BCD digit above 9.
 Result<Value> decode(const Parameter& parameter, RegisterView registers);
 
+/// The same, but registers that hold what the encoding does not have, and bytes that are no
+/// characters, are a value that is raw. Error `internal` only.
+Result<Value> decode_or_raw(const Parameter& parameter, RegisterView registers);
+
 /// The power of ten that a value stands for; empty: it is no number, or a power that no scale has.
 std::optional<std::int64_t> power_of(const Value& value);
 
-/// Value to registers, exact. A value that is none and came from registers is what they held.
+/// Value to registers, exact. A value that was decoded from registers is what they held.
 /// `present` is what they hold now: needed where only some of their bits
 /// are the value's. Error `bad_value` when the number lies between two steps of the scale, or there
 /// is none, `out_of_range` when it does not fit the encoding.
@@ -72,7 +80,8 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text);
 /// other number may be meant.
 Result<Value> parse_exact_value(const Parameter& parameter, std::string_view text);
 
-/// "2.715 is between two steps of 0.01, so it is 2.72": of a value that was rounded.
+/// "2.715 is between two steps of 0.01, so it is 2.72": of a value that was rounded; of each
+/// element of a list that was.
 std::string rounding_in_words(const Parameter& parameter, const Value& value);
 
 /// `out_of_range` when the number is outside; the message names limit and `whose` ("of the

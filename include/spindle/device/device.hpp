@@ -50,6 +50,13 @@ struct Reading {
   std::optional<catalogue::Value> minimum = std::nullopt;
   std::optional<catalogue::Value> maximum = std::nullopt;
   std::optional<Error> limits_error = std::nullopt;
+  /// What cannot be shown as a value of the encoding; see catalogue::decode_or_raw().
+  std::optional<catalogue::Value> raw = std::nullopt;
+
+  /// The value, or what can be written over and put back all the same.
+  [[nodiscard]] Result<catalogue::Value> held() const {
+    return raw ? Result<catalogue::Value>(*raw) : value;
+  }
 };
 
 enum class Limits : std::uint8_t { skip, read };

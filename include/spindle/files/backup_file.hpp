@@ -25,6 +25,7 @@ struct BackupLine {
   std::string unit = {};
   std::optional<Decimal> minimum = std::nullopt;
   std::optional<Decimal> maximum = std::nullopt;
+  std::optional<Decimal> step = std::nullopt;                ///< see catalogue::SnapshotEntry
   std::optional<catalogue::Missing> missing = std::nullopt;  ///< why there is no value
   SourceLocation at = {};
   SourceLocation value_at = {};
