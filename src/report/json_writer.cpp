@@ -53,6 +53,12 @@ struct AppendCell {
 
 }  // namespace
 
+std::string to_json(const Record& record) {
+  std::string text;
+  append_json(text, record);
+  return text;
+}
+
 void append_json(std::string& out, const Record& record) {
   out += R"({"schema":"spindle/1","type":)";
   append_json_string(out, record.type);
