@@ -253,6 +253,7 @@ class Completer {
     if (kind == "WHEN") values = candidates_of(color_words);
     if (kind == "NUMBERING") values = candidates_of(files::numbering_words);
     if (kind == "TABLE") values = candidates_of(modbus::table_words);
+    if (kind == "KIND") values = candidates_of(catalogue::event_kind_words);
     if (kind == "NAME|FILE") values = profiles();
     if (kind == "FAULT") values = faults();
     if (kind == "OUTAGE") values = outages();

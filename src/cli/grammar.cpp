@@ -87,6 +87,12 @@ struct AllOptions {
   commands::RestoreOptions restore;
   commands::SimulateOptions simulate;
   bool check_tools = false;
+  commands::ResultsOptions results;
+  commands::StoreOptions store;
+  commands::StoreOptions store_check;
+  commands::TrimOptions store_trim;
+  commands::CopyOptions store_backup;
+  commands::CopyOptions store_export;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
   commands::ProfileNameOptions profile_show;
@@ -864,15 +870,155 @@ void add_tools(CLI::App& app, ParseState& draft) {
               });
 }
 
+constexpr std::string_view store_words =
+    "the store (default events.db in the user's folder of state)";
+
+std::string results_words() {
+  return "Nothing is asked of a tool: results are those that 'spindle record' stored. TARGET is "
+         "the "
+         "name\n"
+         "that a tool had then; without one all of the store is meant. Times (--since, --until, "
+         "and\n"
+         "--before of store trim):\n"
+         "  now, today, yesterday       and 'yesterday 14:00'\n"
+         "  30min, 2h, 3d, 2w           before now\n"
+         "  14:00, 2026-11-30           in the zone of this computer; a day is its beginning\n"
+         "  2026-11-30T14:00:00Z        ISO 8601, with or without a zone\n"
+         "\n"
+         "A terminal shows the newest 100 events of a store that was not asked for anything\n"
+         "particular, in its own time; what is piped is everything, in UTC. CSV has every field "
+         "and\n"
+         "its unit. With --qdas each tool, preset and settings of it is a file of its own; what "
+         "did "
+         "not\n"
+         "come to its end is marked as not to be evaluated.\n";
+}
+
+/// Kinds that no event has, and what does not go together.
+std::optional<Error> check_results(const commands::ResultsOptions& options) {
+  const std::vector<std::string> known = catalogue::event_kind_words.words();
+  for (const std::string& kind : options.filter.kinds) {
+    if (std::find(known.begin(), known.end(), kind) == known.end()) {
+      return unknown_choice("--kind", kind, known);
+    }
+  }
+  if (options.qdas.empty()) return std::nullopt;
+  if (options.following == commands::Following::yes) {
+    return usage("--qdas and --follow exclude each other", "leave one of them out");
+  }
+  if (options.told == commands::Told::results) return std::nullopt;
+  return usage("--qdas writes results and nothing else", "leave --gaps and --all out");
+}
+
+void bind_results(Binder& bind, commands::ResultsOptions& options) {
+  commands::ResultFilter& filter = options.filter;
+  bind.argument("TARGET", filter.targets, "tool names or @groups; default: all of the store");
+  bind.option("--since", "TIME", filter.since, "from this time on");
+  bind.option("--until", "TIME", filter.until, "before this time");
+  bind.repeatable("--tool", "NAME|SERIAL", filter.tools,
+                  "the same tool at every place where it was");
+  bind.option("--preset", "N", filter.preset, NumberFrom{0, 65'535}, "made with this preset");
+  bind.repeatable("--kind", "KIND", filter.kinds,
+                  fmt::format("of this kind: {}", catalogue::event_kind_words.alternatives()));
+  bind.flag(
+      "--ng", [&filter] { filter.kinds.emplace_back("fastening-ng"); },
+      "the same as --kind fastening-ng");
+  bind.option("--key", "SERIAL/EPOCH/NUMBER", filter.key, "the one result of this name");
+  bind.flag("--gaps", options.told, commands::Told::gaps, "what was missed, and nothing else");
+  bind.flag("--all", options.told, commands::Told::all,
+            "also links, changes, totals, and what the recorder did");
+  bind.option("-n,--count", "N", options.count, NumberFrom{1, 1'000'000'000}, "the newest so many");
+  bind.flag("-f,--follow", options.following, commands::Following::yes,
+            "go on with what is stored from now on");
+  bind.option("--qdas", "FOLDER", options.qdas, "write files for Q-DAS (.dfq) into this folder");
+  bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
+  bind.option("--store", "FILE", options.store, store_words);
+  bind.check([&options] { return check_results(options); });
+}
+
+void add_results(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"results", "[TARGET...] [--since TIME]",
+                           "what was recorded: as a table, JSON Lines, CSV or files for Q-DAS",
+                           "spindle results --since today\n"
+                           "spindle results station3 --since '2026-11-30 14:00' --ng\n"
+                           "spindle results @line1 --since 30d -o csv\n"
+                           "spindle results --follow --json\n"
+                           "spindle results station3 --qdas quality",
+                           results_words};
+  add_command(app, draft, words, draft.options.results, commands::results, bind_results);
+}
+
+void add_store_commands(CLI::App& store, ParseState& draft) {
+  constexpr auto no_tools = Invocation::ToolsFile::only_found;
+  const auto bind_store = [](Binder& bind, auto& options) {
+    bind.option("--store", "FILE", options.store, store_words);
+  };
+  add_command(store, draft,
+              {"check", "", "whether every number is a row or in a gap, and the store whole",
+               "spindle store check\nspindle store check --json", nullptr, no_tools},
+              draft.options.store_check, commands::check_store, bind_store);
+  add_command(store, draft,
+              {"trim", "--before TIME", "remove what is older; asks",
+               "spindle store trim --before 90d\nspindle store trim --before 2026-01-01 --yes",
+               nullptr, no_tools},
+              draft.options.store_trim, commands::trim_store,
+              [bind_store](Binder& bind, commands::TrimOptions& options) {
+                bind.option("--before", "TIME", options.before, "what is older than this");
+                bind_store(bind, options);
+                bind.check([&options]() -> std::optional<Error> {
+                  if (!options.before.empty()) return std::nullopt;
+                  return usage("store trim: --before is missing",
+                               "say what is too old: --before 90d");
+                });
+              });
+  const auto bind_force = [](Binder& bind, commands::CopyOptions& options) {
+    bind.flag("--force", options.overwrite, Overwrite::allow, "replace a file that is there");
+  };
+  add_command(store, draft,
+              {"backup", "FILE", "a whole copy, also while results are recorded",
+               "spindle store backup monday.db", nullptr, no_tools},
+              draft.options.store_backup, commands::backup_store,
+              [bind_store, bind_force](Binder& bind, commands::CopyOptions& options) {
+                bind.required("FILE", options.file, "where to");
+                bind_force(bind, options);
+                bind_store(bind, options);
+              });
+  add_command(store, draft,
+              {"export", "[FILE]", "everything in the store as JSON Lines",
+               "spindle store export events.jsonl\nspindle store export - --store monday.db",
+               nullptr, no_tools},
+              draft.options.store_export, commands::export_store,
+              [bind_store, bind_force](Binder& bind, commands::CopyOptions& options) {
+                bind.argument("FILE", options.file, "where to; - is standard output (the default)");
+                bind_force(bind, options);
+                bind_store(bind, options);
+              });
+}
+
+void add_store(CLI::App& app, ParseState& draft) {
+  using Options = commands::StoreOptions;
+  constexpr Words words = {"store", "check|trim|backup|export [FILE]",
+                           "the completeness and the care of what was recorded",
+                           "spindle store check\n"
+                           "spindle store trim --before 90d\n"
+                           "spindle store backup monday.db\n"
+                           "spindle store export events.jsonl"};
+  const auto none = [](const Options&, Context&) -> Result<Outcome> {
+    return tl::unexpected(Binder::missing("store", "check, trim, backup or export"));
+  };
+  add_command(app, draft, words, draft.options.store, none,
+              [&draft](Binder& bind, Options&) { add_store_commands(bind.command(), draft); });
+}
+
 void build(CLI::App& app, ParseState& draft) {
   app.set_help_flag();
   app.allow_extras();
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
   for (const auto add :
-       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_record, add_remote_start,
-        add_remote_stop, add_alarms, add_backup, add_dump, add_diff, add_restore, add_ping,
-        add_scan, add_simulate, add_profile, add_tools}) {
+       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_record, add_results,
+        add_store, add_remote_start, add_remote_stop, add_alarms, add_backup, add_dump, add_diff,
+        add_restore, add_ping, add_scan, add_simulate, add_profile, add_tools}) {
     add(app, draft);
   }
 }
@@ -1050,6 +1196,7 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
+  invocation.user.format = invocation.format;
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
   // One that the user names is read all the same, so that a wrong name is told; but no stop waits
   // for it.

@@ -24,10 +24,6 @@ std::optional<std::int64_t> in_steps(const catalogue::Value& value, std::int64_t
   return scaled ? scaled->divided_by(Decimal(1)) : std::nullopt;
 }
 
-bool is_torque(const catalogue::Parameter& parameter) {
-  return parameter.unit == catalogue::torque_unit;
-}
-
 /// "target-torque" of the catalogue is "target_torque" of a store.
 std::optional<store::Setting> setting_of(catalogue::SettingKind kind) {
   std::string word(to_text(kind));
@@ -43,6 +39,12 @@ const catalogue::Parameter* parameter_named(const catalogue::Profile& profile,
 }
 
 }  // namespace
+
+bool is_torque(store::Column column) {
+  using enum store::Column;
+  return column == torque || column == target_torque || column == seating || column == clamp ||
+         column == prevailing;
+}
 
 EventRows::EventRows(const catalogue::Profile& profile) : profile_(&profile), layout_(profile) {
   if (profile.events->settings.empty()) return;
@@ -66,7 +68,7 @@ store::Event EventRows::row(const device::ToolEvent& news) const {
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
     if (const auto column = store::column_words.find(key)) {
-      row.columns[*column] = in_steps(*value, is_torque(*parameter) ? store::torque_scale : 1);
+      row.columns[*column] = in_steps(*value, is_torque(*column) ? store::torque_scale : 1);
     }
     if (key == "barcode" && value->content == catalogue::Content::text) row.barcode = value->text;
   }
@@ -100,8 +102,8 @@ std::optional<store::PresetSettings> EventRows::settings_row(
     const std::string name = catalogue::name_of(setting, preset);
     for (const device::Reading& reading : readings) {
       if (!column || reading.parameter.name != name || !reading.value) continue;
-      const bool is_fine =
-          is_torque(reading.parameter) || setting.is == catalogue::SettingKind::torque_limit;
+      const bool is_fine = *column == store::Setting::target_torque ||
+                           setting.is == catalogue::SettingKind::torque_limit;
       row[*column] = in_steps(*reading.value, is_fine ? store::torque_scale : 1);
       any = true;
     }

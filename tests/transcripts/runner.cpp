@@ -20,6 +20,7 @@
 //                         the same of an alarm
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
 //                         backups are kept on
+//   %store FILE [damaged] a store of tests/support/sample_store.hpp, in the transcript's folder
 //   %profile NAME         a file of tests/profiles/good, in the transcript's own folder
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
 //   %disk full|empty      whether it takes any more
@@ -62,6 +63,7 @@
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
 #include "support/rig.hpp"
+#include "support/sample_store.hpp"
 #include "support/serial_bank.hpp"
 
 namespace {
@@ -179,6 +181,10 @@ class Stage {
     tool->profile.link.framing = modbus::Framing::rtu;
     const auto endpoint = link::parse_endpoint(words.at(0)).value();
     tools_[commands::shared_line(endpoint)] = std::move(tool);
+  }
+  void make_store(const std::vector<std::string>& words) const {
+    words.size() > 2 ? test::make_damaged_store(words.at(1), profiles_)
+                     : test::make_sample_store(words.at(1), profiles_);
   }
   void hide_progress() { hides_progress_ = true; }
 
@@ -396,6 +402,7 @@ class Player {
       if (what == event) stage_.happen(what, {words.begin() + 1, words.end()});
     }
     if (words.at(0) == "profiles") stage_.add_profiles(words.at(1));
+    if (words.at(0) == "store") stage_.make_store(words);
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
     if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));

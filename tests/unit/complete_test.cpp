@@ -124,6 +124,10 @@ TEST_CASE("complete: a group is offered where several tools make sense") {
   }
 }
 
+TEST_CASE("complete: kinds of events") {
+  CHECK(texts({"results", "--kind", ""}) == catalogue::event_kind_words.words());
+}
+
 TEST_CASE("complete: tables of registers, and how they are numbered") {
   CHECK(texts({"scan", "station3", "--table", ""}) == modbus::table_words.words());
   CHECK(texts({"profile", "new", "x", "--numbering", ""}) == Words{"address", "modicon"});

@@ -72,3 +72,42 @@ TEST_CASE("a record finds its first field of a key") {
   CHECK(record.find("unit") == nullptr);
   CHECK(record.find("") == nullptr);
 }
+
+TEST_CASE("a record is read from the JSON that was made of it") {
+  const WallTime time = at(std::chrono::year(2026) / 11 / 30, 14h);
+  const Record record{.type = "link",
+                      .target = "station \"3\"",
+                      .time = time,
+                      .fields = {{"state", std::string("lost")},
+                                 {"attempt", Decimal(3)},
+                                 {"torque", Decimal(-271, -2)},
+                                 {"none", Cell()},
+                                 {"here", true},
+                                 {"gone", false},
+                                 {"raw", Words{0, 65535}},
+                                 {"nothing", Words{}},
+                                 {"texts", Texts{"a,b", "]"}},
+                                 {"labels", Pairs{{"0", "off"}, {"1", "\xc3\xa4"}}},
+                                 {"message", std::string("\x1b[2J\"\\\r\n\t\x7f\xe2\x80\xae"
+                                                         "\xf0\x9f\x94\xa9\xf3\xa0\x81\x81")}}};
+  const std::string json = spindle::report::to_json(record);
+  const auto read = spindle::report::record_of(json, time);
+  REQUIRE(read.has_value());
+  CHECK(read->type == "link");
+  CHECK(read->target == "station \"3\"");
+  CHECK(read->find("message")->cell == record.find("message")->cell);
+  CHECK(spindle::report::to_json(*read) == json);
+  const std::string of_none = spindle::report::to_json({"trim", "", time, {}});
+  CHECK(spindle::report::to_json(spindle::report::record_of(of_none, time).value()) == of_none);
+}
+
+TEST_CASE("what is no record is read as none") {
+  for (const char* json :
+       {"", "{", "{}", "[]", R"({"type":"a")", R"({"type":"a"}x)", R"({"type":1})", R"({"a":1})",
+        R"({"type":"a","b":})", R"({"type":"a","b":1e3})", R"({"type":"a","b":"\x"})",
+        R"({"type":"a","b":"\u12"})", R"({"type":"a","b":[1,"x"]})", R"({"type":"a","b":{"c":1}})",
+        R"({"type":"a",})", R"({"type":"a","b":"c)", R"({"type":"a","b":"c\)"}) {
+    CAPTURE(json);
+    CHECK_FALSE(spindle::report::record_of(json, WallTime{}).has_value());
+  }
+}

@@ -144,6 +144,58 @@ struct BackupOptions {
 };
 Result<Outcome> backup(const BackupOptions& options, Context& context);
 
+/// Which results of a store are meant. What is empty asks for all.
+struct ResultFilter {
+  std::vector<std::string> targets = {};  ///< by their names in the store; groups
+  std::vector<std::string> tools = {};    ///< names or serial numbers
+  std::string since = {};                 ///< as typed; see parse_time()
+  std::string until = {};                 ///< likewise; not included
+  std::optional<std::int64_t> preset = std::nullopt;
+  std::vector<std::string> kinds = {};
+  std::string key = {};  ///< SERIAL/EPOCH/NUMBER
+};
+
+/// What of a store is told.
+enum class Told : std::uint8_t { results, gaps, all };
+
+/// Whether what is stored from now on is told, too.
+enum class Following : std::uint8_t { no, yes };
+
+struct ResultsOptions {
+  ResultFilter filter = {};
+  std::string store = {};  ///< empty: the user's own
+  Told told = Told::results;
+  Following following = Following::no;
+  std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
+  std::string qdas = {};  ///< folder for files in the format of Q-DAS; empty: none
+  Overwrite overwrite = Overwrite::refuse;
+};
+/// What was stored.
+Result<Outcome> results(const ResultsOptions& options, Context& context);
+
+struct StoreOptions {
+  std::string store = {};  ///< empty: the user's own
+};
+/// Whether every number is a row or in a gap, and the store whole.
+Result<Outcome> check_store(const StoreOptions& options, Context& context);
+
+struct TrimOptions {
+  std::string store = {};   ///< empty: the user's own
+  std::string before = {};  ///< as typed; see parse_time()
+};
+/// Removes what is older.
+Result<Outcome> trim_store(const TrimOptions& options, Context& context);
+
+struct CopyOptions {
+  std::string store = {};  ///< empty: the user's own
+  std::string file = {};   ///< of an export: empty or "-": standard output
+  Overwrite overwrite = Overwrite::refuse;
+};
+/// A whole copy of the store, also while it is written.
+Result<Outcome> backup_store(const CopyOptions& options, Context& context);
+/// Everything in the store as JSON Lines.
+Result<Outcome> export_store(const CopyOptions& options, Context& context);
+
 struct DumpOptions {
   std::string target;
   std::string file;                            ///< "-": standard output

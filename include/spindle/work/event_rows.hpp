@@ -13,6 +13,9 @@
 
 namespace spindle::work {
 
+/// Whether a column is kept in ten-thousandths of its unit.
+bool is_torque(store::Column column);
+
 /// The events of one product as rows of a store, and back. Everything that the profile says of
 /// event blocks is looked up once.
 class EventRows {
