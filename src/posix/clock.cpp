@@ -28,6 +28,15 @@ WallTime SteadyClock::wall() const {
   return std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
 }
 
+std::chrono::seconds SteadyClock::utc_offset(WallTime time) const {
+  const std::time_t seconds =
+      std::chrono::floor<std::chrono::seconds>(time.time_since_epoch()).count();
+  std::tm shown = {};
+  ::tzset();
+  if (::localtime_r(&seconds, &shown) == nullptr) return {};
+  return std::chrono::seconds(shown.tm_gmtoff);
+}
+
 Result<void> SteadyClock::sleep_until(TimePoint deadline) {
   if (interrupt_->descriptor() < 0) return sleep_undescribed(deadline, *interrupt_);
   if (wait_for({}, deadline, *this, *interrupt_) == Woken::interrupted) {

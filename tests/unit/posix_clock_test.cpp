@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <cstdlib>
+#include <string>
 #include <thread>
 
 #include "posix/wait.hpp"
@@ -155,4 +157,17 @@ TEST_CASE("waiting: a raised interrupt wins over a ready descriptor, unless shie
         posix::Woken::ready);
   CHECK(posix::wait_for({}, clock.now() + 1ms, clock, waking.get(), posix::Shield::up) ==
         posix::Woken::deadline);
+}
+
+TEST_CASE("steady clock: the zone is that of $TZ, with its summer time") {
+  const char* before = std::getenv("TZ");
+  const std::string kept = before == nullptr ? "" : before;
+  ::setenv("TZ", "CET-1CEST,M3.5.0,M10.5.0/3", 1);
+  const Interrupt interrupt;
+  const posix::SteadyClock clock(interrupt);
+  const auto january = std::chrono::sys_days(std::chrono::year(2026) / 1 / 15);
+  const auto july = std::chrono::sys_days(std::chrono::year(2026) / 7 / 15);
+  CHECK(clock.utc_offset(january) == std::chrono::hours(1));
+  CHECK(clock.utc_offset(july) == std::chrono::hours(2));
+  before == nullptr ? ::unsetenv("TZ") : ::setenv("TZ", kept.c_str(), 1);
 }

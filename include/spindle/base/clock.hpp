@@ -24,6 +24,9 @@ class Clock {
   /// Calendar time (UTC), for records and files only.
   [[nodiscard]] virtual WallTime wall() const = 0;
 
+  /// How far the clocks of the user's zone are ahead of UTC at a moment.
+  [[nodiscard]] virtual std::chrono::seconds utc_offset(WallTime /*time*/) const { return {}; }
+
   /// Returns at `deadline`, or early with `Errc::interrupted` when a signal asked the program to
   /// end.
   virtual Result<void> sleep_until(TimePoint deadline) = 0;

@@ -5,12 +5,13 @@
 
 namespace spindle::posix {
 
-/// CLOCK_MONOTONIC and CLOCK_REALTIME. Sleeping polls the interrupt's descriptor.
+/// CLOCK_MONOTONIC, CLOCK_REALTIME and the zone of $TZ or of this computer. Sleeping polls the interrupt's descriptor.
 class SteadyClock final : public Clock {
  public:
   explicit SteadyClock(const Interrupt& interrupt) : interrupt_(&interrupt) {}
   [[nodiscard]] TimePoint now() const override;
   [[nodiscard]] WallTime wall() const override;
+  [[nodiscard]] std::chrono::seconds utc_offset(WallTime time) const override;
   Result<void> sleep_until(TimePoint deadline) override;
 
  private:
