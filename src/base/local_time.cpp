@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <optional>
 
 #include "spindle/base/decimal.hpp"
@@ -131,10 +132,11 @@ std::optional<milliseconds> age_of(std::string_view text) {
   const auto unit = std::ranges::find(units, text.substr(end), &Unit::suffix);
   if (!number || unit == units.end()) return std::nullopt;
   const auto age = number->times(Decimal(unit->length.count()));
-  const auto whole = age ? age->divided_by(Decimal(1)) : std::nullopt;
+  if (!age) return std::nullopt;
   constexpr milliseconds longest = days(36'525);
-  if (!whole || *whole > longest.count()) return std::nullopt;
-  return milliseconds(*whole);
+  const std::int64_t whole = age->divided_by(Decimal(1)).value_or(-1);
+  if (whole < 0 || whole > longest.count()) return std::nullopt;
+  return milliseconds(whole);
 }
 
 std::optional<days> take_day(std::string_view& text, const Clock& clock) {
