@@ -31,6 +31,7 @@ struct UserOptions {
   Consent consent = Consent::ask;
   report::Verbosity verbosity = report::Verbosity::normal;
   Frames frames = Frames::hidden;
+  report::Format format = report::Format::table;  ///< what the renderer draws
   /// Not on a terminal that cannot draw over a line, and not where there is one for all tools.
   report::Showing progress = report::Showing::wanted;
 };

@@ -196,7 +196,7 @@ class Study {
   const StoreFacts* facts_;
   StudyOptions options_;
   std::vector<Exclusion> exclusions_;
-  std::map<store::RowId, std::unique_ptr<ToolCourse>> courses_ = {};
+  std::map<store::RowId, std::unique_ptr<ToolCourse>> courses_;
 };
 
 /// A value as it stands in a store: "2.7100" of a torque, "6301" of an angle.
