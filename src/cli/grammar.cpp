@@ -78,6 +78,7 @@ struct AllOptions {
   ScanArguments scan;
   WatchArguments watch;
   commands::RecordOptions record;
+  commands::ReportOptions report;
   commands::RemoteStartOptions remote_start;
   commands::RemoteStopOptions remote_stop;
   commands::AlarmsOptions alarms;
@@ -493,6 +494,91 @@ void add_record(CLI::App& app, ParseState& draft) {
                            "spindle record station3 --tee --json\n"
                            "spindle record @line1 --store line1.db"};
   add_command(app, draft, words, draft.options.record, commands::record, bind_record);
+}
+
+constexpr auto rule_set_words =
+    enum_table<statistics::RuleSet>({{"standard", statistics::RuleSet::standard},
+                                     {"atlas", statistics::RuleSet::atlas},
+                                     {"western-electric", statistics::RuleSet::western_electric}});
+
+/// What --include and --study take: one word each, so that there is room for others.
+enum class Included : std::uint8_t { not_completed };
+constexpr auto included_words = enum_table<Included>({{"not-completed", Included::not_completed}});
+constexpr auto study_words = enum_table<commands::MachineStudy>(
+    {{"", commands::MachineStudy::no}, {"machine", commands::MachineStudy::yes}});
+
+std::string report_words() {
+  return "Nothing is asked of a tool: results are those that 'spindle record' stored. Results of\n"
+         "one tool, preset and settings are one stratum; nothing is pooled. OK results and NG\n"
+         "results that came to their end are in the statistics; all others are counted and named.\n"
+         "\n"
+         "INDEX=VALUE of --require: pp, ppk, cp, cpk or yield, of the torque, or angle.ppk and so\n"
+         "on of the angle: ppk=1.33, angle.cpk=1.67, yield=99.5%. Each stratum has to meet it;\n"
+         "what cannot be judged (too few values, no limits, not stable) does not meet it, and the\n"
+         "status is 1.\n";
+}
+
+/// Of what is told, and how.
+void bind_report_form(Binder& bind, commands::ReportOptions& options) {
+  bind.option("-f,--file", "FILE", options.file,
+              "write one page of HTML with figures; - is standard output");
+  bind.flag("--force", options.overwrite, Overwrite::allow, "replace a file that is there");
+  bind.option("--rules", "RULES", options.rules, one_of(rule_set_words),
+              fmt::format("of the control chart: {}", rule_set_words.alternatives()));
+  bind.option("--study", "STUDY", options.machine, one_of(study_words),
+              "machine: also Cm and Cmk of the longest run of 50 or more without an interruption");
+  bind.repeatable("--require", "INDEX=VALUE", options.required,
+                  "status 1 where a stratum has less, repeatable; see below");
+  bind.flag("--require-low", options.required_of, commands::RequiredOf::lower_bound,
+            "require it of the lower end of the 95 % interval");
+}
+
+void bind_report(Binder& bind, commands::ReportOptions& options) {
+  bind.argument("TARGET", options.targets, "tool names or @groups (default: all of the store)");
+  bind.option("--since", "TIME", options.since, "from this time on");
+  bind.option("--until", "TIME", options.until, "before this time");
+  bind.repeatable("--tool", "NAME|SERIAL", options.tools,
+                  "the same tool at every place where it was");
+  bind.option("--preset", "N", options.preset, NumberFrom{0, 65'535}, "made with this preset");
+  bind.option("--limits", "LOWER:UPPER", options.limits,
+              "torque limits of the joint, in place of the tool's own");
+  bind.option("--angle-limits", "LOWER:UPPER", options.angle_limits, "the same of the angle");
+  bind.option(
+      "--include", "WHAT", options.include_not_completed,
+      [](std::string_view option, const std::string& text) {
+        return one_of(included_words)(option, text).map([](Included) { return true; });
+      },
+      "not-completed: also results that did not come to their end");
+  bind.repeatable("--exclude", "SERIAL/EPOCH/NUMBER", options.excluded,
+                  "take a result out of the statistics, repeatable; it is named");
+  bind.repeatable("--reason", "TEXT", options.reasons, "why, one for each --exclude");
+  bind.option("--shift-break", "DURATION", options.shift_break, to_duration,
+              "a longer pause ends a run of neighbours (default 30min)");
+  bind_report_form(bind, options);
+  bind.option("--store", "FILE", options.store,
+              "the store (default events.db in the user's folder of state)");
+}
+
+void add_report(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {
+      "report", "[TARGET...] [-f FILE.html]",
+      "what stored results say: yield, Ppk, control charts, what is missing",
+      "spindle report station3 --since today\n"
+      "spindle report @line1 --since 7d -f week.html\n"
+      "spindle report station3 --preset 1 --limits 2.44:2.98 --require ppk=1.33\n"
+      "spindle report --since yesterday --json",
+      report_words};
+  const auto note_file = [&draft](const std::string& file) {
+    if (file == "-") draft.only_as_text = "with -f - the page itself is on standard output";
+  };
+  add_command(app, draft, words, draft.options.report, commands::report,
+              [note_file](Binder& bind, commands::ReportOptions& options) {
+                bind_report(bind, options);
+                bind.check([&options, note_file]() -> std::optional<Error> {
+                  note_file(options.file);
+                  return std::nullopt;
+                });
+              });
 }
 
 constexpr auto stop_modes = enum_table<catalogue::StopMode>(
@@ -1016,9 +1102,10 @@ void build(CLI::App& app, ParseState& draft) {
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
   for (const auto add :
-       {add_identify, add_list, add_get, add_set, add_do, add_watch, add_record, add_results,
-        add_store, add_remote_start, add_remote_stop, add_alarms, add_backup, add_dump, add_diff,
-        add_restore, add_ping, add_scan, add_simulate, add_profile, add_tools}) {
+       {add_identify, add_list,     add_get,     add_set,   add_do,           add_watch,
+        add_record,   add_results,  add_report,  add_store, add_remote_start, add_remote_stop,
+        add_alarms,   add_backup,   add_dump,    add_diff,  add_restore,      add_ping,
+        add_scan,     add_simulate, add_profile, add_tools}) {
     add(app, draft);
   }
 }

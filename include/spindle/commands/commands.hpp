@@ -8,6 +8,7 @@
 #include "spindle/commands/context.hpp"
 #include "spindle/device/watcher.hpp"
 #include "spindle/files/register_map.hpp"
+#include "spindle/statistics/rules.hpp"
 #include "spindle/work/action.hpp"
 #include "spindle/work/register_survey.hpp"
 #include "spindle/work/run.hpp"
@@ -108,6 +109,36 @@ struct RecordOptions {
   bool tee = false;                               ///< show each record once it is stored
 };
 Result<Outcome> record(const RecordOptions& options, Context& context);
+
+/// Whether Cm and Cmk of one uninterrupted run are told, too.
+enum class MachineStudy : std::uint8_t { no, yes };
+
+/// What a requirement is compared with: the index itself, or the lower end of its interval.
+enum class RequiredOf : std::uint8_t { index, lower_bound };
+
+struct ReportOptions {
+  std::vector<std::string> targets = {};  ///< by their names in the store; groups; none: all
+  std::vector<std::string> tools = {};    ///< names or serial numbers
+  std::string since = {};                 ///< as typed; see parse_time()
+  std::string until = {};                 ///< likewise; not included
+  std::optional<std::int64_t> preset = std::nullopt;
+  std::string limits = {};        ///< of the torque, "LOWER:UPPER"; empty: the tool's own
+  std::string angle_limits = {};  ///< likewise
+  statistics::RuleSet rules = statistics::RuleSet::standard;
+  bool include_not_completed = false;
+  std::vector<std::string> excluded = {};  ///< SERIAL/EPOCH/NUMBER
+  std::vector<std::string> reasons = {};   ///< one for each of `excluded`
+  Duration shift_break = std::chrono::minutes(30);
+  std::vector<std::string> required = {};  ///< "ppk=1.33"
+  RequiredOf required_of = RequiredOf::index;
+  MachineStudy machine = MachineStudy::no;
+  std::string file = {};  ///< of the page; "-": standard output; empty: none
+  bool interactive = false;
+  Overwrite overwrite = Overwrite::refuse;
+  std::string store = {};  ///< empty: the user's own
+};
+/// What stored results say of tools and joints.
+Result<Outcome> report(const ReportOptions& options, Context& context);
 
 struct RemoteStartOptions : work::RunOptions {
   std::string target = {};

@@ -1,0 +1,245 @@
+#include "report_selection.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "spindle/base/local_time.hpp"
+#include "spindle/base/text.hpp"
+
+namespace spindle::commands {
+namespace {
+
+using store::Place;
+using store::RowId;
+
+Error bad_option(std::string_view option, std::string message, std::string hint) {
+  Error error{.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
+  error.name = option;
+  return error;
+}
+
+Result<std::optional<WallTime>> time_of(std::string_view option, const std::string& text,
+                                        const Clock& clock) {
+  if (text.empty()) return std::nullopt;
+  auto time = parse_time(text, clock);
+  if (time) return *time;
+  time.error().name = option;
+  return tl::unexpected(std::move(time.error()));
+}
+
+Result<void> add_times(const ReportOptions& options, const Clock& clock, store::Filter& filter) {
+  const auto since = time_of("--since", options.since, clock);
+  if (!since) return tl::unexpected(since.error());
+  const auto until = time_of("--until", options.until, clock);
+  if (!until) return tl::unexpected(until.error());
+  if (*since && *until && **since >= **until) {
+    return tl::unexpected(bad_option("--until", "this is not behind --since", "swap the two"));
+  }
+  filter.since = *since;
+  filter.until = *until;
+  return {};
+}
+
+Error unknown(const std::string& text, const std::set<std::string>& known) {
+  std::vector<std::string> names(known.begin(), known.end());
+  std::string hint = suggestion(text, names);
+  constexpr std::size_t most = 5;
+  if (hint.empty() && !names.empty()) {
+    const bool is_cut = names.size() > most;
+    names.resize(std::min(names.size(), most));
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+    hint = fmt::format("the store has {}{}", list, is_cut ? ", ..." : "");
+  }
+  return {.code = Errc::unknown_name,
+          .message = fmt::format("the store knows no '{}'", text),
+          .hint = std::move(hint)};
+}
+
+/// The places that were named, by target or group. No row is 0.
+Result<void> add_targets(const ReportOptions& options, const std::vector<Place>& places,
+                         Context& context, store::Filter& filter) {
+  std::vector<std::string> names;
+  std::set<std::string> known;
+  for (const Place& place : places) known.insert(place.name);
+  for (const auto& [group, members] : context.tools.groups) known.insert("@" + group);
+  for (const std::string& text : options.targets) {
+    const auto group = context.tools.groups.find(text.substr(1));
+    if (!names_group(text)) {
+      names.push_back(text);
+    } else if (group != context.tools.groups.end()) {
+      names.insert(names.end(), group->second.begin(), group->second.end());
+    } else {
+      return tl::unexpected(unknown(text, known));
+    }
+  }
+  for (const std::string& name : names) {
+    const std::size_t before = filter.places.size();
+    for (const Place& place : places) {
+      if (place.name == name || place.url == name) filter.places.push_back(place.id);
+    }
+    if (filter.places.size() > before) continue;
+    const auto& tools = context.tools.tools;
+    const bool is_tool = std::any_of(tools.begin(), tools.end(),
+                                     [&](const files::Tool& tool) { return tool.name == name; });
+    if (!is_tool) return tl::unexpected(unknown(name, known));
+    context.renderer.note(fmt::format("{}: nothing of it is stored", name));
+  }
+  if (!options.targets.empty() && filter.places.empty()) filter.places = {0};
+  return {};
+}
+
+Result<void> add_tools(const ReportOptions& options, const work::StoreFacts& facts,
+                       store::Filter& filter) {
+  for (const std::string& text : options.tools) {
+    std::set<RowId> found;
+    std::set<std::string> known;
+    for (const store::Tool& tool : facts.tools) {
+      if (tool.name.serial == text) found.insert(tool.id);
+      known.insert(tool.name.serial);
+    }
+    for (const Place& place : facts.places) {
+      if (place.name == text || place.url == text) found.insert(place.tool);
+      known.insert(place.name);
+    }
+    if (found.empty()) return tl::unexpected(unknown(text, known));
+    filter.tools.insert(filter.tools.end(), found.begin(), found.end());
+  }
+  return {};
+}
+
+/// Gaps are of tools, not of places.
+store::Filter gaps_filter(const store::Filter& events, const std::vector<Place>& places) {
+  store::Filter filter{.tools = events.tools, .since = events.since, .until = events.until};
+  if (events.places.empty()) return filter;
+  std::set<RowId> tools;
+  for (const Place& place : places) {
+    const bool is_meant =
+        std::find(events.places.begin(), events.places.end(), place.id) != events.places.end();
+    const bool fits = events.tools.empty() || std::find(events.tools.begin(), events.tools.end(),
+                                                        place.tool) != events.tools.end();
+    if (is_meant && fits) tools.insert(place.tool);
+  }
+  filter.tools.assign(tools.begin(), tools.end());
+  if (filter.tools.empty()) filter.tools = {0};
+  return filter;
+}
+
+void add_products(Context& context, work::StoreFacts& facts) {
+  for (const Place& place : facts.places) {
+    const auto [found, is_new] = facts.products.try_emplace(place.profile);
+    if (!is_new) continue;
+    const auto profile = context.profiles.load(place.profile);
+    const auto codes = context.profiles.load_error_codes(place.profile);
+    if (profile && codes) {
+      found->second = work::facts_of(*profile, *codes);
+    } else {
+      context.renderer.note(
+          fmt::format("{}: profile '{}' cannot be loaded, so that no error code of it is known",
+                      place.name, place.profile));
+    }
+  }
+}
+
+template <typename T>
+Result<void> take(Result<T> from, T& into) {
+  return std::move(from).map([&](T value) { into = std::move(value); });
+}
+
+Result<work::GivenLimits> read_limits(std::string_view option, const std::string& text) {
+  const auto refuse = [&] {
+    return tl::unexpected(bad_option(option, fmt::format("'{}' are no limits", text),
+                                     "write LOWER:UPPER, such as 2.44:2.98, or one of the two"));
+  };
+  const auto parts = split(text, ':');
+  if (parts.size() != 2) return refuse();
+  work::GivenLimits limits;
+  for (const bool is_lower : {true, false}) {
+    const std::string_view part = parts[is_lower ? 0 : 1];
+    if (part.empty()) continue;
+    const auto limit = Decimal::parse(part);
+    if (!limit) return refuse();
+    (is_lower ? limits.lower : limits.upper) = *limit;
+  }
+  if (!limits.lower && !limits.upper) return refuse();
+  if (limits.lower && limits.upper && *limits.lower >= *limits.upper) {
+    return tl::unexpected(
+        bad_option(option, "the upper limit is not above the lower one", "write LOWER:UPPER"));
+  }
+  return limits;
+}
+
+}  // namespace
+
+Result<ReportSelection> select_for_report(const ReportOptions& options, store::Reader& reader,
+                                          Context& context) {
+  ReportSelection selection;
+  store::Filter& filter = selection.filter;
+  work::StoreFacts& facts = selection.facts;
+  using enum store::Column;
+  filter.columns = {preset, target_torque, torque, a3, error, direction};
+  auto read = add_times(options, context.clock, filter)
+                  .and_then([&] { return take(reader.tools(), facts.tools); })
+                  .and_then([&] { return take(reader.places(), facts.places); })
+                  .and_then([&] { return take(reader.epochs(), facts.epochs); })
+                  .and_then([&] { return take(reader.settings(), facts.settings); })
+                  .and_then([&] { return add_targets(options, facts.places, context, filter); })
+                  .and_then([&] { return add_tools(options, facts, filter); })
+                  .and_then([&] {
+                    return take(reader.gaps(gaps_filter(filter, facts.places)), facts.gaps);
+                  });
+  if (!read) return tl::unexpected(std::move(read.error()));
+  add_products(context, facts);
+  return selection;
+}
+
+Result<work::StudyOptions> study_options_of(const ReportOptions& options) {
+  work::StudyOptions study{.shift_break = options.shift_break,
+                           .include_not_completed = options.include_not_completed,
+                           .preset = options.preset};
+  const auto add = [&](std::string_view option, const std::string& text,
+                       Quantity quantity) -> Result<void> {
+    if (text.empty()) return {};
+    return read_limits(option, text).map([&](work::GivenLimits limits) {
+      study.limits[quantity] = limits;
+    });
+  };
+  return add("--limits", options.limits, Quantity::torque)
+      .and_then([&] { return add("--angle-limits", options.angle_limits, Quantity::angle); })
+      .map([&] { return study; });
+}
+
+Result<std::vector<work::Exclusion>> exclusions_of(const ReportOptions& options) {
+  if (options.excluded.size() != options.reasons.size()) {
+    return tl::unexpected(bad_option("--exclude", "each excluded result needs a reason",
+                                     "add --reason TEXT behind each --exclude"));
+  }
+  std::vector<work::Exclusion> exclusions;
+  for (std::size_t at = 0; at < options.excluded.size(); ++at) {
+    const std::string& key = options.excluded[at];
+    const auto second = key.rfind('/');
+    const auto first =
+        second == std::string::npos || second == 0 ? second : key.rfind('/', second - 1);
+    const bool has_parts = first != std::string::npos && first != second && first > 0;
+    const std::string_view text = key;
+    const auto epoch =
+        has_parts ? parse_unsigned(text.substr(first + 1, second - first - 1), 1'000'000'000)
+                  : std::nullopt;
+    const auto number = has_parts ? parse_unsigned(text.substr(second + 1), 65'535) : std::nullopt;
+    if (!epoch || !number || options.reasons[at].empty()) {
+      return tl::unexpected(
+          bad_option("--exclude", fmt::format("'{}' names no result", key),
+                     "write SERIAL/EPOCH/NUMBER as JSON has them: 1021100042/0/1962"));
+    }
+    exclusions.push_back({.serial = key.substr(0, first),
+                          .epoch = static_cast<std::int64_t>(*epoch),
+                          .number = static_cast<std::uint16_t>(*number),
+                          .reason = options.reasons[at]});
+  }
+  return exclusions;
+}
+
+}  // namespace spindle::commands
