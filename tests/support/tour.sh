@@ -1,14 +1,18 @@
 #!/usr/bin/env bash
 # A short tour of spindle against a simulated tool on a loopback port and simulated motor drivers on a
-# pseudo terminal: tour.sh SPINDLE
-# Fails when a step does not end as it should.
+# pseudo terminal: tour.sh SPINDLE [REPORT.html]
+# Fails when a step does not end as it should. The report is kept where it is named.
 set -euo pipefail
 
-if (($# != 1)) || [[ ! -x $1 ]]; then
-  printf 'usage: tour.sh SPINDLE, the program to show\n' >&2
+if (($# < 1 || $# > 2)) || [[ ! -x $1 ]]; then
+  printf 'usage: tour.sh SPINDLE [REPORT.html], the program to show, and where its report is kept\n' >&2
   exit 2
 fi
 program=$(realpath "$1")
+page=
+if (($# == 2)); then
+  page=$(realpath "$2")
+fi
 
 # The tour leaves no trace in the user's home and does not depend on what is configured there.
 scratch=$(mktemp -d)
@@ -188,5 +192,32 @@ shown '1 saved'
 grep 'operation\.3\.' driver.yaml || fail "the backup lacks operation data 3"
 run 0 diff driver.yaml "$url" --profile orientalmotor-blv
 shown '0 different'
+
+say "a line at work: an operator drives screws, and every result is kept in a store"
+kill -TERM "$simulator"
+typed simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 9
+mkfifo works
+"$program" simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 9 >works 2>simulator.log &
+simulator=$!
+disown
+exec {works}<works
+read -r -t 5 url <&"$works" || fail "the simulator did not say where it listens"
+run 0 record "$url" --profile doga-bm --store line.db --count 60
+
+say "what was stored, and whether nothing is missing"
+run 0 results --store line.db --count 3
+shown 'fastening'
+run 0 store check --store line.db
+shown 'complete|no hole|0 holes'
+
+say "how good is the process? first as a table, then as a page for the wall"
+run 0 report --store line.db
+shown 'torque'
+run 0 report --store line.db -f report.html
+grep -q '<svg' report.html || fail "the page shows no figure"
+if [[ -n $page ]]; then
+  cp report.html "$page"
+  printf '# the page lies in %s\n' "$page"
+fi
 
 say "that was the tour; 'spindle --help' shows the rest, and so does ./check"
