@@ -71,12 +71,14 @@ void add_fields(std::vector<Column>& columns, const catalogue::Profile& profile)
   }
 }
 
-void add_units(Record& record, const catalogue::Profile& profile) {
+std::vector<Field> units_of(const catalogue::Profile& profile) {
+  std::vector<Field> units;
   const catalogue::EventLayout layout(profile);
   for (const auto& field : layout.fields()) {
     if (!has_unit_column(*field.parameter)) continue;
-    record.fields.push_back(only_shown(field.key + "_unit", field.parameter->unit.to_string()));
+    units.push_back(only_shown(field.key + "_unit", field.parameter->unit.to_string()));
   }
+  return units;
 }
 
 }  // namespace
@@ -134,7 +136,10 @@ StoredRecords::Speaker& StoredRecords::speaker(const store::Place& place) {
   speaker->target.shown = place.name;
   speaker->target.torque_unit = place.torque_unit;
   const auto known = shelf_->take(place.profile);
-  if (known && (*known)->profile.events) speaker->known = *known;
+  if (known && (*known)->profile.events) {
+    speaker->known = *known;
+    speaker->units = units_of((*known)->profile);
+  }
   speaker->is_strange = !known;
   if (!known && told_.insert(place.profile).second) {
     context_->renderer.note(
@@ -162,7 +167,7 @@ Record StoredRecords::event(const store::EventView& row) {
   Record record = fits ? speaker.records->event(news_of(row), naming(row.tool, row.epoch, row.id))
                        : event_by_columns(row, speaker);
   if (fits && context_->user.format == report::Format::csv) {
-    add_units(record, speaker.known->profile);
+    record.fields.insert(record.fields.end(), speaker.units.begin(), speaker.units.end());
   }
   record.fields.push_back(only_shown("local_time", to_local_text(row.at, context_->clock)));
   return record;

@@ -13,7 +13,6 @@ import pathlib
 import re
 import signal
 import sqlite3
-import subprocess
 import unittest
 
 import support
@@ -25,7 +24,7 @@ BARCODE = '=cmd|"a,b"\n\\x1b[2J'  # as it is shown: nothing steers a terminal
 def make_store(name, *numbers):
     path = support.home().path / name
     command = [PROGRAMS / "spindle_peer_sample_store", path, *map(str, numbers)]
-    subprocess.run(command, check=True, timeout=support.DEADLINE * 5)
+    support.completed(command, check=True)
     return path
 
 
