@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""Measures `spindle watch --json` on tools that push events over loopback.
+"""Measures `spindle watch --json` and `spindle record` on tools that push events over loopback.
 
 usage: watch.py SPINDLE latency [EVENTS]      from the event's sending to the line in the pipe
        watch.py SPINDLE throughput [EVENTS]   events as fast as they can be taken
        watch.py SPINDLE tools [COUNT...]      so many tools, one event per second each
+       watch.py SPINDLE record [COUNT...]     the same, stored: from the event's sending until it is durable
+       watch.py SPINDLE burst [EVENTS]        events of one tool all at once, stored
 
 The tools are one process of their own, so that only spindle is measured. The times of `latency` include
 this program's own part: those of a bare relay from a socket to a pipe, seen in the same run, are printed
 beside them."""
 
+import json
 import os
 import selectors
 import socket
@@ -35,7 +38,8 @@ def event_frame(number):
 class Tool:
     """The registers of one tool whose events are made by the measuring program."""
 
-    def __init__(self):
+    def __init__(self, serial=0):
+        self.identity = IDENTITY[:8] + (1021100074 + serial).to_bytes(4, "big")
         self.number = 0
         self.armed = False
         self.client = None
@@ -43,10 +47,12 @@ class Tool:
 
     def respond(self, function, first, word):
         if function == 17:
-            return bytes([17, len(IDENTITY)]) + IDENTITY
+            return bytes([17, len(self.identity)]) + self.identity
         if function == 6:
             self.armed = self.armed or (first == ARM_REGISTER and word == 1)
             return struct.pack(">BHH", 6, first, word)
+        if function == 3:
+            return bytes([3, 2 * word]) + bytes(2 * word)
         block = event_block(self.number)
         from_here = 2 * (first - NUMBER_REGISTER)
         return bytes([function, 2 * word]) + block[from_here : from_here + 2 * word]
@@ -73,7 +79,7 @@ class Tools:
     """Listens for each tool on a port of its own and serves them all in one thread."""
 
     def __init__(self, count):
-        self.tools = [Tool() for _ in range(count)]
+        self.tools = [Tool(serial) for serial in range(count)]
         self.selector = selectors.DefaultSelector()
         self.ports = []
         for tool in self.tools:
@@ -206,6 +212,92 @@ def throughput(spindle, events=200_000):
     )
 
 
+def record(spindle, urls, store, stdout):
+    arguments = [spindle, "record", *urls, "--profile", "doga-bm", "--store", store, "--tee", "--json"]
+    environment = dict(os.environ, SPINDLE_PROFILE_PATH=PROFILE)
+    return subprocess.Popen(arguments, stdout=stdout, stderr=subprocess.DEVNULL, env=environment)
+
+
+class Told:
+    """When each event was told, which is when it was durable."""
+
+    def __init__(self, process, tools):
+        self.output = process.stdout.fileno()
+        os.set_blocking(self.output, False)
+        self.waiting = b""
+        self.told = {}
+        self.ports = {port: index for index, port in enumerate(tools.ports)}
+
+    def read(self):
+        try:
+            self.waiting += os.read(self.output, 1 << 20)
+        except BlockingIOError:
+            return
+        now = time.perf_counter()
+        *lines, self.waiting = self.waiting.split(b"\n")
+        for line in lines:
+            if b'"type":"event"' not in line:
+                continue
+            told = json.loads(line)
+            port = int(told["target"].rsplit(":", 1)[1])
+            self.told[self.ports[port], told["number"]] = now
+
+
+def recorded(spindle, count, seconds=20):
+    tools = Tools(count)
+    with tempfile.TemporaryDirectory() as folder:
+        process = record(spindle, tools.urls(), os.path.join(folder, "events.db"), subprocess.PIPE)
+        tools.settle()
+        told = Told(process, tools)
+        used, began = processor_seconds(process.pid), time.monotonic()
+        sent = {}
+        while (elapsed := time.monotonic() - began) < seconds:
+            while len(sent) < elapsed * count:
+                index = len(sent) % count
+                frame = tools.tools[index].happen()
+                tools.tools[index].client.sendall(frame)
+                sent[index, tools.tools[index].number] = time.perf_counter()
+            tools.serve(min(0.002, 1 / count))
+            told.read()
+        used = processor_seconds(process.pid) - used
+        settled = time.monotonic() + 2
+        while time.monotonic() < settled:
+            tools.serve(0.01)
+            told.read()
+        peak = memory_mib(process.pid)
+        process.terminate()
+        tools.serve_until(lambda: process.poll() is not None)
+    times = [told.told[event] - at for event, at in sent.items() if event in told.told]
+    print(f"{count:4} tools: {100 * used / seconds:5.1f} % of a core, {peak:6.1f} MiB; "
+          f"{len(times)} of {len(sent)} events durable; status {process.returncode}")
+    show("durable", times)
+
+
+def burst(spindle, events=10_000):
+    tools = Tools(1)
+    tool = tools.tools[0]
+    with tempfile.TemporaryDirectory() as folder:
+        process = record(spindle, tools.urls(), os.path.join(folder, "events.db"), subprocess.PIPE)
+        tools.settle()
+        told = Told(process, tools)
+        frames = b"".join(tool.happen() for _ in range(events))
+        began = time.perf_counter()
+        tool.client.setblocking(False)
+        while len(told.told) < events:
+            if frames:
+                try:
+                    frames = frames[tool.client.send(frames):]
+                except BlockingIOError:
+                    pass
+            told.read()
+            time.sleep(0.001)
+        seconds = time.perf_counter() - began
+        tool.client.setblocking(True)
+        process.terminate()
+        tools.serve_until(lambda: process.poll() is not None)
+    print(f"{events} events durable in {seconds:.2f} s: {events / seconds:,.0f} per second")
+
+
 def processor_seconds(pid):
     with open(f"/proc/{pid}/stat", encoding="ascii") as stat:
         fields = stat.read().rsplit(")", 1)[1].split()
@@ -259,6 +351,11 @@ def main():
     elif what == "tools":
         for count in numbers or (1, 50, 100, 250, 500):
             many(spindle, count)
+    elif what == "record":
+        for count in numbers or (50, 500):
+            recorded(spindle, count)
+    elif what == "burst":
+        burst(spindle, *numbers)
     else:
         sys.exit(__doc__)
 

@@ -15,6 +15,8 @@ namespace {
 constexpr Duration seen_every = std::chrono::seconds(10);
 /// Another client may change settings unseen, so they are read again behind a result.
 constexpr Duration settings_every = std::chrono::minutes(1);
+/// A link that is lost over the settings so often is worth more without them.
+constexpr unsigned most_unanswered = 3;
 /// People are told of one tool's link at most so often.
 constexpr Duration link_told_every = std::chrono::minutes(1);
 }  // namespace
@@ -223,7 +225,9 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   place_ = *place;
   flush_link();
   if (identity) record_total(*identity, *last);
-  if (rows_) wanted_ = rows_->presets();
+  if (rows_) {
+    for (const std::int64_t preset : rows_->presets()) want_settings(preset);
+  }
   device::RecordedPast past = {.wants_first = true};
   if (*last) past.last = work::last_event_of(**last, now());
   return past;
@@ -262,7 +266,13 @@ std::optional<device::Errand> RecordedTool::next_errand() {
     recorder_->journal().add_lazily(store::Seen{*tool_, now()});
   }
   note_pending();
-  if (wanted_.empty() || !rows_) return std::nullopt;
+  if (wanted_.empty() || !rows_ || unanswered_ > most_unanswered) return std::nullopt;
+  if (++unanswered_ > most_unanswered) {
+    recorder_->stream().note(fmt::format(
+        "{}: the settings of its presets cannot be read, so its results are kept without limits",
+        target_.shown));
+    return std::nullopt;
+  }
   constexpr std::size_t at_once = 8;
   const std::size_t count = std::min(at_once, wanted_.size());
   const std::vector<std::int64_t> presets(wanted_.begin(),

@@ -65,6 +65,7 @@ class RecordedTool final : public Listener {
   void record_total(const catalogue::Identity& identity, const std::optional<store::Last>& last);
   std::optional<device::Errand> next_errand();
   void want_settings(const device::ToolEvent& news);
+  void want_settings(std::int64_t preset);
   void flush_gap();
   void flush_link();
   void happen(report::Record record, device::WatchEvent news);
@@ -91,7 +92,7 @@ class RecordedTool final : public Listener {
   TimePoint seen_due_ = {};
   std::vector<std::int64_t> wanted_ = {};  ///< presets whose settings are to be read
   std::map<std::int64_t, TimePoint> read_at_ = {};
-  std::map<std::int64_t, store::PresetSettings> settings_ = {};
+  unsigned unanswered_ = 0;  ///< errands in a row that came to nothing
   bool is_up_ = false;
   std::optional<std::string> link_text_ = std::nullopt;  ///< not told on stderr yet
   std::optional<TimePoint> noted_at_ = std::nullopt;
