@@ -96,7 +96,10 @@ class Tools:
                 tool.client = client
                 self.selector.register(client, selectors.EVENT_READ, (tool, False))
                 continue
-            data = key.fileobj.recv(4096)
+            try:
+                data = key.fileobj.recv(4096)
+            except ConnectionResetError:
+                data = b""
             if not data:
                 self.selector.unregister(key.fileobj)
                 tool.client = None

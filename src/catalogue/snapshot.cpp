@@ -563,12 +563,12 @@ RestorePlan plan_restore(const Snapshot& backup, const Snapshot& present, const 
 
 SnapshotEntry with_step_of(SnapshotEntry entry, const Parameter& parameter,
                            const PlannedWrite& write) {
-  const bool is_scaled =
-      !parameter.scale_by.empty() && write.parameter.name == parameter.scale_by.view();
-  const auto power = is_scaled ? power_of(write.after) : std::nullopt;
-  if (!power) return entry;
-  entry.parameter = with_power(parameter, *power);
-  entry.step = entry.parameter.encoding.scale;
+  if (parameter.scale_by.empty() || write.parameter.name != parameter.scale_by.view()) return entry;
+  const auto power = power_of(write.after);
+  entry.parameter = with_power(parameter, power.value_or(0));
+  entry.step = power ? std::optional(entry.parameter.encoding.scale) : std::nullopt;
+  if (!power) entry.unit = {};
+  if (power && entry.unit.empty()) entry.unit = parameter.unit;
   if (auto value = decode_or_raw(entry.parameter, entry.raw)) entry.value = std::move(*value);
   return entry;
 }

@@ -116,6 +116,20 @@ class ValuesTest(unittest.TestCase):
         self.assertEqual([write[1] for write in target.writes], [21])
         self.assertEqual([target.value(20), target.value(21)], [7, 0])
 
+    def test_an_exponent_is_put_back_with_its_value(self):
+        self.good(self.spindle("backup", self.serve(GOOD | {20: 50, 21: 2}), "-f", "odd-backup.yaml"))
+        for exception, status in ((4, 6), (None, 8)):
+            with self.subTest(exception=exception):
+                target = self.serve(
+                    GOOD | {20: 7, 21: 0},
+                    lambda number: Deed(exception=exception, acts=None) if number == 2 else Deed(),
+                )
+                finished = self.spindle("restore", target, "odd-backup.yaml", "--yes")
+                self.assertEqual(finished.status, status, finished)
+                self.assertEqual([write[1] for write in target.writes[:2]], [21, 20])
+                self.assertEqual([target.value(20), target.value(21)], [7, 0])
+                self.assertEqual([error["name"] for error in finished.records("error")], ["power"])
+
     def test_a_value_and_the_worth_of_its_steps_are_not_set_together(self):
         server = self.serve(GOOD)
         finished = self.spindle("set", server, "power=500", "exponent=2")
