@@ -325,7 +325,7 @@ std::string histogram_figure(const AssessedStratum& assessed, Quantity which,
   if (deviation && *deviation > 0 && moments.count() >= 30) {
     chart.normal = {.mean = *moments.mean(), .deviation = *deviation};
   }
-  return both(chart, &chart::histogram);
+  return chart::histogram(chart, Format::narrow);
 }
 
 std::string control_figure(const AssessedStratum& assessed, Quantity which,
@@ -345,7 +345,7 @@ std::string control_figure(const AssessedStratum& assessed, Quantity which,
   if (!places.is_time()) chart.course.name = has_groups ? "Subgroup" : "Result";
   chart.baseline = baseline_of(quantity, chart);
   chart.doubt = doubt_of(quantity);
-  return both(chart, &chart::control_chart);
+  return chart::control_chart(chart, Format::narrow);
 }
 
 std::vector<CodeRow> code_rows(const Assessed& assessed) {

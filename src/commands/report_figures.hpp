@@ -21,10 +21,10 @@ std::string run_figure(Subject subject, Quantity quantity, const work::Study& st
 /// The same of one stratum, in the height of a table row.
 std::string small_figure(const AssessedStratum& stratum, const work::Study& study,
                          const ReportZone& zone);
-/// Of the values that are in the statistics. Empty: there are none.
+/// Of the values that are in the statistics, to stand beside another figure. Empty: there are none.
 std::string histogram_figure(const AssessedStratum& stratum, Quantity quantity,
                              const work::Study& study, const ReportZone& zone);
-/// Empty: there are no control limits.
+/// To stand beside another figure. Empty: there are no control limits.
 std::string control_figure(const AssessedStratum& stratum, Quantity quantity,
                            const work::Study& study, const ReportZone& zone);
 

@@ -30,27 +30,27 @@ h2{font-size:20px;line-height:1.25;margin:40px 0 8px;padding-top:12px;border-top
 h3{font-size:16px;margin:24px 0 8px}
 p{margin:4px 0 8px;max-width:80ch}
 .lead{font-size:17px;margin:0}
-.quiet{color:#52606d}
+.quiet{color:#52606d;font-weight:400}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums;margin:8px 0 16px}
 caption{text-align:left;font-weight:600;padding:4px 0}
-th,td{padding:5px 10px;border-bottom:1px solid #d5dbe1;text-align:right;vertical-align:top;white-space:nowrap}
+th,td{padding:5px 8px;border-bottom:1px solid #d5dbe1;text-align:right;vertical-align:top;white-space:nowrap}
 th{font-weight:600;border-bottom:1.5px solid #52606d;vertical-align:bottom}
 th[scope=row]{border-bottom:1px solid #d5dbe1;vertical-align:top}
 .t{text-align:left}
 .w{text-align:left;white-space:normal;min-width:16ch}
 .bad{color:#a61b1b;font-weight:600}
 .box{border:2px solid #a61b1b;padding:8px 14px;margin:16px 0;max-width:80ch}
-.figures{display:grid;grid-template-columns:1fr 1fr;gap:16px 24px;align-items:start}
+.figures{display:grid;grid-template-columns:repeat(2,minmax(0,464px));gap:16px 32px;align-items:start}
 ul{margin:4px 0 8px;padding-left:20px;max-width:90ch}
-@media screen and (max-width:900px){.figures{grid-template-columns:minmax(0,1fr)}}
+@media screen and (max-width:900px){.figures{grid-template-columns:minmax(0,480px)}}
 @media screen and (max-width:640px){body{padding:14px}h1{font-size:22px}}
 @media print{
 @page{size:A4;margin:12mm}
 body{max-width:none;padding:0;font-size:11px}
 .lead{font-size:13px}
 h1{font-size:20px}h2{font-size:15px;margin-top:20px;break-after:avoid}h3{font-size:12px;break-after:avoid}
-table{font-size:8.5px}th,td{padding:2px 5px}
+table{font-size:9px}th,td{padding:2px 5px}
 tr,.box,.figures>div{break-inside:avoid}
 .scroll{overflow:visible}
 .figures{gap:8px 12px}

@@ -58,6 +58,17 @@ std::string verdict_cell(const AssessedQuantity& quantity) {
   return is_bad ? fmt::format("<td class=\"t bad\">\u25b2 {}</td>", word) : text_cell(word);
 }
 
+/// Ppk, and below it Cpk.
+std::string indices_cell(const AssessedQuantity& quantity) {
+  const statistics::Assessment& assessment = quantity.assessment;
+  const auto line = [](std::string_view name, const std::optional<statistics::Indices>& indices) {
+    if (!indices || !indices->index) return fmt::format("{} \u2013", name);
+    return fmt::format("{} {}", statistics::to_text(indices->index->name), with_bounds(indices));
+  };
+  return fmt::format("<td class=\"t\">{}<br/>{}</td>", line("Ppk", assessment.performance),
+                     line("Cpk", assessment.capability));
+}
+
 std::string yield_text(const AssessedStratum& assessed) {
   if (!assessed.yield) return "\u2013";
   const auto percent = [](double share) { return chart::number_text(share * 100, 2); };
@@ -65,11 +76,12 @@ std::string yield_text(const AssessedStratum& assessed) {
                      percent(assessed.yield->low), percent(assessed.yield->high));
 }
 
-std::string target_text(const Stratum& stratum) {
-  if (!stratum.facts.target) return "\u2013";
-  const Decimal target = work::value_of(Quantity::torque, *stratum.facts.target);
-  std::string text = work::without_zeros(target).to_string();
-  if (!stratum.facts.torque_unit.empty()) text += " " + stratum.facts.torque_unit;
+/// The same with the interval below.
+std::string yield_lines(const AssessedStratum& assessed) {
+  std::string text = yield_text(assessed);
+  if (const auto space = text.find(' '); space != std::string::npos) {
+    text.replace(space, 1, "<br/>");
+  }
   return text;
 }
 
@@ -78,17 +90,20 @@ std::string summary_row(const AssessedStratum& assessed, const work::Study& stud
   const Stratum& stratum = *assessed.stratum;
   const AssessedQuantity& torque = assessed.quantities[Quantity::torque];
   const AssessedQuantity& angle = assessed.quantities[Quantity::angle];
-  std::string row =
-      fmt::format("<tr><th scope=\"row\" class=\"t\">{}</th>{}{}{}",
-                  escape(study.facts().place(stratum.place).name),
-                  cell(stratum.facts.preset ? std::to_string(*stratum.facts.preset) : "\u2013"),
-                  cell(target_text(stratum)), text_cell(zone.minute(stratum.results.front().at)));
+  const std::string preset =
+      stratum.facts.preset ? fmt::format("preset {}, ", *stratum.facts.preset) : std::string();
+  std::string from = zone.minute(stratum.results.front().at);
+  from.replace(10, 1, "<br/>");
+  std::string row = fmt::format(
+      "<tr><th scope=\"row\" class=\"t\">{}<br/><span class=\"quiet\">{}{}</span></th>"
+      "<td class=\"t\">{}</td>",
+      escape(study.facts().place(stratum.place).name), preset, escape(target_of(stratum)), from);
   row += cell(std::to_string(stratum.results.size()));
-  row += cell(std::to_string(stratum.ng)) + cell(yield_text(assessed));
+  row += cell(std::to_string(stratum.ng));
+  row += fmt::format("<td>{}</td>", yield_lines(assessed));
   row += cell(missed_of(study.tool(stratum.tool)));
   for (const AssessedQuantity* quantity : {&torque, &angle}) {
-    row += cell(named_index(quantity->assessment.performance));
-    row += cell(named_index(quantity->assessment.capability)) + verdict_cell(*quantity);
+    row += indices_cell(*quantity) + verdict_cell(*quantity);
   }
   row += fmt::format("<td>{}</td></tr>\n", small_figure(assessed, study, zone));
   return row;
@@ -151,13 +166,12 @@ std::string summary_table(const Assessed& assessed, const ReportZone& zone) {
   for (const AssessedStratum& each : assessed.strata) {
     rows += summary_row(each, *assessed.study, zone);
   }
-  std::string head = head_cell("Tool", "t") + head_cell("Preset") + head_cell("Target");
-  head += head_cell("From", "t") + head_cell("Results") + head_cell("NG");
+  std::string head = head_cell("Tool,<br/>preset, target", "t") + head_cell("From", "t");
+  head += head_cell("Results") + head_cell("NG");
   head += head_cell("Yield %<br/>(95 %)") + head_cell("Missed<br/>of the tool");
-  head += head_cell("Torque<br/>Ppk (95 %)") + head_cell("Torque<br/>Cpk (95 %)");
-  head += head_cell("Torque<br/>stable", "t");
-  head += head_cell("Angle<br/>Ppk (95 %)") + head_cell("Angle<br/>Cpk (95 %)");
-  head += head_cell("Angle<br/>stable", "t") + head_cell("Torque,<br/>result by result", "t");
+  head += head_cell("Torque<br/>(95 %)", "t") + head_cell("Torque<br/>stable", "t");
+  head += head_cell("Angle a3<br/>(95 %)", "t") + head_cell("Angle<br/>stable", "t");
+  head += head_cell("Torque,<br/>result by result", "t");
   return table(head, rows);
 }
 
@@ -177,8 +191,8 @@ std::string numbers_table(const AssessedStratum& assessed, const work::Study& st
   std::string counts = fmt::format("{}: OK {}, NG {}", counted(stratum.results.size(), "result"),
                                    stratum.ok, stratum.ng);
   if (stratum.ng > 0) counts += fmt::format(" ({})", codes_of(stratum));
-  counts += fmt::format("; yield {} %; missed {} (of the tool)", yield_text(assessed),
-                        missed_of(study.tool(stratum.tool)));
+  counts +=
+      fmt::format("; yield {} %; missed {}", yield_text(assessed), missed_words(stratum, study));
   for (const std::string& line : left_out_of(stratum, study.options())) counts += "; " + line;
   return table(head, rows) + fmt::format("<ul>\n<li>{}</li>\n{}</ul>\n", escape(counts), remarks);
 }

@@ -94,8 +94,8 @@ Columns columns_of(const AssessedQuantity& quantity, double step) {
   std::int64_t high = steps_of(moments.max().value_or(0), step);
   const statistics::Specification& limits = quantity.specification;
   if (limits.is_usable() && limits.lower && limits.upper) {
-    const std::int64_t lower = steps_of(*limits.lower, step);
-    const std::int64_t upper = steps_of(*limits.upper, step);
+    const auto lower = static_cast<std::int64_t>(std::ceil(*limits.lower / step - 1e-6));
+    const auto upper = static_cast<std::int64_t>(std::floor(*limits.upper / step + 1e-6));
     const std::int64_t room = std::max<std::int64_t>((upper - lower) / 4, 1);
     low = std::max(std::min(low, lower), lower - room);
     high = std::min(std::max(high, upper), upper + room);
@@ -104,6 +104,23 @@ Columns columns_of(const AssessedQuantity& quantity, double step) {
   Columns columns{.first = low, .steps = (span + most - 1) / most};
   columns.count = static_cast<std::size_t>((span + columns.steps - 1) / columns.steps);
   return columns;
+}
+
+using statistics::Side;
+
+/// The first column whose values a lower limit allows, or the last one that an upper one does.
+std::optional<std::int64_t> column_of(const std::optional<double>& limit, const Columns& columns,
+                                      double step, Side side) {
+  if (!limit) return std::nullopt;
+  // A limit that is a step of the resolution must not lose it to the error of the division.
+  constexpr double error = 1e-6;
+  const double steps = *limit / step;
+  const auto first = static_cast<std::int64_t>(side == Side::lower ? std::ceil(steps - error)
+                                                                   : std::floor(steps + error));
+  const std::int64_t distance = first - columns.first;
+  if (distance < 0) return std::nullopt;
+  return side == Side::lower ? (distance + columns.steps - 1) / columns.steps
+                             : distance / columns.steps;
 }
 
 /// A character for each column, from an empty one to a full block.
@@ -137,19 +154,14 @@ std::string histogram_line(const AssessedQuantity& quantity, const Stratum& stra
   }
   const std::size_t most =
       std::max<std::size_t>(*std::max_element(counts.begin(), counts.end()), 1);
-  const auto column_of = [&](const std::optional<double>& limit) -> std::optional<double> {
-    if (!limit) return std::nullopt;
-    return (*limit / step - static_cast<double>(columns.first)) /
-           static_cast<double>(columns.steps);
-  };
-  const auto lower = column_of(quantity.specification.lower);
-  const auto upper = column_of(quantity.specification.upper);
   std::string bars;
+  const auto lower = column_of(quantity.specification.lower, columns, step, Side::lower);
+  const auto upper = column_of(quantity.specification.upper, columns, step, Side::upper);
   for (std::size_t at = 0; at < counts.size(); ++at) {
-    const auto place = static_cast<double>(at);
-    if (lower && *lower >= place && *lower < place + 1) bars += "\u2503";
+    const auto place = static_cast<std::int64_t>(at);
+    if (lower == place) bars += "\u2503";
     bars += block_of(counts[at], most);
-    if (upper && *upper >= place && *upper < place + 1) bars += "\u2503";
+    if (upper == place) bars += "\u2503";
   }
   const int decimals = decimals_of(exact_step);
   const auto edge = [&](std::int64_t steps) {
@@ -170,12 +182,7 @@ std::string heading_of(const AssessedStratum& assessed, const work::StoreFacts& 
   std::string text = facts.place(stratum.place).name;
   text += fmt::format("  serial {}", tool.name.serial);
   if (stratum.facts.preset) text += fmt::format("  preset {}", *stratum.facts.preset);
-  if (stratum.facts.target) {
-    const Decimal target = work::value_of(Quantity::torque, *stratum.facts.target);
-    text += fmt::format("  target {} {}", work::without_zeros(target).to_string(),
-                        stratum.facts.torque_unit);
-    text.erase(text.find_last_not_of(' ') + 1);
-  }
+  if (stratum.facts.target) text += "  target " + target_of(stratum);
   const work::QuantityLimits& limits = stratum.limits[Quantity::torque];
   const std::string range = range_of(limits);
   const std::string origin = origin_of(limits, stratum, zone);
@@ -206,7 +213,7 @@ std::string counts_of(const AssessedStratum& assessed, const work::Study& study)
     text += fmt::format("   yield {} % ({}\u2026{})", percent(assessed.yield->share),
                         percent(assessed.yield->low), percent(assessed.yield->high));
   }
-  return text + fmt::format("   missed {}\n", missed_of(study.tool(stratum.tool)));
+  return text + fmt::format("   missed {}\n", missed_words(stratum, study));
 }
 
 std::string stratum_text(const AssessedStratum& assessed, const work::Study& study,

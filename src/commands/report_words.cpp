@@ -60,7 +60,7 @@ std::string periods_text(const AssessedQuantity& quantity, const Stratum& stratu
                   ", ");
   }
   if (chart.periods.size() > most) {
-    text += fmt::format(" and {} times more", chart.periods.size() - most);
+    text += fmt::format(" and {} more", counted(chart.periods.size() - most, "time"));
   }
   return text;
 }
@@ -139,6 +139,22 @@ std::string missed_of(const work::StudiedTool& tool) {
   return tool.missed == 0 ? "an unknown number" : fmt::format("{} or more", tool.missed);
 }
 
+std::string missed_words(const Stratum& stratum, const work::Study& study) {
+  const std::vector<const Stratum*> all = study.strata();
+  const auto of_tool = std::count_if(
+      all.begin(), all.end(), [&](const Stratum* each) { return each->tool == stratum.tool; });
+  const work::StudiedTool& tool = study.tool(stratum.tool);
+  return missed_of(tool) + (of_tool > 1 && !tool.gaps.empty() ? " of this tool" : "");
+}
+
+std::string target_of(const Stratum& stratum) {
+  if (!stratum.facts.target) return "\u2013";
+  const Decimal target = work::value_of(Quantity::torque, *stratum.facts.target);
+  std::string text = work::with_least_decimals(target, stratum.steps[Quantity::torque]).to_string();
+  if (!stratum.facts.torque_unit.empty()) text += " " + stratum.facts.torque_unit;
+  return text;
+}
+
 std::string bounds_of(const statistics::Index& index) {
   return fmt::format("{}\u2026{}", chart::number_text(index.low, 2),
                      chart::number_text(index.high, 2));
@@ -176,8 +192,9 @@ std::string reasons_of(const AssessedQuantity& quantity, const Stratum& stratum,
     return assessment.moments.count() < 25 ? "25 values are needed" : "no control limits";
   }
   const statistics::Stability& stability = assessment.chart->stability;
+  const double expected = stability.expected();
   std::string text = fmt::format("{}, {} by chance", counted(stability.signals(), "signal"),
-                                 chart::number_text(stability.expected(), 0));
+                                 expected < 1 ? "less than 1" : fmt::format("{:.0f}", expected));
   if (assessment.is_too_coarse) text = joined(std::move(text), "resolution too coarse");
   if (stability.is_greyed) {
     text = joined(std::move(text), fmt::format("neighbours depend on each other ({:.2f})",

@@ -48,6 +48,12 @@ std::string code_name(std::int64_t code);
 /// "12", "12 or more", "an unknown number"; "0".
 std::string missed_of(const work::StudiedTool& tool);
 
+/// The same, with a word where the tool has other strata, too.
+std::string missed_words(const Stratum& stratum, const work::Study& study);
+
+/// "2.80 N.m"; "–".
+std::string target_of(const Stratum& stratum);
+
 /// "2.59…2.81"
 std::string bounds_of(const statistics::Index& index);
 /// Of the performance; "–" where there is none, with the reason.

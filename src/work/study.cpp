@@ -32,8 +32,9 @@ const T& by_id(const std::vector<T>& rows, RowId id) {
   return found == rows.end() ? none : *found;
 }
 
-std::string shown(const std::optional<Decimal>& value) {
-  return value ? without_zeros(*value).to_string() : "not known";
+/// With the decimals of the product's torque.
+std::string shown(const std::optional<Decimal>& value, const Decimal& step) {
+  return value ? with_least_decimals(*value, step).to_string() : "not known";
 }
 
 std::optional<Decimal> torque_of(const std::optional<std::int64_t>& stored) {
@@ -106,24 +107,27 @@ bool has_same_values(const std::optional<store::PresetSettings>& a,
   return a ? b != nullptr && a->values == b->values : b == nullptr;
 }
 
+std::string setting_text(const store::PresetSettings& settings, Setting which) {
+  const auto& value = settings[which];
+  if (!value) return "not known";
+  if (which != Setting::torque_limit) return std::to_string(*value);
+  return without_zeros(Decimal(*value, -torque_decimals)).to_string() + " %";
+}
+
 /// What is different between two strata of one preset, in words.
-std::string change_between(const StratumFacts& a, const StratumFacts& b) {
+std::string change_between(const StratumFacts& a, const StratumFacts& b, const Decimal& step) {
   std::string text;
   const auto add = [&](std::string_view what, const std::string& before,
                        const std::string& behind) {
     if (before == behind) return;
     text += fmt::format("{}{} {} \u2192 {}", text.empty() ? "" : ", ", what, before, behind);
   };
-  add("target", shown(torque_of(a.target)), shown(torque_of(b.target)));
-  const auto setting = [](const StratumFacts& facts, Setting which, int decimals) {
-    if (!facts.settings || !(*facts.settings)[which]) return std::string("not known");
-    return without_zeros(Decimal(*(*facts.settings)[which], -decimals)).to_string();
-  };
-  const auto add_setting = [&](std::string_view what, Setting which, int decimals = 0) {
-    add(what, setting(a, which, decimals), setting(b, which, decimals));
+  add("target", shown(torque_of(a.target), step), shown(torque_of(b.target), step));
+  const auto add_setting = [&](std::string_view what, Setting which) {
+    add(what, setting_text(*a.settings, which), setting_text(*b.settings, which));
   };
   if (a.settings && b.settings) {
-    add_setting("torque limit %", Setting::torque_limit, torque_decimals);
+    add_setting("torque limit", Setting::torque_limit);
     add_setting("mode", Setting::mode);
     add_setting("target angle", Setting::target_angle);
     add_setting("smallest angle", Setting::min_angle);
@@ -204,6 +208,11 @@ Decimal without_zeros(Decimal value) {
   if (point == std::string::npos) return value;
   const auto last = text.find_last_not_of('0');
   return value.with_decimals(static_cast<int>(last > point ? last - point : 0));
+}
+
+Decimal with_least_decimals(Decimal value, const Decimal& step) {
+  const Decimal bare = without_zeros(value);
+  return bare.exponent() > step.exponent() ? bare.with_decimals(-step.exponent()) : bare;
 }
 
 Decimal value_of(Quantity quantity, std::int64_t stored) {
@@ -360,7 +369,8 @@ class Study::ToolCourse {
     stratum->limits = limits_of(stratum->facts, study_->options_);
     stratum->steps = product.steps;
     if (!of_preset.empty()) {
-      stratum->change = change_between(of_preset.back()->facts, stratum->facts);
+      stratum->change =
+          change_between(of_preset.back()->facts, stratum->facts, product.steps[Quantity::torque]);
     }
     of_preset.push_back(std::move(stratum));
     return *of_preset.back();
@@ -394,7 +404,9 @@ class Study::ToolCourse {
       const auto torque = torque_of(event.columns[Column::torque]);
       const auto& angle = event.columns[Column::a3];
       exclusion.is_found = true;
-      exclusion.value = fmt::format("torque {}", shown(torque));
+      exclusion.value = fmt::format(
+          "torque {}",
+          shown(torque, study_->facts_->product(place_of(event.place)).steps[Quantity::torque]));
       if (angle) exclusion.value += fmt::format(", angle {}", *angle);
       return true;
     }

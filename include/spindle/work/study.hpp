@@ -202,6 +202,9 @@ class Study {
 /// A value as it stands in a store: "2.7100" of a torque, "6301" of an angle.
 Decimal value_of(Quantity quantity, std::int64_t stored);
 
+/// The same number with as many decimals as a step has, or more where it has more.
+Decimal with_least_decimals(Decimal value, const Decimal& step);
+
 /// The same number without zeros at its end: "2.7" of "2.7000".
 Decimal without_zeros(Decimal value);
 

@@ -1,0 +1,270 @@
+// What a report says of results, on a terminal and as a page.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "commands/exact_numbers.hpp"
+#include "commands/report_assessment.hpp"
+#include "commands/report_page.hpp"
+#include "commands/report_selection.hpp"
+#include "commands/report_text.hpp"
+#include "support/study_bench.hpp"
+
+using namespace spindle;
+using namespace spindle::commands;
+using namespace spindle::test;
+
+namespace {
+
+bool contains(std::string_view text, std::string_view part) {
+  return text.find(part) != std::string_view::npos;
+}
+
+/// A report on what is added to a bench.
+struct Told {
+  Bench bench = {};
+  ReportOptions options = {};
+
+  /// Values that go around a mean, two hundredths up and down.
+  void add(std::size_t count, std::int64_t mean = 271, std::int64_t begin = 1) {
+    constexpr std::array<std::int64_t, 8> pattern = {0, 2, -1, 1, -2, 0, 1, -1};
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto at = begin + static_cast<std::int64_t>(i);
+      auto& event = bench.result(at, mean + pattern[i % 8]);
+      event.columns[Column::a3] = 6300 + 10 * pattern[(i * 3) % 8];
+    }
+  }
+
+  template <typename Use>
+  auto with_report(Use use) const {
+    Study study(bench.facts, bench.options, bench.exclusions);
+    for (const store::EventView& event : bench.events) study.add(event);
+    return use(assess_study(study, options));
+  }
+
+  [[nodiscard]] std::string text() const {
+    return with_report([](const Assessed& assessed) {
+      std::string text;
+      for (const std::string& line : report_lines(assessed, zone)) text += line + '\n';
+      return text;
+    });
+  }
+  [[nodiscard]] std::string page() const {
+    return with_report([&](const Assessed& assessed) {
+      return report_page(
+          assessed,
+          {.zone = zone, .made = bench_second(9000), .version = "9.9", .options = options});
+    });
+  }
+  /// Of the torque of the first stratum.
+  [[nodiscard]] statistics::Assessment torque() const {
+    return with_report([](const Assessed& assessed) {
+      return assessed.strata.front().quantities[Quantity::torque].assessment;
+    });
+  }
+  [[nodiscard]] std::vector<std::string> unmet() const {
+    return with_report([](const Assessed& assessed) { return assessed.unmet; });
+  }
+
+  static constexpr ReportZone zone = {std::chrono::minutes(60)};
+};
+
+}  // namespace
+
+TEST_CASE("one aborted rundown does not ruin Ppk") {
+  Told told;
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  told.add(100);
+  const double before = told.torque().performance.index->value;
+  told.bench.result(101, 135, 333);
+  CHECK(told.torque().performance.index->value == before);
+  CHECK(contains(told.text(), "not completed and left out of the statistics: 1 (E333 1)"));
+  told.bench.options.include_not_completed = true;
+  CHECK(told.torque().performance.index->value < 1);
+  CHECK(contains(told.text(), "not completed, yet in the statistics as you asked: 1 (E333 1)"));
+}
+
+TEST_CASE("what the limits rejected is in the index") {
+  Told told;
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  told.add(100);
+  const double before = told.torque().performance.index->value;
+  told.bench.result(101, 300, 335);
+  CHECK(told.torque().moments.count() == 101);
+  CHECK(told.torque().performance.index->value < before / 2);
+}
+
+TEST_CASE("a shift of today is seen against the baseline, not hidden in new limits") {
+  Told told;
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  told.add(200);
+  const statistics::ControlLimits before = told.torque().chart->limits;
+  told.add(40, 276, 201);
+  const statistics::Assessment after = told.torque();
+  CHECK(after.chart->limits.baseline.count < 200);
+  CHECK(after.chart->limits.upper == before.upper);
+  CHECK(after.chart->limits.upper != doctest::Approx(2.981));
+  CHECK(after.chart->stability.verdict == statistics::Verdict::unstable);
+  CHECK_FALSE(after.capability);
+  CHECK(contains(told.page(), "baseline: "));
+}
+
+TEST_CASE("one limit has an index of its own, and none of two sides") {
+  Told told;
+  told.bench.options.limits[Quantity::torque] =
+      GivenLimits{.lower = std::nullopt, .upper = Decimal(28, -1)};
+  told.add(60);
+  const statistics::Indices indices = told.torque().performance;
+  CHECK(indices.index->name == statistics::IndexName::ppu);
+  CHECK_FALSE(indices.centred);
+  CHECK(contains(told.text(), "limits up to 2.8 (given)"));
+  CHECK(contains(told.text(), "one limit"));
+  CHECK(contains(told.page(), "Ppu"));
+}
+
+TEST_CASE("few values, no limits and a coarse resolution are said") {
+  Told told;
+  told.add(29);
+  CHECK(contains(told.text(), "no limits (the settings of the preset were not read)"));
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  CHECK(contains(told.text(), "only 29 values, 30 are needed"));
+  told.bench.events.clear();
+  for (std::int64_t at = 1; at <= 60; ++at) told.bench.result(at, 271 + (at % 9 == 0 ? 1 : 0));
+  CHECK(contains(told.text(), "too coarse"));
+  CHECK(contains(told.page(), "too coarse"));
+}
+
+TEST_CASE("what was missed and what was taken out is told everywhere") {
+  Told told;
+  told.bench.facts.gaps = {{.tool = 1,
+                            .after = 10,
+                            .before = 15,
+                            .missed = 4,
+                            .at_least = true,
+                            .began = bench_second(10),
+                            .ended = bench_second(15),
+                            .reason = "link lost"}};
+  told.bench.exclusions = {{.serial = "42", .epoch = 0, .number = 3, .reason = "test <screw>"}};
+  told.add(10);
+  told.add(20, 271, 15);
+  CHECK(contains(told.text(), "missed 4 or more"));
+  CHECK(contains(told.text(), "excluded: 42/0/3: test <screw> (torque 2.70, angle 6310)"));
+  const std::string page = told.page();
+  CHECK(contains(page, "4 or more"));
+  CHECK(contains(page, "link lost"));
+  CHECK(contains(page, "Excluded by hand: 42/0/3"));
+  CHECK(contains(page, "test &lt;screw&gt;"));
+}
+
+TEST_CASE("times have a zone") {
+  Told told;
+  told.add(30);
+  CHECK(contains(told.text(), "UTC+01:00"));
+  CHECK(contains(told.page(), "UTC+01:00"));
+}
+
+TEST_CASE("Cmk is told only when it was asked for, with its condition") {
+  Told told;
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  told.add(100);
+  CHECK_FALSE(contains(told.text(), "Cmk"));
+  CHECK_FALSE(contains(told.page(), "Cmk"));
+  told.options.machine = MachineStudy::yes;
+  CHECK(contains(told.text(), "Cmk"));
+  CHECK(contains(told.page(), "no test by VDI/VDE 2645-2"));
+}
+
+TEST_CASE("a page needs nothing else, and what comes from outside is text") {
+  Told told;
+  told.bench.facts.places.front().name = "<script>alert(1)</script>\"'&";
+  told.bench.facts.tools.front().name.serial = "</style><img src=x onerror=y>";
+  told.bench.facts.places.front().torque_unit = "<b>";
+  told.bench.facts.settings = {settings(0, 271, 10)};
+  told.add(60);
+  told.bench.result(100, 260, 335);
+  const std::string page = told.page();
+  CHECK_FALSE(contains(page, "<script"));
+  CHECK_FALSE(contains(page, "<img"));
+  CHECK_FALSE(contains(page, "<b>"));
+  CHECK_FALSE(contains(page, "href="));
+  CHECK_FALSE(contains(page, "src="));
+  CHECK_FALSE(contains(page, "url("));
+  CHECK(contains(page, "&lt;script&gt;alert(1)&lt;/script&gt;"));
+  CHECK(contains(page, "default-src 'none'; style-src 'unsafe-inline'"));
+  CHECK(contains(page, "VDI/VDE 2645-2"));
+}
+
+TEST_CASE("many strata are small charts, and the page says which stand in full") {
+  Told told;
+  for (std::int64_t preset = 1; preset <= 20; ++preset) {
+    for (std::int64_t i = 0; i < 30; ++i) {
+      told.bench.result(preset * 100 + i, 271 + i % 3).columns[Column::preset] = preset;
+    }
+  }
+  const std::string page = told.page();
+  CHECK(contains(page, "Drawn in full: the 6 of 20 tools and presets with most results"));
+  CHECK(contains(page, "Other tools and presets"));
+  CHECK(page.size() < 600'000);
+}
+
+TEST_CASE("requirements are met by the index, or by its lower bound") {
+  Told told;
+  told.bench.facts.settings = {settings(0, 271, 3)};
+  told.add(100);
+  const statistics::Index index = *told.torque().performance.index;
+  REQUIRE(index.low < index.value);
+  told.options.required = {fmt::format("ppk={:.3f}", index.value - 0.01), "yield=100%"};
+  CHECK(told.unmet().empty());
+  told.options.required_of = RequiredOf::lower_bound;
+  CHECK(told.unmet().size() == 2);
+  told.options.required = {"ppk=1.0", "angle.ppk=0.1", "pp=0.1"};
+  told.options.required_of = RequiredOf::index;
+  const auto unmet = told.unmet();
+  REQUIRE(unmet.size() == 1);
+  CHECK(unmet.front() == "station3 preset 1: angle.ppk=0.1 is not met: it cannot be judged");
+}
+
+TEST_CASE("requirements that cannot be read are refused") {
+  for (const char* text : {"ppk", "ppk=", "ppk=x", "ppm=3", "depth.ppk=1", "ppk=-1", "ppk=50%",
+                           "yield=1.2", "yield=101%"}) {
+    CAPTURE(text);
+    const auto read = read_requirements({text});
+    REQUIRE_FALSE(read);
+    CHECK(read.error().code == Errc::usage);
+  }
+  const auto read = read_requirements({"yield=99.5%", "angle.cpk=1.67"});
+  REQUIRE(read);
+  CHECK(read->at(0).least == Decimal(995, -3));
+  CHECK(read->at(1).quantity == Quantity::angle);
+}
+
+TEST_CASE("limits and exclusions that cannot be read are refused") {
+  for (const char* text : {"2.44", ":", "2.98:2.44", "a:b", "1:2:3"}) {
+    CAPTURE(text);
+    CHECK_FALSE(study_options_of({.limits = text}));
+  }
+  CHECK(study_options_of({.limits = "2.44:"})->limits[Quantity::torque]->lower == Decimal(244, -2));
+  CHECK_FALSE(exclusions_of({.excluded = {"42/0/1"}}));
+  CHECK_FALSE(exclusions_of({.excluded = {"42/0"}, .reasons = {"x"}}));
+  CHECK_FALSE(exclusions_of({.excluded = {"/0/1"}, .reasons = {"x"}}));
+  CHECK_FALSE(exclusions_of({.excluded = {"42/0/70000"}, .reasons = {"x"}}));
+  const auto exclusions = exclusions_of({.excluded = {"a/b/3/17"}, .reasons = {"x"}});
+  REQUIRE(exclusions);
+  CHECK(exclusions->front().serial == "a/b");
+  CHECK(exclusions->front().epoch == 3);
+  CHECK(exclusions->front().number == 17);
+}
+
+TEST_CASE("numbers of records are exact decimals") {
+  CHECK(to_double(Decimal(2439, -3)) == 2.439);
+  CHECK(to_decimal(2.439)->to_string() == "2.439");
+  CHECK(to_decimal(1.0 / 3)->to_string() == "0.333333333");
+  CHECK(to_decimal(6300)->to_string() == "6300");
+  CHECK_FALSE(to_decimal(1e300));
+  CHECK_FALSE(to_decimal(std::nan("")));
+}
