@@ -34,23 +34,16 @@ std::string bit_text(const catalogue::BitName& bit, const Parameter& parameter) 
   return fmt::format("{} {} while {} is {}", place, bit.text, parameter.bits_by, *bit.when);
 }
 
-<<<<<<< HEAD
+/// All names of a bit field; of a part of it only its own.
 report::Texts bits_of(const Parameter& parameter) {
   report::Texts bits;
   bits.reserve(parameter.bits.size());
-  for (const auto& bit : parameter.bits) bits.push_back(bit_text(bit, parameter));
-  return bits;
-=======
-/// All names of a bit field; of a part of it only its own.
-std::vector<std::string> bit_texts(const Parameter& parameter) {
-  std::vector<std::string> texts;
-  for (const catalogue::BitName& bit : parameter.bits) {
+  for (const auto& bit : parameter.bits) {
     const bool is_meant =
         parameter.part.empty() || same_ignoring_case(bit.text, parameter.part.view());
-    if (is_meant) texts.push_back(bit_text(bit, parameter));
+    if (is_meant) bits.push_back(bit_text(bit, parameter));
   }
-  return texts;
->>>>>>> w-val
+  return bits;
 }
 
 /// What it means, with the labels of an enumeration or the bits of a bit field behind it.
@@ -62,23 +55,14 @@ std::string meaning_of(const Parameter& parameter, const report::Texts& bits) {
     text.append(between).append(part);
     between = ", ";
   };
-<<<<<<< HEAD
   for (const std::string& bit : bits) add(bit);
-=======
-  for (const std::string& bit : bit_texts(parameter)) add(bit);
->>>>>>> w-val
   for (const auto& label : parameter.labels) add(std::to_string(label.number) + " " + label.text);
   return text + ")";
 }
 
 /// What only some products say of their parameters.
-<<<<<<< HEAD
 void add_drive_fields(const Parameter& parameter, report::Texts bits, report::Record& record) {
   if (!bits.empty()) record.fields.push_back({"bits", std::move(bits)});
-=======
-void add_drive_fields(const Parameter& parameter, report::Record& record) {
-  if (!parameter.bits.empty()) record.fields.push_back({"bits", bit_texts(parameter)});
->>>>>>> w-val
   if (parameter.except) {
     record.fields.push_back({"except_minimum", number_or_null(parameter.except->minimum)});
     record.fields.push_back({"except_maximum", number_or_null(parameter.except->maximum)});
