@@ -1,11 +1,8 @@
 """record against a tool whose own count is known: every number is a row or inside a gap, whatever becomes
 of the recorder, and nothing is told before it is stored.
-
-With SPINDLE_LONG=1 the recorder is killed 200 times instead of 20.
 """
 
 import contextlib
-import os
 import pathlib
 import random
 import resource
@@ -18,8 +15,7 @@ import unittest
 import support
 from event_server import NUMBERS, EventServer
 
-LONG = os.environ.get("SPINDLE_LONG") == "1"
-KILLS = 200 if LONG else 20
+KILLS = 40 if support.is_sanitized() else 200
 PROFILE = ("--profile", "doga-bm")
 
 
@@ -80,10 +76,15 @@ class Store:
         return self.ask("PRAGMA integrity_check")
 
 
-def stored(store, number):
+def soon(ask):
+    """What a store answers that may not be made yet; nothing while it is not."""
     with contextlib.suppress(sqlite3.OperationalError):
-        return any(n == number for _, n in store.numbers())
-    return False
+        return ask()
+    return None
+
+
+def stored(store, number):
+    return number in {n for _, n in soon(store.numbers) or ()}
 
 
 class Recorded(unittest.TestCase):
@@ -239,11 +240,30 @@ class Recorded(unittest.TestCase):
         self.assertEqual(self.store.holes(1961, 1982), [])
         self.assertEqual(self.store.ask("SELECT count(*) FROM gap"), [(0,)])
 
+    def test_fifty_tools_at_once(self):
+        with contextlib.ExitStack() as stack:
+            tools = [stack.enter_context(EventServer(serial=1000 + index)) for index in range(50)]
+            recorder = stack.enter_context(
+                Recording(self.path, *(tool.url for tool in tools), *PROFILE))
+            for tool in tools:
+                support.wait_until(lambda tool=tool: tool.caught_up, "the recorder listens")
+            for _ in range(20):
+                for tool in tools:
+                    tool.event()
+            support.wait_until(lambda: len(recorder.records("event")) == 50 * 21, "all is told")
+            status = pathlib.Path(f"/proc/{recorder.pid}/status").read_text()
+            peak = int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1])
+            recorder.end()
+        self.assertEqual(self.store.ask("SELECT count(*), count(DISTINCT tool) FROM event"), [(50 * 21, 50)])
+        self.assertEqual(self.store.ask("SELECT count(*) FROM gap"), [(0,)])
+        if not support.is_sanitized():
+            self.assertLess(peak, 100 * 1024, "KiB of memory at most")
+
     def test_settings_are_kept_with_the_results(self):
         with support.simulator("doga-bm", "--rundown-every", "200ms") as tool, \
                 Recording(self.path, tool, *PROFILE) as recorder:
             support.wait_until(
-                lambda: self.path.exists() and self.store.ask("SELECT count(*) FROM preset")[0][0] >= 15,
+                lambda: soon(lambda: self.store.ask("SELECT count(*) FROM preset HAVING count(*) >= 15")),
                 "the settings are stored")
             recorder.end()
         settings = self.store.ask("SELECT target_torque, torque_limit, max_angle FROM preset WHERE preset = 1")
