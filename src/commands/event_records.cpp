@@ -57,7 +57,9 @@ std::vector<report::Column> result_columns(const catalogue::Profile& profile) {
     for (std::size_t index = 0; index < keys.size(); ++index) {
       const catalogue::Parameter& parameter = *layout.fields()[index].parameter;
       if (parameter.name != wanted.parameter) continue;
-      const auto align = parameter.labels.empty() ? report::Align::right : report::Align::left;
+      const bool words =
+          !parameter.labels.empty() || parameter.encoding.kind == catalogue::Kind::text;
+      const auto align = words ? report::Align::left : report::Align::right;
       const std::size_t width = std::max<std::size_t>(wanted.width, wanted.heading.size());
       columns.push_back({wanted.heading, keys[index], align, width});
     }
