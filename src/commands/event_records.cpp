@@ -27,9 +27,11 @@ std::vector<report::Column> result_columns(const catalogue::Profile& profile) {
   const catalogue::EventLayout layout(profile);
   for (const catalogue::EventColumn& wanted : profile.events->columns) {
     for (const auto& field : layout.fields()) {
-      if (field.parameter->name != wanted.parameter) continue;
-      const bool is_number = field.parameter->labels.empty();
-      const auto align = is_number ? report::Align::right : report::Align::left;
+      const catalogue::Parameter& parameter = *field.parameter;
+      if (parameter.name != wanted.parameter) continue;
+      const bool words =
+          !parameter.labels.empty() || parameter.encoding.kind == catalogue::Kind::text;
+      const auto align = words ? report::Align::left : report::Align::right;
       const std::size_t width = std::max<std::size_t>(wanted.width, wanted.heading.size());
       columns.push_back({wanted.heading, field.key, align, width});
     }

@@ -22,10 +22,11 @@ Result<std::unique_ptr<const RunModel>> make(const catalogue::Profile& profile) 
 
 Result<std::unique_ptr<const RunModel>> RunModel::of(const catalogue::Profile& profile) {
   if (!profile.run) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = "this product cannot be started and stopped by Modbus",
-                                .hint = "start and stop it at the tool",
-                                .name = profile.id});
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "the profile does not say how it is started and stopped by Modbus",
+              .hint = "start and stop it at the tool",
+              .name = profile.id});
   }
   switch (profile.run->kind()) {
     case catalogue::RunKind::start_action:

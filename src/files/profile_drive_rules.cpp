@@ -135,9 +135,9 @@ class DriveRules {
       findings_.add_once(origin.of("motion"),
                          fmt::format("{}: a motion needs the section 'run'", action.name));
     }
-    if (action.busy > Duration::zero() && !has_command_word()) {
-      findings_.add_once(origin.of("busy"), fmt::format("{}: without the section 'run' no status "
-                                                        "says that it is busy",
+    if (action.busy > Duration::zero() && !tells_busy()) {
+      findings_.add_once(origin.of("busy"), fmt::format("{}: no status in the section 'run' says "
+                                                        "that it is busy",
                                                         action.name));
     }
     const bool pair = catalogue::register_count(action.encoding) == 2;
@@ -148,10 +148,17 @@ class DriveRules {
     }
   }
 
-  /// The words of a motion, and the status that says "busy", are those of a command word.
+  /// The words of a motion are those of a command word.
   [[nodiscard]] bool has_command_word() const {
     if (draft_.run.entry == nullptr) return false;
     return !draft_.profile.run || draft_.profile.run->word() != nullptr;
+  }
+
+  [[nodiscard]] bool tells_busy() const {
+    if (has_command_word()) return true;
+    const auto& run = draft_.profile.run;
+    const auto* command = run ? run->command_register() : nullptr;
+    return command != nullptr && command->monitor.busy.has_value();
   }
 
   const ProfileDraft& draft_;

@@ -135,6 +135,8 @@ Result<void> check_evidence(const Action& action, const Target& target, Acceptan
                         target.verified.end();
   const bool accepted = verified || acceptance == Acceptance::unverified;
   if (!moves_or_locks || !is_weak(action.evidence) || accepted) return {};
+  const std::string check =
+      action.check.empty() ? "try it where nothing can be hurt" : action.check.to_string();
   return tl::unexpected(Error{
       .code = Errc::unverified,
       .message = fmt::format(
@@ -142,7 +144,7 @@ Result<void> check_evidence(const Action& action, const Target& target, Acceptan
           action.address.value, action.name, catalogue::to_text(action.evidence), action.source),
       .hint = fmt::format("{}; then add --accept-unverified, or list it under 'verified' in the "
                           "tools file",
-                          action.check),
+                          check),
       .name = action.name,
       .register_address = action.address.value});
 }

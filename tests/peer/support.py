@@ -78,13 +78,13 @@ class Outcome:
         return f"status {self.status}\n{self.out}{self.err}"
 
 
-def run(*arguments):
+def run(*arguments, folder=_scratch.name):
     """Any program, in surroundings that the user's own files do not reach."""
-    surroundings = dict(os.environ, LC_ALL="C.UTF-8", HOME=_scratch.name)
+    surroundings = dict(os.environ, LC_ALL="C.UTF-8", HOME=str(folder))
     for name in ("SPINDLE_TOOLS", "XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
         surroundings.pop(name, None)
     done = subprocess.run(
-        [str(argument) for argument in arguments], cwd=_scratch.name, env=surroundings,
+        [str(argument) for argument in arguments], cwd=folder, env=surroundings,
         stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False)
     return Outcome(done)
 
