@@ -33,12 +33,11 @@ Result<Parameter> with_names(const Parameter& parameter, const ValueOf& value_of
 
 Result<Parameter> with_scale(Parameter parameter, const ValueOf& value_of) {
   const std::string decider = parameter.scale_by;
-  const auto value = value_of(decider);
-  if (!value) return tl::unexpected(value.error());
-  if (const auto power = power_of(*value)) return with_power(std::move(parameter), *power);
+  TRY_LET(const auto value, value_of(decider));
+  if (const auto power = power_of(value)) return with_power(std::move(parameter), *power);
   return tl::unexpected(
       Error{.code = Errc::bad_value,
-            .message = fmt::format("{} is no power of ten: {}", decider, value->to_string())});
+            .message = fmt::format("{} is no power of ten: {}", decider, value.to_string())});
 }
 
 }  // namespace

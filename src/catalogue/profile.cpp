@@ -220,16 +220,14 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
   if (const auto range = raw_range(name); !range.empty()) {
     std::vector<Parameter> parameters;
     for (const std::string& one : range) {
-      auto found = purpose == Purpose::reading ? profile.find(one) : find_any(profile, one);
-      if (!found) return tl::unexpected(std::move(found.error()));
-      parameters.push_back(std::move(*found));
+      TRY_LET(auto found, purpose == Purpose::reading ? profile.find(one) : find_any(profile, one));
+      parameters.push_back(std::move(found));
     }
     return parameters;
   }
   if (!is_pattern(name)) {
-    auto one = purpose == Purpose::reading ? profile.find(name) : find_any(profile, name);
-    if (!one) return tl::unexpected(std::move(one.error()));
-    return std::vector<Parameter>{std::move(*one)};
+    TRY_LET(auto one, purpose == Purpose::reading ? profile.find(name) : find_any(profile, name));
+    return std::vector<Parameter>{std::move(one)};
   }
   auto found = match_named(profile, name);
   if (found.empty() && profile.numbered) found = match_numbered(profile, name);
@@ -250,9 +248,8 @@ Result<std::vector<Parameter>> select_for(const Profile& profile,
   }
   std::unordered_set<std::string> seen;
   for (const std::string& name : names) {
-    auto found = expand(profile, name, purpose);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    for (Parameter& parameter : *found) {
+    TRY_LET(auto found, expand(profile, name, purpose));
+    for (Parameter& parameter : found) {
       if (seen.insert(parameter.name).second) selected.push_back(std::move(parameter));
     }
   }

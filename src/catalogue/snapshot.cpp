@@ -160,20 +160,19 @@ Result<std::vector<std::string>> understand(const std::vector<std::string>& patt
       understood.push_back(pattern);
       continue;
     }
-    auto meant = profile.select({pattern});
-    if (!meant) return tl::unexpected(std::move(meant.error()));
+    TRY_LET(auto meant, profile.select({pattern}));
     const auto same = std::find_if(stored.begin(), stored.end(), [&](const Parameter& parameter) {
-      return parameter.table == meant->front().table && parameter.address == meant->front().address;
+      return parameter.table == meant.front().table && parameter.address == meant.front().address;
     });
-    if (meant->size() == 1 && same == stored.end()) {
-      if (const auto danger = danger_of(meant->front(), profile)) {
+    if (meant.size() == 1 && same == stored.end()) {
+      if (const auto danger = danger_of(meant.front(), profile)) {
         return tl::unexpected(Error{.code = Errc::usage,
                                     .message = danger->effect() + ", so no backup holds it",
                                     .hint = danger->remedy(),
                                     .name = pattern});
       }
     }
-    if (meant->size() != 1 || same == stored.end()) {
+    if (meant.size() != 1 || same == stored.end()) {
       return tl::unexpected(Error{.code = Errc::unknown_name,
                                   .message = "this is no stored parameter, so no backup holds it",
                                   .name = pattern});
@@ -257,8 +256,8 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
   const Decimal& number = wanted.value.number;
   const auto registers = encode(parameter, wanted.value, wanted.raw);
   if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = check_pair(parameter.encoding, profile.link); !fits) return fits;
-  if (auto inside = check_range(parameter, wanted.value); !inside) return inside;
+  TRY(check_pair(parameter.encoding, profile.link));
+  TRY(check_range(parameter, wanted.value));
   const bool has_limits = profile.limit_registers(parameter).has_value();
   if (has_limits && (!present.minimum || !present.maximum)) {
     return tl::unexpected(Error{.code = Errc::out_of_range,
@@ -496,12 +495,10 @@ Result<Selection> Selection::make(const std::vector<std::string>& wanted,
                                   const std::vector<std::string>& ignored, const Profile& profile) {
   const std::vector<Parameter> stored = stored_parameters(profile);
   Selection selection;
-  auto named = understand(wanted, profile, stored);
-  if (!named) return tl::unexpected(std::move(named.error()));
-  auto left_out = understand(ignored, profile, stored);
-  if (!left_out) return tl::unexpected(std::move(left_out.error()));
-  selection.wanted_ = std::move(*named);
-  selection.ignored_ = std::move(*left_out);
+  TRY_LET(auto named, understand(wanted, profile, stored));
+  TRY_LET(auto left_out, understand(ignored, profile, stored));
+  selection.wanted_ = std::move(named);
+  selection.ignored_ = std::move(left_out);
   return selection;
 }
 

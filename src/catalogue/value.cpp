@@ -260,13 +260,12 @@ Result<Value> decode_number(const Parameter& parameter, RegisterView registers) 
     return none(label == nullptr ? std::string() : label->text.to_string());
   }
   if (encoding.is_float()) return decode_float(parameter, pattern);
-  const auto integer = stored_integer(parameter, pattern);
-  if (!integer) return tl::unexpected(integer.error());
-  const Decimal stored(integer->sign, integer->magnitude, 0);
+  TRY_LET(const auto integer, stored_integer(parameter, pattern));
+  const Decimal stored(integer.sign, integer.magnitude, 0);
   const auto number = scaled(encoding, stored);
   if (!number) return tl::unexpected(too_many_digits(parameter, stored));
   return Value{.number = *number,
-               .label = words_for(parameter, plain(*integer)),
+               .label = words_for(parameter, plain(integer)),
                .decimals = shown_decimals(encoding)};
 }
 
@@ -313,9 +312,8 @@ Result<Registers> encode_number(const Parameter& parameter, const Decimal& numbe
                                 RegisterView present) {
   const Encoding& encoding = parameter.encoding;
   if (encoding.is_float()) return encode_float(parameter, number);
-  const auto integer = integer_for(parameter, number);
-  if (!integer) return tl::unexpected(integer.error());
-  if (scaled(encoding, Decimal(integer->sign, integer->magnitude, 0)) != number) {
+  TRY_LET(const auto integer, integer_for(parameter, number));
+  if (scaled(encoding, Decimal(integer.sign, integer.magnitude, 0)) != number) {
     return tl::unexpected(between_steps(parameter, number));
   }
   if (encoding.is_part() && present.size() != register_count(encoding)) {
@@ -323,7 +321,7 @@ Result<Registers> encode_number(const Parameter& parameter, const Decimal& numbe
         fault(Errc::internal, parameter, "it is part of a register that was not read before"));
   }
   const std::uint64_t pattern =
-      encoding.kind == Kind::bcd ? bcd_pattern(integer->magnitude) : to_pattern(encoding, *integer);
+      encoding.kind == Kind::bcd ? bcd_pattern(integer.magnitude) : to_pattern(encoding, integer);
   return to_registers(encoding, pattern, encoding.is_part() ? to_pattern(encoding, present) : 0);
 }
 
@@ -331,18 +329,15 @@ Result<Registers> encode_number(const Parameter& parameter, const Decimal& numbe
 Result<Decimal> nearest(const Parameter& parameter, const Decimal& number) {
   const Encoding& encoding = parameter.encoding;
   if (!encoding.is_float()) {
-    const auto integer = integer_for(parameter, number);
-    if (!integer) return tl::unexpected(integer.error());
-    const Decimal stored(integer->sign, integer->magnitude, 0);
+    TRY_LET(const auto integer, integer_for(parameter, number));
+    const Decimal stored(integer.sign, integer.magnitude, 0);
     const auto shown = scaled(encoding, stored);
     if (!shown) return tl::unexpected(too_many_digits(parameter, stored));
     return *shown;
   }
-  const auto registers = encode_float(parameter, number);
-  if (!registers) return tl::unexpected(registers.error());
-  const auto value = decode_float(parameter, to_pattern(encoding, *registers));
-  if (!value) return tl::unexpected(value.error());
-  return value->number;
+  TRY_LET(const auto registers, encode_float(parameter, number));
+  TRY_LET(const auto value, decode_float(parameter, to_pattern(encoding, registers)));
+  return value.number;
 }
 
 // ---- texts, dates, lists ----
@@ -423,9 +418,8 @@ Result<Value> parse_list(const Parameter& parameter, std::string_view text) {
 
 Result<Value> parse_text(const Parameter& parameter, std::string_view text) {
   const Value typed{.content = Content::text, .text = std::string(text)};
-  const auto registers = encode_text(parameter, typed);
-  if (!registers) return tl::unexpected(registers.error());
-  return decode(parameter, *registers);
+  TRY_LET(const auto registers, encode_text(parameter, typed));
+  return decode(parameter, registers);
 }
 
 /// Whether all texts of a value are such.
@@ -583,7 +577,7 @@ Result<Registers> encode(const Parameter& parameter, const Value& value, Registe
 
 Result<void> check_range(const Parameter& parameter, const Value& value) {
   for (const Value& element : value.elements) {
-    if (auto inside = check_range(parameter, element); !inside) return inside;
+    TRY(check_range(parameter, element));
   }
   if (!value.is_number()) return {};
   const Decimal& number = value.number;
@@ -623,15 +617,11 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   if (encoding.kind == Kind::text || encoding.kind == Kind::date) {
     return parse_text(parameter, text);
   }
-  const auto typed = typed_number(parameter, text);
-  if (!typed) return tl::unexpected(typed.error());
-  if (auto inside = check_range(parameter, {*typed}); !inside) {
-    return tl::unexpected(std::move(inside.error()));
-  }
-  const auto number = nearest(parameter, *typed);
-  if (!number) return tl::unexpected(number.error());
+  TRY_LET(const auto typed, typed_number(parameter, text));
+  TRY(check_range(parameter, {typed}));
+  TRY_LET(const auto number, nearest(parameter, typed));
   const Registers nothing(register_count(encoding));
-  auto value = encode(parameter, {*number}, nothing).and_then([&](const Registers& registers) {
+  auto value = encode(parameter, {number}, nothing).and_then([&](const Registers& registers) {
     return decode(parameter, registers);
   });
   if (!value) return value;
@@ -642,15 +632,13 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   if (value->label.empty() && closed_enumeration(parameter)) {
     return tl::unexpected(not_a_label(parameter, text));
   }
-  if (auto inside = check_range(parameter, *value); !inside) {
-    return tl::unexpected(std::move(inside.error()));
-  }
-  if (*number == *typed) return value;
+  TRY(check_range(parameter, *value));
+  if (number == typed) return value;
   // A label, or the name of a bit, has no neighbours.
   if (closed_enumeration(parameter) || !parameter.bits.empty()) {
-    return tl::unexpected(between_steps(parameter, *typed));
+    return tl::unexpected(between_steps(parameter, typed));
   }
-  value->typed = *typed;
+  value->typed = typed;
   return value;
 }
 

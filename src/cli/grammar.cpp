@@ -522,6 +522,8 @@ std::string report_words() {
 void bind_report_form(Binder& bind, commands::ReportOptions& options) {
   bind.option("-f,--file", "FILE", options.file,
               "write one page of HTML with figures; - is standard output");
+  bind.flag("--interactive", options.interactive, true,
+            "let the run charts of the page zoom, by a script that is part of it");
   bind.flag("--force", options.overwrite, Overwrite::allow, "replace a file that is there");
   bind.option("--rules", "RULES", options.rules, one_of(rule_set_words),
               fmt::format("of the control chart: {}", rule_set_words.alternatives()));

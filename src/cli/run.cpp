@@ -114,8 +114,7 @@ Result<void> begin_capture(const std::string& path, const Disk& disk) {
 
 Result<commands::Outcome> run_command(const Invocation& invocation, World& world,
                                       report::Renderer& renderer) {
-  const auto tools = find_tools(world, invocation);
-  if (!tools) return tl::unexpected(tools.error());
+  TRY_LET(const auto tools, find_tools(world, invocation));
   const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
   const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.frames);
@@ -128,14 +127,12 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
        .state_folder = state,
        .version = version,
        .profiles = profiles,
-       .tools = *tools,
+       .tools = tools,
        .show_frames = show_frames,
        .common = invocation.common},
       {.io = world.io, .serve = world.serve, .end_waits = world.end_waits, .user = invocation.user},
       {.renderer = renderer}};
-  if (auto begun = begin_capture(invocation.common.trace_file, world.disk); !begun) {
-    return tl::unexpected(std::move(begun.error()));
-  }
+  TRY(begin_capture(invocation.common.trace_file, world.disk));
   return invocation.run(context);
 }
 

@@ -57,7 +57,7 @@ class Question {
   Result<void> ask(const std::string& tools, const Context& context) const {
     for (const auto& [name, note] : dangerous_) {
       const std::string what = fmt::format("{} on {}: {}", name, tools, note);
-      if (auto given = ask_typed_consent(what, name, context); !given) return given;
+      TRY(ask_typed_consent(what, name, context));
     }
     if (requests_.empty()) return {};
     std::string what = fmt::format("{} on {}", fmt::join(requests_, ", "), tools);

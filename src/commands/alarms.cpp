@@ -89,9 +89,8 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
   [[nodiscard]] bool changes_tools() const override { return options_->reset == AlarmReset::yes; }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
-    auto sources = alarm_sources(profile);
-    if (!sources) return tl::unexpected(std::move(sources.error()));
-    AlarmPlan plan{std::move(*sources)};
+    TRY_LET(auto sources, alarm_sources(profile));
+    AlarmPlan plan{std::move(sources)};
     if (!changes_tools()) return plan;
     return plan_reset(profile, target, options_->acceptance).map([&](ActionRequest reset) {
       plan.reset = std::move(reset);

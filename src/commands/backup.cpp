@@ -28,9 +28,7 @@ const std::array<Column, 3> columns = {{{"FILE", "file"},
 /// A profile that cannot be read is told before a tool is asked.
 Result<void> check_profiles(const std::vector<Target>& targets, const Context& context) {
   for (const Target& target : targets) {
-    if (auto profile = load_profile(target, context); !profile) {
-      return tl::unexpected(std::move(profile.error()));
-    }
+    TRY(load_profile(target, context));
   }
   return {};
 }
@@ -152,17 +150,15 @@ class Backup final : public Verb<std::monostate, Saved> {
 }  // namespace
 
 Result<Outcome> backup(const BackupOptions& options, Context& context) {
-  auto tools = resolve_compatible_targets(options.targets, context);
-  if (!tools) return tl::unexpected(std::move(tools.error()));
-  const auto paths = choose_paths(*tools, options, context);
-  if (!paths) return tl::unexpected(paths.error());
-  if (auto known = check_profiles(*tools, context); !known) return tl::unexpected(known.error());
+  TRY_LET(auto tools, resolve_compatible_targets(options.targets, context));
+  TRY_LET(const auto paths, choose_paths(tools, options, context));
+  TRY(check_profiles(tools, context));
   if (!options.folder.empty()) {
     auto made = context.disk.make_folders(options.folder, Privacy::usual);
     if (!made) return tl::unexpected(std::move(made.error()));
   }
   const bool is_listed = options.file != standard_output;
-  return run_verb(Backup(options, *paths), {.tools = std::move(*tools), .is_group = is_listed},
+  return run_verb(Backup(options, paths), {.tools = std::move(tools), .is_group = is_listed},
                   options.jobs, context);
 }
 

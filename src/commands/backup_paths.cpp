@@ -71,11 +71,10 @@ Result<BackupPaths> paths_in_folder(const std::vector<Target>& targets, const st
 
 Result<Backups> read_backups(const std::vector<Target>& targets, const std::string& folder,
                              const Context& context) {
-  const auto paths = paths_in_folder(targets, folder);
-  if (!paths) return tl::unexpected(paths.error());
+  TRY_LET(const auto paths, paths_in_folder(targets, folder));
   Backups backups;
   for (const Target& target : targets) {
-    auto file = read_backup_file(paths->at(target.shown), context);
+    auto file = read_backup_file(paths.at(target.shown), context);
     if (!file) return tl::unexpected(with_target(std::move(file.error()), target));
     backups.emplace(target.shown, std::move(*file));
   }

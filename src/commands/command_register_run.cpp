@@ -79,9 +79,8 @@ class RegisterSetup final : public MotorSetup {
   }
 
   Result<std::uint32_t> read_number(const Parameter& parameter) {
-    const auto readings = tool().device.read_each({parameter}, device::Limits::skip);
-    if (!readings) return tl::unexpected(readings.error());
-    const auto& value = readings->front().value;
+    TRY_LET(const auto readings, tool().device.read_each({parameter}, device::Limits::skip));
+    const auto& value = readings.front().value;
     if (!value) return tl::unexpected(value.error());
     return static_cast<std::uint32_t>(value->number.mantissa());
   }
@@ -89,13 +88,12 @@ class RegisterSetup final : public MotorSetup {
   Result<void> enable() {
     if (!plan_->enable) return {};
     const Parameter& parameter = *plan_->enable;
-    const auto before = read_number(parameter);
-    if (!before) return tl::unexpected(before.error());
+    TRY_LET(const auto before, read_number(parameter));
     const std::uint32_t bit = facts().enable.bit ? std::uint32_t{1} << *facts().enable.bit : 0;
-    std::uint32_t present = *before;
+    std::uint32_t present = before;
     if (plan_->model->enabling_bit() != 0) {
       present = *facts().stop | (present & bit);
-      auto stopped = present == *before ? Result<void>() : settle_command(*before & bit);
+      auto stopped = present == before ? Result<void>() : settle_command(before & bit);
       if (!stopped) return stopped;
     }
     const std::uint32_t wanted = bit != 0 ? present | bit : facts().enable.value;
@@ -142,25 +140,22 @@ Result<void> check_model(const Profile& profile, const Target& target, Acceptanc
 }
 
 Result<RegisterPlan> make_plan(const RemoteStartOptions& options, const Profile& profile) {
-  auto model = CommandRegister::of(profile);
-  if (!model) return tl::unexpected(std::move(model.error()));
+  TRY_LET(auto model, CommandRegister::of(profile));
   RegisterPlan plan;
   plan.options = options;
-  plan.model = std::make_unique<const CommandRegister>(std::move(*model));
+  plan.model = std::make_unique<const CommandRegister>(std::move(model));
   const CommandRegisterSpec& facts = plan.model->facts();
   if (!facts.enable.parameter.empty()) {
-    auto enable = profile.find(facts.enable.parameter);
-    if (!enable) return tl::unexpected(std::move(enable.error()));
-    plan.enable = std::move(*enable);
+    TRY_LET(auto enable, profile.find(facts.enable.parameter));
+    plan.enable = std::move(enable);
   }
   if (facts.set_point.empty()) return plan;
-  const auto set_point = profile.find(facts.set_point);
-  if (!set_point) return tl::unexpected(set_point.error());
+  TRY_LET(const auto set_point, profile.find(facts.set_point));
   if (options.speed.empty()) {
-    const std::string& unit = set_point->unit;
+    const std::string& unit = set_point.unit;
     return tl::unexpected(speed_is_missing(unit.empty() ? "10" : fmt::format("10{}", unit)));
   }
-  return add_speed(*set_point, plan).and_then([&] { return check_turns(plan); }).map([&] {
+  return add_speed(set_point, plan).and_then([&] { return check_turns(plan); }).map([&] {
     return std::move(plan);
   });
 }
@@ -188,9 +183,7 @@ class Plan final : public RunPlan {
 Result<std::unique_ptr<RunPlan>> plan_command_register(const RemoteStartOptions& options,
                                                        const Profile& profile,
                                                        const Target& target) {
-  if (auto allowed = check_model(profile, target, options.acceptance); !allowed) {
-    return tl::unexpected(std::move(allowed.error()));
-  }
+  TRY(check_model(profile, target, options.acceptance));
   return make_plan(options, profile).map([](RegisterPlan plan) -> std::unique_ptr<RunPlan> {
     return std::make_unique<Plan>(std::move(plan));
   });

@@ -24,9 +24,8 @@ constexpr Duration shortest_watchdog = std::chrono::milliseconds(200);
 Result<void> add_setting(std::string_view option, const std::string& pattern,
                          const std::string& text, const Profile& profile, WordPlan& plan) {
   if (text.empty()) return {};
-  auto parameter = profile.find(catalogue::numbered_name(pattern, plan.operation));
-  if (!parameter) return tl::unexpected(std::move(parameter.error()));
-  return parse_setting(option, *parameter, text).map([&](Setting setting) {
+  TRY_LET(auto parameter, profile.find(catalogue::numbered_name(pattern, plan.operation)));
+  return parse_setting(option, parameter, text).map([&](Setting setting) {
     plan.settings.push_back(std::move(setting));
   });
 }
@@ -52,11 +51,10 @@ Result<void> plan_watchdog(Duration wanted, WordPlan& plan) {
 
 Result<WordPlan> make_plan(const RemoteStartOptions& options, const Profile& profile) {
   if (options.speed.empty()) return tl::unexpected(speed_is_missing());
-  auto motor = device::CommandWord::of(profile);
-  if (!motor) return tl::unexpected(std::move(motor.error()));
+  TRY_LET(auto motor, device::CommandWord::of(profile));
   WordPlan plan;
   plan.options = options;
-  plan.motor = std::make_unique<const device::CommandWord>(std::move(*motor));
+  plan.motor = std::make_unique<const device::CommandWord>(std::move(motor));
   const CommandWordSpec& run = plan.motor->facts();
   plan.operation = options.operation.value_or(run.preferred);
   if (plan.operation < run.first || plan.operation > run.last) {
@@ -65,9 +63,8 @@ Result<WordPlan> make_plan(const RemoteStartOptions& options, const Profile& pro
                    fmt::format("it takes a number from {} to {}", run.first, run.last)));
   }
   if (auto watchdog = profile.find(run.watchdog)) plan.watchdog_parameter = std::move(*watchdog);
-  const auto speed = profile.find(catalogue::numbered_name(run.speed, plan.operation));
-  if (!speed) return tl::unexpected(speed.error());
-  auto planned = add_speed(*speed, plan)
+  TRY_LET(const auto speed, profile.find(catalogue::numbered_name(run.speed, plan.operation)));
+  auto planned = add_speed(speed, plan)
                      .and_then([&] {
                        return add_setting("--acceleration", run.acceleration, options.acceleration,
                                           profile, plan);
@@ -78,7 +75,7 @@ Result<WordPlan> make_plan(const RemoteStartOptions& options, const Profile& pro
                      });
   if (planned && options.watchdog) planned = plan_watchdog(*options.watchdog, plan);
   if (planned) planned = check_turns(plan);
-  return planned.map([&] { return std::move(plan); });
+  return planned.map([&] { return plan; });
 }
 
 class Plan final : public RunPlan {
@@ -106,10 +103,9 @@ class Plan final : public RunPlan {
 
 Result<std::unique_ptr<RunPlan>> plan_command_word(const RemoteStartOptions& options,
                                                    const Profile& profile, const Target& target) {
-  auto plan = make_plan(options, profile);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
+  TRY_LET(auto plan, make_plan(options, profile));
   const auto made = [&]() -> std::unique_ptr<RunPlan> {
-    return std::make_unique<Plan>(std::move(*plan));
+    return std::make_unique<Plan>(std::move(plan));
   };
   const auto& actions = profile.actions;
   const auto start = std::find_if(actions.begin(), actions.end(), [](const auto& action) {

@@ -73,11 +73,10 @@ report::Record difference_record(const Difference& difference, const std::string
 }  // namespace
 
 Result<void> check_selection(const DiffOptions& options, const Profile& profile) {
-  const auto selection = Selection::make(options.patterns, options.ignored, profile);
-  if (!selection) return tl::unexpected(selection.error());
+  TRY_LET(const auto selection, Selection::make(options.patterns, options.ignored, profile));
   const auto stored = catalogue::stored_parameters(profile);
   const bool selects = std::any_of(stored.begin(), stored.end(), [&](const auto& parameter) {
-    return selection->contains(parameter);
+    return selection.contains(parameter);
   });
   if (!selects) return tl::unexpected(nothing_left());
   return {};
@@ -92,9 +91,8 @@ Summary diff_summary(const DiffResult& result, const std::string& target) {
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, Lacking lacking,
                            const std::string& target, Context& context) {
   const auto& [a, b] = sides;
-  const auto selection = Selection::make(options.patterns, options.ignored, a.profile);
-  if (!selection) return tl::unexpected(selection.error());
-  const auto comparison = catalogue::compare(a.snapshot, b.snapshot, *selection, lacking);
+  TRY_LET(const auto selection, Selection::make(options.patterns, options.ignored, a.profile));
+  const auto comparison = catalogue::compare(a.snapshot, b.snapshot, selection, lacking);
   DiffResult result{.different = comparison.differences.size(), .same = comparison.same};
   const bool compared =
       result.same + result.different > 0 || !a.unreadable.empty() || !b.unreadable.empty();

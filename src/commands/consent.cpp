@@ -42,17 +42,15 @@ Error refused(std::string_view what, std::string hint = {}) {
 }  // namespace
 
 Result<void> ask_consent(std::string_view what, const Context& context) {
-  const auto answer = ask(what, "Go on? [y/N]", context);
-  if (!answer) return tl::unexpected(answer.error());
-  if (!*answer || **answer == "y" || **answer == "Y" || **answer == "yes") return {};
+  TRY_LET(const auto answer, ask(what, "Go on? [y/N]", context));
+  if (!answer || *answer == "y" || *answer == "Y" || *answer == "yes") return {};
   return tl::unexpected(refused(what));
 }
 
 Result<void> ask_typed_consent(std::string_view what, std::string_view word,
                                const Context& context) {
-  const auto answer = ask(what, fmt::format("Type '{}' to go on:", word), context);
-  if (!answer) return tl::unexpected(answer.error());
-  if (!*answer || **answer == word) return {};
+  TRY_LET(const auto answer, ask(what, fmt::format("Type '{}' to go on:", word), context));
+  if (!answer || *answer == word) return {};
   return tl::unexpected(
       refused(what, fmt::format("type '{}', or add --yes, when you are sure", word)));
 }
@@ -65,13 +63,11 @@ Result<void> require_answer(std::string_view what, const Context& context) {
 Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context& context) {
   const auto identity = tool.device.identity();
   tool.device.disconnect();
-  if (auto agreed = ask_consent(what, context); !agreed) return agreed;
+  TRY(ask_consent(what, context));
   const Target known = known_target(tool);
-  auto profile = load_profile(known, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto again = open_tool(known, std::move(*profile), Need::named_registers, context);
-  if (!again) return tl::unexpected(std::move(again.error()));
-  const auto now = again->device.identity();
+  TRY_LET(auto profile, load_profile(known, context));
+  TRY_LET(auto again, open_tool(known, std::move(profile), Need::named_registers, context));
+  const auto now = again.device.identity();
   if (identity && now && identity->serial != now->serial) {
     return tl::unexpected(with_target(
         Error{
@@ -82,8 +78,8 @@ Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context&
             .hint = "nothing was done"},
         tool.target));
   }
-  again->target = tool.target;
-  tool = std::move(*again);
+  again.target = tool.target;
+  tool = std::move(again);
   return {};
 }
 

@@ -43,9 +43,7 @@ class Diff final : public Verb<Counterpart, DiffResult> {
   [[nodiscard]] Fit fit() const override { return Fit::one; }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
-    if (auto selected = check_selection(*options_, profile); !selected) {
-      return tl::unexpected(std::move(selected.error()));
-    }
+    TRY(check_selection(*options_, profile));
     if (counterparts_->backups.empty()) return read_known({.side = counterparts_->side}, profile);
     auto plan = find_backup(target).and_then(
         [&](DiffSide side) { return read_known({.side = std::move(side)}, profile); });
@@ -54,14 +52,13 @@ class Diff final : public Verb<Counterpart, DiffResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    auto own = read_tool(tool, context);
-    if (!own) return tl::unexpected(std::move(own.error()));
-    auto other = plan.content ? Result<SideContent>(*plan.content) : [&] {
-      tool.device.disconnect();  // the other one may be on the same line
-      return read_tool(*plan.side.target, context);
-    }();
-    if (!other) return tl::unexpected(std::move(other.error()));
-    ReadSides sides{std::move(*own), std::move(*other)};
+    TRY_LET(auto own, read_tool(tool, context));
+    TRY_LET(
+        auto other, plan.content ? Result<SideContent>(*plan.content) : [&] {
+          tool.device.disconnect();  // the other one may be on the same line
+          return read_tool(*plan.side.target, context);
+        }());
+    ReadSides sides{std::move(own), std::move(other)};
     if (counterparts_->is_first) std::swap(sides.a, sides.b);
     return compare(sides, *options_, lacking_of(plan.side), tool.target.shown, context);
   }
@@ -92,9 +89,9 @@ class Diff final : public Verb<Counterpart, DiffResult> {
   /// Reads the other side as far as no tool has to be asked; `profile` says the defaults.
   [[nodiscard]] Result<Counterpart> read_known(Counterpart other, const Profile& profile) const {
     if (other.side.target) return other;
-    auto content = other.side.file ? read_file(other.side, *context_) : read_defaults(profile);
-    if (!content) return tl::unexpected(std::move(content.error()));
-    other.content = std::move(*content);
+    TRY_LET(auto content,
+            other.side.file ? read_file(other.side, *context_) : read_defaults(profile));
+    other.content = std::move(content);
     return other;
   }
 
@@ -106,15 +103,11 @@ class Diff final : public Verb<Counterpart, DiffResult> {
 /// Two sides of which none is a tool, and one at most the defaults.
 Result<Outcome> diff_files(const DiffSide& a, const DiffSide& b, const DiffOptions& options,
                            Context& context) {
-  auto first = read_file(a.is_defaults() ? b : a, context);
-  if (!first) return tl::unexpected(std::move(first.error()));
-  if (auto selected = check_selection(options, first->profile); !selected) {
-    return tl::unexpected(std::move(selected.error()));
-  }
+  TRY_LET(auto first, read_file(a.is_defaults() ? b : a, context));
+  TRY(check_selection(options, first.profile));
   const bool with_defaults = a.is_defaults() || b.is_defaults();
-  auto other = with_defaults ? read_defaults(first->profile) : read_file(b, context);
-  if (!other) return tl::unexpected(std::move(other.error()));
-  ReadSides sides{std::move(*first), std::move(*other)};
+  TRY_LET(auto other, with_defaults ? read_defaults(first.profile) : read_file(b, context));
+  ReadSides sides{std::move(first), std::move(other)};
   if (a.is_defaults()) std::swap(sides.a, sides.b);
   return compare(sides, options, lacking_of(a.is_defaults() ? a : b), {}, context)
       .map([](const DiffResult& result) { return result.outcome; });
@@ -126,28 +119,23 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
                                 .message = "one side must be a tool or a backup",
                                 .hint = "write for example 'spindle diff station3 defaults'"});
   }
-  const auto dumps = read_dump_sides(options, context);
-  if (!dumps) return tl::unexpected(dumps.error());
-  if (dumps->any()) return diff_dumps(*dumps, options, context);
-  const auto a = resolve_side(options.a, context);
-  if (!a) return tl::unexpected(a.error());
-  const auto b = resolve_side(options.b, context);
-  if (!b) return tl::unexpected(b.error());
-  if (!a->target && !b->target) return diff_files(*a, *b, options, context);
-  const Counterparts other{.side = a->target ? *b : *a, .is_first = !a->target};
-  return run_verb(Diff(options, other, context), {.tools = {a->target ? *a->target : *b->target}},
+  TRY_LET(const auto dumps, read_dump_sides(options, context));
+  if (dumps.any()) return diff_dumps(dumps, options, context);
+  TRY_LET(const auto a, resolve_side(options.a, context));
+  TRY_LET(const auto b, resolve_side(options.b, context));
+  if (!a.target && !b.target) return diff_files(a, b, options, context);
+  const Counterparts other{.side = a.target ? b : a, .is_first = !a.target};
+  return run_verb(Diff(options, other, context), {.tools = {a.target ? *a.target : *b.target}},
                   options.jobs, context);
 }
 
 Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {
-  auto targets = resolve_one_or_group(options.a, Addressing::unicast, context);
-  if (!targets) return tl::unexpected(std::move(targets.error()));
-  auto paths = check_names_only(options.patterns, context).and_then([&] {
-    return paths_in_folder(targets->tools, options.folder);
-  });
-  if (!paths) return tl::unexpected(std::move(paths.error()));
-  const Counterparts backups{.backups = std::move(*paths)};
-  return run_verb(Diff(options, backups, context), *targets, options.jobs, context);
+  TRY_LET(auto targets, resolve_one_or_group(options.a, Addressing::unicast, context));
+  TRY_LET(auto paths, check_names_only(options.patterns, context).and_then([&] {
+    return paths_in_folder(targets.tools, options.folder);
+  }));
+  const Counterparts backups{.backups = std::move(paths)};
+  return run_verb(Diff(options, backups, context), targets, options.jobs, context);
 }
 
 }  // namespace

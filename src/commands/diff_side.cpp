@@ -16,16 +16,15 @@ Result<DiffSide> resolve_side(const std::string& text, const Context& context) {
   DiffSide side{.text = text};
   if (side.is_defaults()) return side;
   if (is_backup_file(text, context)) {
-    auto file = read_backup_file(text, context);
-    if (!file) return tl::unexpected(std::move(file.error()));
-    side.file = std::move(*file);
+    TRY_LET(auto file, read_backup_file(text, context));
+    side.file = std::move(file);
     return side;
   }
-  auto target = resolve_target(text, context,
-                               {.why = "each side of a comparison is one",
-                                .remedy = "--dir FOLDER compares each with its own backup in it"});
-  if (!target) return tl::unexpected(std::move(target.error()));
-  side.target = std::move(*target);
+  TRY_LET(auto target,
+          resolve_target(text, context,
+                         {.why = "each side of a comparison is one",
+                          .remedy = "--dir FOLDER compares each with its own backup in it"}));
+  side.target = std::move(target);
   return side;
 }
 
@@ -37,11 +36,9 @@ std::string profile_of(const DiffSide& side, const Context& context) {
 
 Result<SideContent> read_tool(OpenTool& tool, const Context& context) {
   ProgressLine progress(context);
-  auto taken = take_snapshot(tool, Secrets::include, context,
-                             progress.counter(tool.target.shown + ": reading"));
-  if (!taken) return tl::unexpected(std::move(taken.error()));
-  return SideContent{std::move(taken->snapshot), std::move(taken->unreadable),
-                     tool.device.profile()};
+  TRY_LET(auto taken, take_snapshot(tool, Secrets::include, context,
+                                    progress.counter(tool.target.shown + ": reading")));
+  return SideContent{std::move(taken.snapshot), std::move(taken.unreadable), tool.device.profile()};
 }
 
 Result<SideContent> read_tool(const Target& target, const Context& context) {
@@ -54,11 +51,9 @@ Result<SideContent> read_tool(const Target& target, const Context& context) {
 }
 
 Result<SideContent> read_file(const DiffSide& side, const Context& context) {
-  auto profile = context.profiles.load(profile_of(side, context));
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto snapshot = files::resolve_backup(*side.file, *profile);
-  if (!snapshot) return tl::unexpected(std::move(snapshot.error()));
-  return SideContent{std::move(*snapshot), {}, std::move(*profile)};
+  TRY_LET(auto profile, context.profiles.load(profile_of(side, context)));
+  TRY_LET(auto snapshot, files::resolve_backup(*side.file, profile));
+  return SideContent{std::move(snapshot), {}, std::move(profile)};
 }
 
 Result<SideContent> read_defaults(const Profile& profile) {

@@ -36,13 +36,12 @@ Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const P
                                                const Target& target) {
   std::vector<ActionRequest> requests;
   for (const std::string& text : options.actions) {
-    auto request = parse_action(text, profile);
-    if (!request) return tl::unexpected(std::move(request.error()));
-    auto allowed = check_guard(*request, profile).and_then([&] {
-      return check_evidence(request->action, target, options.acceptance);
+    TRY_LET(auto request, parse_action(text, profile));
+    auto allowed = check_guard(request, profile).and_then([&] {
+      return check_evidence(request.action, target, options.acceptance);
     });
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    requests.push_back(std::move(*request));
+    requests.push_back(std::move(request));
   }
   return requests;
 }
@@ -54,16 +53,14 @@ Summary listed(const Outcome& outcome, const std::string& target) {
 }
 
 Result<Outcome> list_actions(const Target& target, Context& context) {
-  auto profile = load_profile(target, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
+  TRY_LET(auto profile, load_profile(target, context));
   if (target.profile.empty()) {
-    auto tool = open_tool(target, catalogue::Profile(), Need::named_registers, context);
-    if (!tool) return tl::unexpected(std::move(tool.error()));
-    *profile = tool->device.profile();
+    TRY_LET(auto tool, open_tool(target, catalogue::Profile(), Need::named_registers, context));
+    profile = tool.device.profile();
   }
   Outcome outcome;
   Listing listing(context, action_columns());
-  for (const Action& action : profile->actions) {
+  for (const Action& action : profile.actions) {
     listing.add(action_record(action, target.shown, context.clock));
     outcome.succeed();
   }

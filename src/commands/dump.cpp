@@ -155,8 +155,7 @@ class DumpRegisters final : public Verb<Wanted, Outcome> {
 }  // namespace
 
 Result<Outcome> dump(const DumpOptions& options, Context& context) {
-  auto target = resolve_target(options.target, context);
-  if (!target) return tl::unexpected(std::move(target.error()));
+  TRY_LET(auto target, resolve_target(options.target, context));
   const bool is_kept = options.file != standard_output && options.overwrite == Overwrite::refuse &&
                        context.disk.exists(options.file);
   if (is_kept) {
@@ -166,7 +165,7 @@ Result<Outcome> dump(const DumpOptions& options, Context& context) {
     error.name = options.file;
     return tl::unexpected(std::move(error));
   }
-  return run_verb(DumpRegisters(options), {.tools = {std::move(*target)}}, 1, context);
+  return run_verb(DumpRegisters(options), {.tools = {std::move(target)}}, 1, context);
 }
 
 }  // namespace spindle::commands

@@ -273,11 +273,9 @@ Result<std::optional<files::Dump>> read_side(const std::string& text, const Cont
 }  // namespace
 
 Result<DumpSides> read_dump_sides(const DiffOptions& options, const Context& context) {
-  auto a = read_side(options.a, context);
-  if (!a) return tl::unexpected(std::move(a.error()));
-  auto b = read_side(options.b, context);
-  if (!b) return tl::unexpected(std::move(b.error()));
-  return DumpSides{std::move(*a), std::move(*b)};
+  TRY_LET(auto a, read_side(options.a, context));
+  TRY_LET(auto b, read_side(options.b, context));
+  return DumpSides{std::move(a), std::move(b)};
 }
 
 Result<Outcome> diff_dumps(const DumpSides& sides, const DiffOptions& options, Context& context) {
@@ -287,16 +285,15 @@ Result<Outcome> diff_dumps(const DumpSides& sides, const DiffOptions& options, C
                             context);
     });
   }
-  auto other = resolve_side(sides.a ? options.b : options.a, context);
-  if (!other) return tl::unexpected(std::move(other.error()));
-  if (!other->target) {
-    const std::string_view what = other->is_defaults() ? "the defaults are" : "a backup is";
+  TRY_LET(auto other, resolve_side(sides.a ? options.b : options.a, context));
+  if (!other.target) {
+    const std::string_view what = other.is_defaults() ? "the defaults are" : "a backup is";
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("a dump is raw registers, and {} parameters by name", what),
               .hint = "compare a dump with another dump, or with a tool"});
   }
-  return run_verb(DumpDiff(sides, options), {.tools = {std::move(*other->target)}}, 1, context);
+  return run_verb(DumpDiff(sides, options), {.tools = {std::move(*other.target)}}, 1, context);
 }
 
 }  // namespace spindle::commands

@@ -41,7 +41,7 @@ Result<Outcome> tell_findings(const std::vector<files::Diagnostic>& findings,
     context.renderer.note(fmt::format("{}: no faults", name));
     return finish(listing, outcome);
   }
-  if (auto ended = listing.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  TRY(listing.end());
   return tl::unexpected(
       Error{.code = Errc::bad_file,
             .message = fmt::format("{} in this {}", counted(findings.size(), "fault"), what),

@@ -26,11 +26,10 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    const auto readings = tool.device.read_each(plan, options_->limits);
-    if (!readings) return tl::unexpected(readings.error());
+    TRY_LET(const auto readings, tool.device.read_each(plan, options_->limits));
     Outcome outcome;
     Listing listing(context, value_columns(options_->limits));
-    for (const device::Reading& reading : *readings) {
+    for (const device::Reading& reading : readings) {
       if (reading.value) {
         outcome.succeed();
         listing.add(value_record(reading, tool.target, context.clock, options_->limits));

@@ -91,8 +91,7 @@ Result<Duration> meet_once(OpenTool& tool) {
 
 /// A product without an identity can only be met, not proven.
 Result<Identified> meet(OpenTool& tool, const Clock& clock) {
-  const auto round_trip = meet_once(tool);
-  if (!round_trip) return tl::unexpected(round_trip.error());
+  TRY_LET(const auto round_trip, meet_once(tool));
   Identification found;
   found.profile = tool.profile->id;
   found.candidates = {tool.profile->id};
@@ -105,7 +104,7 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
   if (auto words = motor_state_words(tool); !words.empty()) {
     found.identity.notes.push_back(std::move(words));
   }
-  return Identified{identity_record(tool, found, *round_trip, clock), std::nullopt};
+  return Identified{identity_record(tool, found, round_trip, clock), std::nullopt};
 }
 
 Result<Identified> identify_one(OpenTool& tool, const Context& context) {
@@ -116,13 +115,11 @@ Result<Identified> identify_one(OpenTool& tool, const Context& context) {
   if (!named && target.endpoint.medium != link::Medium::tcp) {
     return tl::unexpected(unproven(target));
   }
-  const auto answer = tool.device.report_server_id();
-  if (!answer) return tl::unexpected(answer.error());
+  TRY_LET(const auto answer, tool.device.report_server_id());
   const Duration round_trip = tool.device.session().last_round_trip();
-  const auto found = match_identity(*answer, target.profile, context);
-  if (!found) return tl::unexpected(found.error());
-  return Identified{identity_record(tool, *found, round_trip, context.clock),
-                    misfit_of(target, *found)};
+  TRY_LET(const auto found, match_identity(answer, target.profile, context));
+  return Identified{identity_record(tool, found, round_trip, context.clock),
+                    misfit_of(target, found)};
 }
 
 class Identify final : public Verb<std::monostate, Outcome> {

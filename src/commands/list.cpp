@@ -25,24 +25,19 @@ catalogue::Profile with_units_of(const Target& target, catalogue::Profile profil
 
 /// Without a tool there is nothing to ask: the profile's own words.
 Result<Subject> offline(const ListOptions& options, const Context& context) {
-  auto profile = context.profiles.load(context.common.profile);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  return Subject{{}, std::move(*profile), options.arguments};
+  TRY_LET(auto profile, context.profiles.load(context.common.profile));
+  return Subject{{}, std::move(profile), options.arguments};
 }
 
 Result<Subject> of_target(const ListOptions& options, const Context& context) {
-  auto target = resolve_target(options.arguments.front(), context);
-  if (!target) return tl::unexpected(std::move(target.error()));
+  TRY_LET(auto target, resolve_target(options.arguments.front(), context));
   std::vector<std::string> patterns(options.arguments.begin() + 1, options.arguments.end());
-  if (!target->profile.empty()) {
-    auto profile = context.profiles.load(target->profile);
-    if (!profile) return tl::unexpected(std::move(profile.error()));
-    return Subject{target->shown, with_units_of(*target, std::move(*profile)), std::move(patterns)};
+  if (!target.profile.empty()) {
+    TRY_LET(auto profile, context.profiles.load(target.profile));
+    return Subject{target.shown, with_units_of(target, std::move(profile)), std::move(patterns)};
   }
-  auto tool = open_tool(*target, catalogue::Profile(), Need::named_registers, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
-  return Subject{target->shown, with_units_of(*target, tool->device.profile()),
-                 std::move(patterns)};
+  TRY_LET(auto tool, open_tool(target, catalogue::Profile(), Need::named_registers, context));
+  return Subject{target.shown, with_units_of(target, tool.device.profile()), std::move(patterns)};
 }
 
 Result<Subject> subject_of(const ListOptions& options, const Context& context) {
@@ -61,18 +56,17 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
 }  // namespace
 
 Result<Outcome> list(const ListOptions& options, Context& context) {
-  const auto subject = subject_of(options, context);
-  if (!subject) return tl::unexpected(subject.error());
-  auto parameters = subject->profile.describe(subject->patterns);
+  TRY_LET(const auto subject, subject_of(options, context));
+  auto parameters = subject.profile.describe(subject.patterns);
   if (!parameters) {
-    parameters.error().asked_of = subject->target;
+    parameters.error().asked_of = subject.target;
     return tl::unexpected(std::move(parameters.error()));
   }
   Outcome outcome;
   const auto columns = parameter_columns(*parameters);
   Listing listing(context, columns);
   for (const catalogue::Parameter& parameter : *parameters) {
-    listing.add(parameter_record(parameter, subject->target, context.clock));
+    listing.add(parameter_record(parameter, subject.target, context.clock));
     outcome.succeed();
   }
   return finish(listing, outcome);

@@ -78,11 +78,10 @@ class MotorRun final : public ToolRun {
   }
 
   Result<void> follow() override {
-    auto ending = monitor_ == nullptr
-                      ? device::wait_unseen(tool().device, following_)
-                      : device::follow_motor(tool().device, *monitor_, *stopper_, following_);
-    if (!ending) return tl::unexpected(std::move(ending.error()));
-    ending_ = *ending;
+    TRY_LET(auto ending, monitor_ == nullptr ? device::wait_unseen(tool().device, following_)
+                                             : device::follow_motor(tool().device, *monitor_,
+                                                                    *stopper_, following_));
+    ending_ = ending;
     return {};
   }
 

@@ -51,30 +51,28 @@ Result<Outcome> profile_list(Context& context) {
 }
 
 Result<Outcome> profile_show(const ProfileNameOptions& options, Context& context) {
-  const auto profile = context.profiles.load(options.profile);
-  if (!profile) return tl::unexpected(profile.error());
+  TRY_LET(const auto profile, context.profiles.load(options.profile));
   Outcome outcome;
   outcome.succeed();
   Listing head(context, profile_columns);
-  head.add(profile_record(*profile, context.clock));
-  if (auto ended = head.end(); !ended) return tl::unexpected(std::move(ended.error()));
-  const auto columns = parameter_columns(profile->parameters);
+  head.add(profile_record(profile, context.clock));
+  TRY(head.end());
+  const auto columns = parameter_columns(profile.parameters);
   Listing parameters(context, columns);
-  for (const catalogue::Parameter& parameter : profile->parameters) {
+  for (const catalogue::Parameter& parameter : profile.parameters) {
     parameters.add(parameter_record(parameter, {}, context.clock));
   }
-  if (auto ended = parameters.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  TRY(parameters.end());
   Listing actions(context, action_columns());
-  for (const catalogue::Action& action : profile->actions) {
+  for (const catalogue::Action& action : profile.actions) {
     actions.add(action_record(action, {}, context.clock));
   }
   return finish(actions, outcome);
 }
 
 Result<Outcome> profile_check(const ProfileNameOptions& options, Context& context) {
-  const auto findings = context.profiles.check(options.profile);
-  if (!findings) return tl::unexpected(findings.error());
-  return tell_findings(*findings, options.profile, "profile", context);
+  TRY_LET(const auto findings, context.profiles.check(options.profile));
+  return tell_findings(findings, options.profile, "profile", context);
 }
 
 }  // namespace spindle::commands

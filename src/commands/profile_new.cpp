@@ -65,25 +65,24 @@ Result<Outcome> profile_new(const ProfileNewOptions& options, Context& context) 
   if (context.disk.exists(path)) {
     return refuse(Errc::usage, path, "this file exists already", "choose another name");
   }
-  const auto map = read_map(options, context);
-  if (!map) return tl::unexpected(map.error());
-  if (!options.map.empty() && map->entries.empty()) {
-    tell_warnings(*map, options.map, context);
+  TRY_LET(const auto map, read_map(options, context));
+  if (!options.map.empty() && map.entries.empty()) {
+    tell_warnings(map, options.map, context);
     return refuse(Errc::bad_file, options.map, "no row of it is a register", {});
   }
   const std::string source = std::filesystem::path(options.map).filename().string();
-  const std::string text = files::render_profile(options.name, *map, source);
+  const std::string text = files::render_profile(options.name, map, source);
   if (text.size() > largest_profile) {
     return refuse(Errc::bad_file, options.map, "this is more than a profile can hold",
                   "split it, or leave out what is not needed");
   }
   auto written = context.disk.write(path, text, Overwrite::refuse, Privacy::usual);
   if (!written) return tl::unexpected(std::move(written.error()));
-  tell_warnings(*map, options.map, context);
+  tell_warnings(map, options.map, context);
   Outcome outcome;
   outcome.succeed();
   Listing listing(context, columns);
-  listing.add(profile_record(options.name, *map, path, context.clock));
+  listing.add(profile_record(options.name, map, path, context.clock));
   return finish(listing, outcome);
 }
 

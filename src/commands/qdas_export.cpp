@@ -73,7 +73,7 @@ class QdasExport {
   }
 
   Result<Outcome> write() {
-    if (auto kept = check_paths(); !kept) return tl::unexpected(std::move(kept.error()));
+    TRY(check_paths());
     auto folder = context_->disk.make_folders(options_->qdas, Privacy::usual);
     if (!folder) return tl::unexpected(std::move(folder.error()));
     Listing listing(*context_, columns);
@@ -259,12 +259,11 @@ class QdasExport {
 
 Result<Outcome> export_qdas(const ResultsOptions& options, store::Reader& reader,
                             StoredRecords& records, const Selection& selection, Context& context) {
-  auto settings = reader.settings();
-  if (!settings) return tl::unexpected(std::move(settings.error()));
+  TRY_LET(auto settings, reader.settings());
   store::Filter filter = selection.filter;
   if (filter.kinds.empty()) filter.kinds = {"fastening-ok", "fastening-ng"};
   filter.newest = options.count;
-  QdasExport files(options, records, context, std::move(*settings));
+  QdasExport files(options, records, context, std::move(settings));
   auto read = reader.events(filter, [&](const store::EventView& row) {
     if (row.kind.starts_with("fastening-")) files.add(row);
     return !context.interrupt.signalled();

@@ -65,37 +65,34 @@ Error not_stored(std::size_t left, const std::string& path) {
 
 Result<Outcome> record(const RecordOptions& options, Context& context) {
   ProfileShelf shelf(context.profiles);
-  auto tools = tools_to_record(options, shelf, context);
-  if (!tools) return tl::unexpected(std::move(tools.error()));
-  const auto path = work::store_place(options.store, context.state_folder);
-  if (!path) return tl::unexpected(path.error());
-  auto writer = store::Writer::open(*path);
-  if (!writer) return tl::unexpected(std::move(writer.error()));
+  TRY_LET(auto tools, tools_to_record(options, shelf, context));
+  TRY_LET(const auto path, work::store_place(options.store, context.state_folder));
+  TRY_LET(auto writer, store::Writer::open(path));
 
   std::vector<Target> targets;
-  for (const WatchedTool& tool : *tools) targets.push_back(tool.target());
+  for (const WatchedTool& tool : tools) targets.push_back(tool.target());
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
   std::vector<report::Column> columns;
-  if (options.tee) columns = columns_for(*tools, shelf, options.watch, context);
-  WatchStream stream(options.watch, tools->size(), columns, context,
+  if (options.tee) columns = columns_for(tools, shelf, options.watch, context);
+  WatchStream stream(options.watch, tools.size(), columns, context,
                      options.tee ? Records::shown : Records::counted);
   work::JournalOptions pace;
   if (options.gather) pace.gather = *options.gather;
-  Recorder recorder(**writer, stream, pace, context);
+  Recorder recorder(*writer, stream, pace, context);
   std::vector<std::unique_ptr<RecordedTool>> recorded;
-  for (const WatchedTool& tool : *tools) {
+  for (const WatchedTool& tool : tools) {
     recorded.push_back(std::make_unique<RecordedTool>(tool.target(), recorder));
   }
   const auto plan = [&](const catalogue::Profile& profile) {
     return plan_watch(options.watch, profile);
   };
-  for_each_side_by_side(*tools, [&](WatchedTool& tool) {
-    const auto index = static_cast<std::size_t>(&tool - tools->data());
+  for_each_side_by_side(tools, [&](WatchedTool& tool) {
+    const auto index = static_cast<std::size_t>(&tool - tools.data());
     watch_tool(tool, open_transport, plan, options.watch.reconnection, *recorded[index], context);
   });
   const std::size_t left = recorder.journal().close(farewell);
-  if (left > 0) stream.fail(not_stored(left, *path));
+  if (left > 0) stream.fail(not_stored(left, path));
   return stream.finish();
 }
 

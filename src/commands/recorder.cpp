@@ -39,13 +39,12 @@ Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOpti
 Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::string& target) {
   const std::lock_guard lock(mutex_);
   const store::ToolName own = {said.maker, fmt::format("{}@{}", said.serial, target)};
-  const auto has_own = writer_->has_tool(own);
-  if (!has_own) return tl::unexpected(has_own.error());
+  TRY_LET(const auto has_own, writer_->has_tool(own));
   const auto holder = std::find_if(claims_.begin(), claims_.end(), [&](const auto& claim) {
     return claim.second == said && claim.first != target;
   });
   const bool is_taken = holder != claims_.end();
-  const store::ToolName& name = is_taken || *has_own ? own : said;
+  const store::ToolName& name = is_taken || has_own ? own : said;
   claims_.insert_or_assign(target, name);
   if (is_taken && told_.insert({own, target}).second) {
     stream_->fault(Error{
@@ -196,13 +195,11 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   flush_gap();
   store::Writer& writer = recorder_->writer();
   const store::ToolName said = work::name_of(device, target_.shown);
-  const auto name = recorder_->claim(said, target_.shown);
-  if (!name) return tl::unexpected(name.error());
+  TRY_LET(const auto name, recorder_->claim(said, target_.shown));
   const auto& identity = device.identity();
-  const auto tool = writer.tool(*name, identity ? identity->tool_model : std::string());
-  if (!tool) return tl::unexpected(tool.error());
+  TRY_LET(const auto tool, writer.tool(name, identity ? identity->tool_model : std::string()));
   const auto place =
-      writer.place({.tool = *tool,
+      writer.place({.tool = tool,
                     .name = target_.shown,
                     .url = target_.endpoint.text,
                     .profile = profile_->id.to_string(),
@@ -210,26 +207,25 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
                     .torque_unit = target_.torque_unit,
                     .since = now()});
   if (!place) return tl::unexpected(place.error());
-  const auto last = writer.last(*tool);
-  if (!last) return tl::unexpected(last.error());
+  TRY_LET(const auto last, writer.last(tool));
   {
     const std::lock_guard lock(voice_mutex_);
-    serial_ = name->serial;
+    serial_ = name.serial;
   }
-  if (tool_ != *tool) {
+  if (tool_ != tool) {
     epochs_ = {};
-    counted_ = *last ? std::optional((*last)->number) : std::nullopt;
-    seen_ = *last ? (*last)->seen : now();
+    counted_ = last ? std::optional(last->number) : std::nullopt;
+    seen_ = last ? last->seen : now();
   }
-  tool_ = *tool;
+  tool_ = tool;
   place_ = *place;
   flush_link();
-  if (identity) record_total(*identity, *last);
+  if (identity) record_total(*identity, last);
   if (rows_) {
     for (const std::int64_t preset : rows_->presets()) want_settings(preset);
   }
   device::RecordedPast past = {.wants_first = true};
-  if (*last) past.last = work::last_event_of(**last, now());
+  if (last) past.last = work::last_event_of(*last, now());
   return past;
 }
 

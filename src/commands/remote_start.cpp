@@ -19,12 +19,9 @@ Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context
       return require_answer(plan->in_words(*target), context).map([&] { return std::move(plan); });
     });
   };
-  auto opened = open_prepared(*target, Need::named_registers, context, plan_for);
-  if (!opened) return tl::unexpected(std::move(opened.error()));
-  auto& [tool, plan] = *opened;
-  if (auto agreed = plan->on(tool, context)->ask(); !agreed) {
-    return tl::unexpected(std::move(agreed.error()));
-  }
+  TRY_LET(auto opened, open_prepared(*target, Need::named_registers, context, plan_for));
+  auto& [tool, plan] = opened;
+  TRY(plan->on(tool, context)->ask());
   const auto mode = options.stop.value_or(catalogue::StopMode::decelerate);
   return run_and_tell(*plan->on(tool, context), mode, tool, context);
 }

@@ -123,35 +123,6 @@ void add_samples(const AssessedStratum& assessed, Quantity quantity, const Place
   }
 }
 
-chart::RunChart run_chart_of(Subject subject, Quantity quantity, const work::Study& study,
-                             const ReportZone& zone) {
-  const Stratum& first = *subject.front().stratum;
-  const Places places(subject, study);
-  chart::RunChart chart{
-      .caption = {.title = fmt::format("Run chart of {}, {}", name_of(quantity),
-                                       subject_name(first, study)),
-                  .description = "Every result in the order in which it was stored."},
-      .course = places.course(zone),
-      .quantity = quantity_of(quantity, first),
-      .samples = {}};
-  std::vector<WallTime> times;
-  for (const AssessedStratum& each : subject) {
-    const Stratum& stratum = *each.stratum;
-    const std::int64_t begin = places.of(stratum.results.front(), times.size());
-    if (&each != &subject.front()) chart.changes.push_back({.at = begin, .word = stratum.change});
-    add_samples(each, quantity, places, study.options().shift_break, times, chart);
-    for (Level level : levels_of(each, quantity)) {
-      if (subject.size() > 1) {
-        level.from = begin;
-        level.to = places.of(stratum.results.back(), times.size() - 1);
-      }
-      chart.levels.push_back(std::move(level));
-    }
-  }
-  chart.gaps = gaps_of(first, times, places, study);
-  return chart;
-}
-
 // ---- control charts ----
 
 int number_of(statistics::Rule rule) {
@@ -277,6 +248,35 @@ bool runs_along_time(Subject subject, Duration shift_break) {
     }
   }
   return pauses * 2 <= *before - subject.front().stratum->results.front().at;
+}
+
+chart::RunChart run_chart_of(Subject subject, Quantity quantity, const work::Study& study,
+                             const ReportZone& zone) {
+  const Stratum& first = *subject.front().stratum;
+  const Places places(subject, study);
+  chart::RunChart chart{
+      .caption = {.title = fmt::format("Run chart of {}, {}", name_of(quantity),
+                                       subject_name(first, study)),
+                  .description = "Every result in the order in which it was stored."},
+      .course = places.course(zone),
+      .quantity = quantity_of(quantity, first),
+      .samples = {}};
+  std::vector<WallTime> times;
+  for (const AssessedStratum& each : subject) {
+    const Stratum& stratum = *each.stratum;
+    const std::int64_t begin = places.of(stratum.results.front(), times.size());
+    if (&each != &subject.front()) chart.changes.push_back({.at = begin, .word = stratum.change});
+    add_samples(each, quantity, places, study.options().shift_break, times, chart);
+    for (Level level : levels_of(each, quantity)) {
+      if (subject.size() > 1) {
+        level.from = begin;
+        level.to = places.of(stratum.results.back(), times.size() - 1);
+      }
+      chart.levels.push_back(std::move(level));
+    }
+  }
+  chart.gaps = gaps_of(first, times, places, study);
+  return chart;
 }
 
 std::string run_figure(Subject subject, Quantity quantity, const work::Study& study,

@@ -6,6 +6,7 @@
 
 #include "report_assessment.hpp"
 #include "report_words.hpp"
+#include "spindle/chart/run_chart.hpp"
 
 namespace spindle::commands {
 
@@ -18,7 +19,10 @@ bool runs_along_time(Subject subject, Duration shift_break);
 /// All results of a tool and preset, with NG ones, changes of settings, gaps and limits.
 std::string run_figure(Subject subject, Quantity quantity, const work::Study& study,
                        const ReportZone& zone);
-/// The same of one stratum, in the height of a table row.
+/// The same as data, for those who draw it otherwise.
+chart::RunChart run_chart_of(Subject subject, Quantity quantity, const work::Study& study,
+                             const ReportZone& zone);
+/// That of one stratum, in the height of a table row.
 std::string small_figure(const AssessedStratum& stratum, const work::Study& study,
                          const ReportZone& zone);
 /// Of the values that are in the statistics, to stand beside another figure. Empty: there are none.

@@ -6,6 +6,7 @@
 
 #include "report_figures.hpp"
 #include "report_tables.hpp"
+#include "report_zoom.hpp"
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/chart/escape.hpp"
@@ -20,6 +21,8 @@ using chart::escape;
 constexpr std::size_t most_in_full = 6;
 /// So many have a table of their own.
 constexpr std::size_t most_tables = 60;
+
+constexpr std::string_view no_scripts = "default-src 'none'; style-src 'unsafe-inline'";
 
 constexpr std::string_view page_style = R"(
 :root{color-scheme:light}
@@ -122,12 +125,14 @@ class Page {
     out_ += "<h2>Missing results</h2>\n" + gaps_table(*study_, zone());
     left_out();
     how_computed();
+    if (is_interactive()) out_ += zoom_scripts();
     out_ += "</body>\n</html>\n";
     return std::move(out_);
   }
 
  private:
   [[nodiscard]] const ReportZone& zone() const { return facts_->zone; }
+  [[nodiscard]] bool is_interactive() const { return facts_->options.interactive; }
 
   template <typename... Parts>
   void add(fmt::format_string<Parts...> format, Parts&&... parts) {
@@ -141,11 +146,14 @@ class Page {
                                     : "no results";
     out_ +=
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
-        "style-src 'unsafe-inline'\"/>\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"";
+    out_ += is_interactive() ? zoom_policy() : no_scripts;
+    out_ +=
+        "\"/>\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n";
-    add("<title>Fastening results, {}</title>\n<style>{}{}</style>\n</head>\n<body>\n", when,
-        page_style, chart::style());
+    add("<title>Fastening results, {}</title>\n<style>{}{}", when, page_style, chart::style());
+    if (is_interactive()) add("{}{}", uplot_style(), zoom_style());
+    out_ += "</style>\n</head>\n<body>\n";
     add("<h1>Fastening results</h1>\n<p class=\"lead\">{}</p>\n", when);
     add("<p class=\"quiet\">{}. Times are those of the computer that recorded. Made {} by spindle "
         "{}.</p>\n",
@@ -194,7 +202,9 @@ class Page {
         escape(study_->facts().place(first.place).name), preset, escape(tool.name.serial),
         tool.model.empty() ? "" : ", model " + escape(tool.model));
     for (const Quantity quantity : work::quantities) {
-      out_ += run_figure(subject, quantity, *study_, zone());
+      const std::string figure = run_figure(subject, quantity, *study_, zone());
+      const bool zooms = is_interactive() && !figure.empty();
+      out_ += zooms ? zooming(figure, run_chart_of(subject, quantity, *study_, zone())) : figure;
     }
     for (const AssessedStratum& each : subject) add_stratum(each, subject.size() > 1);
   }

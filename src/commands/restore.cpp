@@ -53,7 +53,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     }
     if (names.empty()) return {};
     if (can_ask(context)) {
-      if (auto shown = show_plans(planned, context); !shown) return shown;
+      TRY(show_plans(planned, context));
     }
     return ask_consent(fmt::format("write {} to {}{}", counted(writes, "parameter"),
                                    is_group_ ? tools_in_words(names, of) : names.front(),

@@ -18,16 +18,15 @@ using catalogue::Snapshot;
 /// What cannot be read can be neither compared nor put back.
 Result<Snapshot> read_present(const RestoreTask& task, OpenTool& tool, const Context& context) {
   ProgressLine progress(context);
-  auto present = take_snapshot(tool, Secrets::include, context,
-                               progress.counter(tool.target.shown + ": reading"));
-  if (!present) return tl::unexpected(std::move(present.error()));
-  for (const Error& error : present->unreadable) {
+  TRY_LET(auto present, take_snapshot(tool, Secrets::include, context,
+                                      progress.counter(tool.target.shown + ": reading")));
+  for (const Error& error : present.unreadable) {
     const auto* needed = task.backup.find(error.name);
     if (needed != nullptr && task.selection.contains(needed->parameter)) {
       return tl::unexpected(error);
     }
   }
-  return std::move(present->snapshot);
+  return std::move(present.snapshot);
 }
 
 std::string serial_of(const Snapshot& snapshot) {
@@ -46,22 +45,17 @@ bool changes_by_itself(const catalogue::Parameter& parameter) {
 
 Result<RestoreTask> plan_by_profile(const files::BackupFile& file, const RestoreOptions& options,
                                     const Profile& profile) {
-  if (auto storing = check_storing(options.storing, profile); !storing) {
-    return tl::unexpected(std::move(storing.error()));
-  }
-  auto backup = files::resolve_backup(file, profile);
-  if (!backup) return tl::unexpected(std::move(backup.error()));
-  auto selection = catalogue::Selection::make(options.patterns, {}, profile);
-  if (!selection) return tl::unexpected(std::move(selection.error()));
+  TRY(check_storing(options.storing, profile));
+  TRY_LET(auto backup, files::resolve_backup(file, profile));
+  TRY_LET(auto selection, catalogue::Selection::make(options.patterns, {}, profile));
   return RestoreTask{
-      .file = file.path, .backup = std::move(*backup), .selection = std::move(*selection)};
+      .file = file.path, .backup = std::move(backup), .selection = std::move(selection)};
 }
 
 Result<RestoreTask> plan_by_tool(RestoreTask task, OpenTool& tool, const RestoreOptions& options,
                                  const Context& context) {
-  auto present = read_present(task, tool, context);
-  if (!present) return tl::unexpected(std::move(present.error()));
-  task.present = std::move(*present);
+  TRY_LET(auto present, read_present(task, tool, context));
+  task.present = std::move(present);
   const bool is_strict = options.model == ModelCheck::strict;
   if (auto same = check_model(task); is_strict && !same) {
     return tl::unexpected(std::move(same.error()));

@@ -88,7 +88,7 @@ RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, O
       counts_(counts_of(task.plan)) {}
 
 Result<RestoreResult> RestoreRun::run() {
-  if (auto saved = save_present(); !saved) return tl::unexpected(std::move(saved.error()));
+  TRY(save_present());
   listing_.emplace(*context_, restore_columns());
   write_all();
   if (errors_.empty()) verify();

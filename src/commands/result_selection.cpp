@@ -121,7 +121,7 @@ class Selector {
         names = group->second;
       }
       for (const std::string& name : names) {
-        if (auto added = add_target(name); !added) return added;
+        TRY(add_target(name));
       }
     }
     const bool has_group = std::any_of(wanted_->targets.begin(), wanted_->targets.end(),

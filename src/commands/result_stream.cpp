@@ -37,14 +37,13 @@ ResultStream::ResultStream(store::Reader& reader, StoredRecords& records,
 
 /// What was stored meanwhile belongs to the next round. Gaps and all else are read behind that.
 Result<void> ResultStream::tell_new(const Take& take) {
-  const auto newest = reader_->newest();
-  if (!newest) return tl::unexpected(newest.error());
-  last_ = *newest;
-  if (auto known = note_places(); !known) return known;
+  TRY_LET(const auto newest, reader_->newest());
+  last_ = newest;
+  TRY(note_places());
   if (newest_ && told_ != Told::gaps) {
-    if (auto found = find_begin(); !found) return found;
+    TRY(find_begin());
   }
-  if (auto read = read_others(); !read) return read;
+  TRY(read_others());
   const auto flush = [&] {
     const bool goes_on = std::all_of(part_.begin(), part_.end(), take);
     part_.clear();
@@ -52,9 +51,8 @@ Result<void> ResultStream::tell_new(const Take& take) {
   };
   if (told_ != Told::gaps) {
     for (std::size_t rows = rows_of_part; rows == rows_of_part;) {
-      const auto read = read_part();
-      if (!read) return tl::unexpected(read.error());
-      rows = *read;
+      TRY_LET(const auto read, read_part());
+      rows = read;
       if (!flush()) return {};
     }
   }
@@ -70,9 +68,8 @@ Result<void> ResultStream::tell_new(const Take& take) {
 
 /// A tool that is meant may be reached in another way by now.
 Result<void> ResultStream::note_places() {
-  const auto fresh = records_->refresh(*reader_);
-  if (!fresh) return tl::unexpected(fresh.error());
-  for (const store::Place* place : *fresh) {
+  TRY_LET(const auto fresh, records_->refresh(*reader_));
+  for (const store::Place* place : fresh) {
     if (selection_->names.contains(place->name)) filter_.places.push_back(place->id);
   }
   return {};
@@ -92,9 +89,9 @@ Result<void> ResultStream::find_begin() {
 }
 
 Result<void> ResultStream::read_others() {
-  if (auto read = read_gaps(); !read) return read;
+  TRY(read_gaps());
   if (told_ != Told::gaps) {
-    if (auto read = read_happenings(); !read) return read;
+    TRY(read_happenings());
   }
   std::stable_sort(others_.begin(), others_.end(),
                    [](const Other& a, const Other& b) { return a.at < b.at; });
@@ -107,10 +104,9 @@ Result<void> ResultStream::read_others() {
 
 Result<void> ResultStream::read_gaps() {
   if (filter_.number) return {};  // one result misses nothing
-  auto gaps = reader_->gaps(gap_filter_);
-  if (!gaps) return tl::unexpected(gaps.error());
+  TRY_LET(auto gaps, reader_->gaps(gap_filter_));
   gap_filter_.newest = std::nullopt;
-  for (store::Gap& gap : *gaps) {
+  for (store::Gap& gap : gaps) {
     gap_filter_.after = gap.id;
     if (!selection_->has(records_->place_at(gap.tool, gap.ended))) continue;
     Record record = records_->gap(gap);

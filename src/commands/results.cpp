@@ -46,7 +46,7 @@ Result<void> follow(ResultStream& stream, Listing& listing, const ResultStream::
       outcome.fail(slept.error());
       return {};
     }
-    if (auto told = stream.tell_new(take); !told) return told;
+    TRY(stream.tell_new(take));
   }
   return {};
 }
@@ -64,7 +64,7 @@ Result<Outcome> list_results(const ResultsOptions& options, store::Reader& reade
     listing.add(record);
     return listing.open() && !context.interrupt.signalled();
   };
-  if (auto told = stream.tell_new(take); !told) return tl::unexpected(told.error());
+  TRY(stream.tell_new(take));
   if (context.interrupt.signalled()) {
     outcome.fail(context.interrupt.error());
   } else if (options.following == Following::yes) {
@@ -78,17 +78,14 @@ Result<Outcome> list_results(const ResultsOptions& options, store::Reader& reade
 }  // namespace
 
 Result<Outcome> results(const ResultsOptions& options, Context& context) {
-  auto reader = open_store(options.store, context);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  TRY_LET(auto reader, open_store(options.store, context));
   ProfileShelf shelf(context.profiles);
-  auto records = StoredRecords::make(**reader, shelf, context);
-  if (!records) return tl::unexpected(std::move(records.error()));
-  const auto selection = select_results(options.filter, *records, context);
-  if (!selection) return tl::unexpected(selection.error());
+  TRY_LET(auto records, StoredRecords::make(*reader, shelf, context));
+  TRY_LET(const auto selection, select_results(options.filter, records, context));
   if (!options.qdas.empty()) {
-    return export_qdas(options, **reader, *records, *selection, context);
+    return export_qdas(options, *reader, records, selection, context);
   }
-  return list_results(options, **reader, *records, *selection, context);
+  return list_results(options, *reader, records, selection, context);
 }
 
 }  // namespace spindle::commands

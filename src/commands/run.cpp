@@ -82,7 +82,7 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options, con
                       "spindle-profile(5)",
               .name = profile.id});
   }
-  if (auto known = check_options(options, profile); !known) return tl::unexpected(known.error());
+  TRY(check_options(options, profile));
   switch (profile.run->kind()) {
     case catalogue::RunKind::start_action:
       return plan_start_action(options, profile, target);

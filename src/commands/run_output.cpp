@@ -106,11 +106,10 @@ Result<Outcome> RunOutput::ended_with(const Result<void>& written) const {
 
 Result<void> RunOutput::drain() {
   if (!out_) return {};
-  const auto left = out_->drain();
-  if (!left) return tl::unexpected(left.error());
-  if (*left > 0) {
+  TRY_LET(const auto left, out_->drain());
+  if (left > 0) {
     context_->io.err(fmt::format("spindle: {}: the reader of standard output did not take {}\n",
-                                 tool_->target.shown, counted(*left, "record")));
+                                 tool_->target.shown, counted(left, "record")));
   }
   return {};
 }

@@ -83,11 +83,9 @@ Error with_unit(Error error, modbus::UnitId unit) {
 
 Result<Outcome> scan(const ScanOptions& options, Context& context) {
   if (options.registers) return scan_registers(options, context);
-  const auto bus = resolve_bus(options, context);
-  if (!bus) return tl::unexpected(bus.error());
-  auto profile = load_bus_profile(*bus, context);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tool = connect(*bus, std::move(*profile), context);
+  TRY_LET(const auto bus, resolve_bus(options, context));
+  TRY_LET(auto profile, load_bus_profile(bus, context));
+  auto tool = connect(bus, std::move(profile), context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
 
   Outcome outcome;
@@ -104,7 +102,7 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
     if (probe && is_absence(*probe)) continue;
     if (probe) {
       outcome.succeed();
-      listing.add(unit_record(unit, *probe, *bus, context.clock));
+      listing.add(unit_record(unit, *probe, bus, context.clock));
     } else if (!is_silence(probe.error())) {
       outcome.fail(probe.error());
       listing.add(with_unit(probe.error(), unit));
@@ -112,7 +110,7 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
     }
   }
   if (outcome.succeeded() == 0) outcome.negate();
-  const bool one_for_all = bus->endpoint.medium == link::Medium::tcp && asked > 1 &&
+  const bool one_for_all = bus.endpoint.medium == link::Medium::tcp && asked > 1 &&
                            outcome.succeeded() == static_cast<std::size_t>(asked);
   if (one_for_all) {
     context.renderer.note(
@@ -121,7 +119,7 @@ Result<Outcome> scan(const ScanOptions& options, Context& context) {
   return finish(listing, outcome,
                 {.counts = {{"asked", number(asked)}, {"found", count(outcome.succeeded())}},
                  .sentence = fmt::format("{} asked, {} found", asked, outcome.succeeded()),
-                 .target = bus->shown},
+                 .target = bus.shown},
                 context);
 }
 

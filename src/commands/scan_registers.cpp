@@ -126,9 +126,8 @@ class ScanRegisters final : public Verb<std::monostate, Outcome> {
 }  // namespace
 
 Result<Outcome> scan_registers(const ScanOptions& options, Context& context) {
-  auto target = resolve_target(options.bus, context);
-  if (!target) return tl::unexpected(std::move(target.error()));
-  return run_verb(ScanRegisters(options), {.tools = {std::move(*target)}}, 1, context);
+  TRY_LET(auto target, resolve_target(options.bus, context));
+  return run_verb(ScanRegisters(options), {.tools = {std::move(target)}}, 1, context);
 }
 
 }  // namespace spindle::commands

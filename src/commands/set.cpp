@@ -43,11 +43,10 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
-    auto steps = options_->addressing == Addressing::broadcast
-                     ? steps_for_everybody(plan.assignments)
-                     : check_against_tool(plan.assignments, tool.device);
-    if (!steps) return tl::unexpected(std::move(steps.error()));
-    plan.steps = std::move(*steps);
+    TRY_LET(auto steps, options_->addressing == Addressing::broadcast
+                            ? steps_for_everybody(plan.assignments)
+                            : check_against_tool(plan.assignments, tool.device));
+    plan.steps = std::move(steps);
     plan.serial = serial_of(tool.device);
     tell_other_steps(plan.steps, tool.device.profile(), tool.target, context);
     tell_roundings(plan.steps, tool.target, context);
@@ -163,7 +162,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     }
     if (names.empty()) return {};
     if (can_ask(context)) {
-      if (auto shown = show_plans(planned, context); !shown) return shown;
+      TRY(show_plans(planned, context));
     }
     return ask_consent(fmt::format("write {} to {}{}", counted(counts.changed, "value"),
                                    tools_in_words(names, of), stores() ? ", and save" : ""),

@@ -121,19 +121,16 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
                                 .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
                                 .hint = "write it like preset.1.target-torque=2.71"});
   }
-  auto parameter = profile.find(text.substr(0, equals));
-  if (!parameter) return tl::unexpected(std::move(parameter.error()));
-  if (auto allowed = check_access(*parameter, profile, raw); !allowed) {
-    return tl::unexpected(std::move(allowed.error()));
-  }
-  if (auto fits = catalogue::check_pair(parameter->encoding, profile.link); !fits) {
-    fits.error().name = parameter->name;
-    fits.error().register_address = parameter->address.value;
+  TRY_LET(auto parameter, profile.find(text.substr(0, equals)));
+  TRY(check_access(parameter, profile, raw));
+  if (auto fits = catalogue::check_pair(parameter.encoding, profile.link); !fits) {
+    fits.error().name = parameter.name;
+    fits.error().register_address = parameter.address.value;
     return tl::unexpected(std::move(fits.error()));
   }
-  return with_value({*parameter, {}, text.substr(equals + 1)}, target).map_error([&](Error error) {
-    error.name = parameter->name;
-    error.register_address = parameter->address.value;
+  return with_value({parameter, {}, text.substr(equals + 1)}, target).map_error([&](Error error) {
+    error.name = parameter.name;
+    error.register_address = parameter.address.value;
     return error;
   });
 }
@@ -163,9 +160,8 @@ Result<void> check_own_limits(const Assignment& assignment, const device::Readin
 Result<void> resolve_by_tool(Assignment& assignment, const device::Reading& reading) {
   if (assignment.parameter.bits_by.empty() && assignment.parameter.scale_by.empty()) return {};
   assignment.parameter = reading.parameter;
-  auto value = catalogue::parse_value(assignment.parameter, assignment.text);
-  if (!value) return tl::unexpected(std::move(value.error()));
-  assignment.value = std::move(*value);
+  TRY_LET(auto value, catalogue::parse_value(assignment.parameter, assignment.text));
+  assignment.value = std::move(value);
   return {};
 }
 
@@ -256,9 +252,8 @@ std::string serial_of(const device::Device& device) {
 
 Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device) {
   SetPlan now{.assignments = plan.assignments};
-  auto steps = check_against_tool(now.assignments, device);
-  if (!steps) return tl::unexpected(std::move(steps.error()));
-  now.steps = std::move(*steps);
+  TRY_LET(auto steps, check_against_tool(now.assignments, device));
+  now.steps = std::move(steps);
   now.serial = serial_of(device);
   return check_unchanged(plan, now).map([&] { return std::move(now); });
 }
@@ -277,15 +272,14 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
                                                   RawWrites raw) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
-    auto assignment = parse_assignment(text, profile, target, raw);
-    if (!assignment) return tl::unexpected(std::move(assignment.error()));
+    TRY_LET(auto assignment, parse_assignment(text, profile, target, raw));
     for (const Assignment& earlier : assignments) {
       // Which bits these are is known once the tool was read.
-      if (!earlier.parameter.part.empty() || !assignment->parameter.part.empty()) continue;
-      if (!catalogue::share_bits(earlier.parameter, assignment->parameter)) continue;
-      return tl::unexpected(assigned_twice(assignment->parameter));
+      if (!earlier.parameter.part.empty() || !assignment.parameter.part.empty()) continue;
+      if (!catalogue::share_bits(earlier.parameter, assignment.parameter)) continue;
+      return tl::unexpected(assigned_twice(assignment.parameter));
     }
-    assignments.push_back(std::move(*assignment));
+    assignments.push_back(std::move(assignment));
   }
   return assignments;
 }
@@ -295,24 +289,18 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   std::vector<Parameter> parameters;
   parameters.reserve(assignments.size());
   for (const Assignment& assignment : assignments) parameters.push_back(assignment.parameter);
-  const auto readings = device.read_each(parameters, device::Limits::read);
-  if (!readings) return tl::unexpected(readings.error());
+  TRY_LET(const auto readings, device.read_each(parameters, device::Limits::read));
   std::vector<SetStep> steps;
   for (std::size_t index = 0; index < assignments.size(); ++index) {
-    const device::Reading& reading = (*readings)[index];
-    const auto before = reading.held();
-    if (!before) return tl::unexpected(before.error());
-    if (auto known = resolve_by_tool(assignments[index], reading); !known) {
-      return tl::unexpected(std::move(known.error()));
-    }
+    const device::Reading& reading = readings[index];
+    TRY_LET(const auto before, reading.held());
+    TRY(resolve_by_tool(assignments[index], reading));
     auto allowed = check_own_limits(assignments[index], reading, device.profile());
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    steps.push_back({std::move(assignments[index]), *before});
+    steps.push_back({std::move(assignments[index]), before});
   }
-  if (auto stay = check_meanings_stay(parameters, steps); !stay) {
-    return tl::unexpected(std::move(stay.error()));
-  }
-  if (auto once = check_once(steps); !once) return tl::unexpected(std::move(once.error()));
+  TRY(check_meanings_stay(parameters, steps));
+  TRY(check_once(steps));
   return in_order(std::move(steps));
 }
 
@@ -335,9 +323,8 @@ Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignm
     }
     if (!assignment.parameter.bits_by.empty()) {
       assignment.parameter = catalogue::with_bits_for(assignment.parameter, std::nullopt);
-      auto value = catalogue::parse_value(assignment.parameter, assignment.text);
-      if (!value) return tl::unexpected(std::move(value.error()));
-      assignment.value = std::move(*value);
+      TRY_LET(auto value, catalogue::parse_value(assignment.parameter, assignment.text));
+      assignment.value = std::move(value);
     }
     steps.push_back({std::move(assignment), std::nullopt});
   }

@@ -98,37 +98,31 @@ Result<void> summarise(const Traffic& traffic, const Outcome& outcome, Context& 
 }  // namespace
 
 Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
-  auto faults = parse_each("--fault", options.faults, sim::parse_fault);
-  if (!faults) return tl::unexpected(std::move(faults.error()));
-  auto outages = parse_each("--outage", options.outages, sim::parse_outage);
-  if (!outages) return tl::unexpected(std::move(outages.error()));
+  TRY_LET(auto faults, parse_each("--fault", options.faults, sim::parse_fault));
+  TRY_LET(auto outages, parse_each("--outage", options.outages, sim::parse_outage));
   SimulateOptions wanted = options;
   constexpr std::uint16_t highest_code = 0xFFFF;
   const auto parse_code = [](const std::string& text) {
     return sim::parse_raised(text, highest_code);
   };
-  auto alarms = parse_each("--alarm", options.alarms, parse_code);
-  if (!alarms) return tl::unexpected(std::move(alarms.error()));
-  auto warnings = parse_each("--warning", options.warnings, parse_code);
-  if (!warnings) return tl::unexpected(std::move(warnings.error()));
-  wanted.tool.alarms = std::move(*alarms);
-  wanted.tool.warnings = std::move(*warnings);
-  wanted.tool.bm.faults = *faults;
-  auto tool = make_simulated_tool(options.profile, wanted.tool, context);
-  if (!tool) return tl::unexpected(std::move(tool.error()));
-  auto place = place_of(options, tool->profile);
-  if (!place) return tl::unexpected(std::move(place.error()));
-  auto idle = useless_option(wanted, tool->profile);
-  if (!idle) idle = useless_trouble(*faults, *outages, tool->profile);
+  TRY_LET(auto alarms, parse_each("--alarm", options.alarms, parse_code));
+  TRY_LET(auto warnings, parse_each("--warning", options.warnings, parse_code));
+  wanted.tool.alarms = std::move(alarms);
+  wanted.tool.warnings = std::move(warnings);
+  wanted.tool.bm.faults = faults;
+  TRY_LET(auto tool, make_simulated_tool(options.profile, wanted.tool, context));
+  TRY_LET(auto place, place_of(options, tool.profile));
+  auto idle = useless_option(wanted, tool.profile);
+  if (!idle) idle = useless_trouble(faults, outages, tool.profile);
   if (idle) return tl::unexpected(std::move(*idle));
   Outcome outcome;
   outcome.succeed();
   Traffic traffic;
-  sim::ServeOptions serve = serve_options(*place, tool->profile, options, std::move(*faults));
-  serve.outages = std::move(*outages);
+  sim::ServeOptions serve = serve_options(place, tool.profile, options, std::move(faults));
+  serve.outages = std::move(outages);
   serve.listening = [&](std::uint16_t port) {
-    place->port = port;
-    return announce(tool->profile.id, url_of(*place, options), context);
+    place.port = port;
+    return announce(tool.profile.id, url_of(place, options), context);
   };
   serve.log = [&](sim::Heard heard, std::uint32_t connection, ByteView bytes) {
     traffic.count(heard);
@@ -137,7 +131,7 @@ Result<Outcome> simulate(const SimulateOptions& options, Context& context) {
   serve.ignored = [&](std::uint32_t connection, ByteView bytes, std::string_view reason) {
     tell_ignored(connection, bytes, reason, context);
   };
-  auto served = context.serve(*tool->server, serve);
+  auto served = context.serve(*tool.server, serve);
   // Being stopped is how it ends; the status still says by what.
   if (served && context.interrupt.raised()) outcome.fail(context.interrupt.error());
   return served.and_then([&] { return summarise(traffic, outcome, context); }).map([&] {

@@ -84,9 +84,8 @@ class StartActionRun final : public ToolRun {
     is_begun_ = true;
   }
   Result<void> follow() override {
-    auto ended = follower_->follow(limits_);
-    if (!ended) return tl::unexpected(std::move(ended.error()));
-    ended_ = std::move(*ended);
+    TRY_LET(auto ended, follower_->follow(limits_));
+    ended_ = std::move(ended);
     return {};
   }
 
@@ -197,12 +196,11 @@ Result<std::string> foresee(StartActionSetup& setup, const RemoteStartOptions& o
 /// Asks with what the tool itself says, and makes sure that it is still so behind the answer.
 Result<void> StartActionRun::ask() {
   if (context().user.consent == Consent::given) return {};
-  const auto asked = foresee(setup_, *options_, tool().target);
-  if (!asked) return tl::unexpected(asked.error());
-  if (auto agreed = ask_away_from(tool(), *asked, context()); !agreed) return agreed;
+  TRY_LET(const auto asked, foresee(setup_, *options_, tool().target));
+  TRY(ask_away_from(tool(), asked, context()));
   const auto now = foresee(setup_, *options_, tool().target);
   if (!now) return tl::unexpected(now.error());
-  if (*now == *asked) return {};
+  if (*now == asked) return {};
   return tl::unexpected(
       not_ready(tool().target,
                 fmt::format("the tool was changed while the question stood; now it is: {}", *now),
@@ -235,23 +233,21 @@ const std::string& value_of(std::string_view option, const RemoteStartOptions& o
 
 Result<std::unique_ptr<RunPlan>> plan_start_action(const RemoteStartOptions& options,
                                                    const Profile& profile, const Target& target) {
-  const auto model = device::StartAction::of(profile);
-  if (!model) return tl::unexpected(model.error());
-  if (!profile.events || model->start().confirm.empty()) {
+  TRY_LET(const auto model, device::StartAction::of(profile));
+  if (!profile.events || model.start().confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "a run of this product cannot be followed",
                                 .hint = "its profile lacks 'events', or 'confirm' of its start",
                                 .name = profile.id});
   }
-  StartActionPlan plan{.facts = model->facts(), .selections = {}, .start = model->start()};
+  StartActionPlan plan{.facts = model.facts(), .selections = {}, .start = model.start()};
   for (const catalogue::StartOption& option : plan.facts.selections) {
     const std::string& value = value_of(option.option, options);
     if (value.empty()) continue;
-    auto request = parse_action(fmt::format("{}={}", option.action, value), profile);
-    if (!request) return tl::unexpected(std::move(request.error()));
-    auto allowed = check_evidence(request->action, target, options.acceptance);
+    TRY_LET(auto request, parse_action(fmt::format("{}={}", option.action, value), profile));
+    auto allowed = check_evidence(request.action, target, options.acceptance);
     if (!allowed) return tl::unexpected(std::move(allowed.error()));
-    plan.selections.push_back(std::move(*request));
+    plan.selections.push_back(std::move(request));
   }
   return check_evidence(plan.start, target, options.acceptance)
       .map([&]() -> std::unique_ptr<RunPlan> {

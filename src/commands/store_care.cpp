@@ -42,7 +42,7 @@ Result<void> replace(store::Reader& reader, const std::string& file) {
   const std::string part = file + ".part";
   std::error_code failed;
   std::filesystem::remove(part, failed);
-  if (auto copied = reader.backup(part); !copied) return copied;
+  TRY(reader.backup(part));
   std::filesystem::rename(part, file, failed);
   if (!failed) return {};
   Error error{.code = Errc::storage,
@@ -60,42 +60,34 @@ Result<Outcome> trim_store(const TrimOptions& options, Context& context) {
     before.error().name = "--before";
     return tl::unexpected(std::move(before.error()));
   }
-  const auto path = work::store_place(options.store, context.state_folder);
-  if (!path) return tl::unexpected(path.error());
-  auto reader = store::Reader::open(*path);
+  TRY_LET(const auto path, work::store_place(options.store, context.state_folder));
+  auto reader = store::Reader::open(path);
   if (!reader) return tl::unexpected(std::move(reader.error()));
-  auto writer = store::Writer::open(*path);
-  if (!writer) return tl::unexpected(std::move(writer.error()));
-  const auto older = count_older(**reader, *before);
-  if (!older) return tl::unexpected(older.error());
+  TRY_LET(auto writer, store::Writer::open(path));
+  TRY_LET(const auto older, count_older(**reader, *before));
   reader->reset();  // a reader holds back what is to be removed
   const std::string what =
       fmt::format("trim removes {} from before {} for ever, but for the last of each tool",
-                  counted(*older, "event"), to_local_text(*before, context.clock));
-  if (auto agreed = ask_consent(what, context); !agreed) {
-    return tl::unexpected(std::move(agreed.error()));
-  }
-  const auto trimmed = (*writer)->trim(*before, context.clock.wall());
-  if (!trimmed) return tl::unexpected(trimmed.error());
+                  counted(older, "event"), to_local_text(*before, context.clock));
+  TRY(ask_consent(what, context));
+  TRY_LET(const auto trimmed, writer->trim(*before, context.clock.wall()));
   Outcome outcome;
   outcome.succeed();
   return tell({.counts = {{"before", report::to_text(*before)},
-                          {"events", count(trimmed->events)},
-                          {"gaps", count(trimmed->gaps)},
-                          {"happenings", count(trimmed->happenings)}},
-               .sentence = fmt::format("{}, {} and {} removed", counted(trimmed->events, "event"),
-                                       counted(trimmed->gaps, "gap"),
-                                       counted(trimmed->happenings, "happening"))},
+                          {"events", count(trimmed.events)},
+                          {"gaps", count(trimmed.gaps)},
+                          {"happenings", count(trimmed.happenings)}},
+               .sentence = fmt::format("{}, {} and {} removed", counted(trimmed.events, "event"),
+                                       counted(trimmed.gaps, "gap"),
+                                       counted(trimmed.happenings, "happening"))},
               outcome, context)
       .map([&] { return outcome; });
 }
 
 Result<Outcome> backup_store(const CopyOptions& options, Context& context) {
-  const auto path = work::store_place(options.store, context.state_folder);
-  if (!path) return tl::unexpected(path.error());
-  auto reader = store::Reader::open(*path);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
-  const bool is_itself = context.disk.same_file(*path, options.file);
+  TRY_LET(const auto path, work::store_place(options.store, context.state_folder));
+  TRY_LET(auto reader, store::Reader::open(path));
+  const bool is_itself = context.disk.same_file(path, options.file);
   const bool is_taken = context.disk.exists(options.file);
   if (is_itself || (is_taken && options.overwrite == Overwrite::refuse)) {
     Error error = is_there(options.file);
@@ -103,7 +95,7 @@ Result<Outcome> backup_store(const CopyOptions& options, Context& context) {
     if (is_itself) error.hint = "choose another name";
     return tl::unexpected(std::move(error));
   }
-  auto copied = is_taken ? replace(**reader, options.file) : (*reader)->backup(options.file);
+  auto copied = is_taken ? replace(*reader, options.file) : reader->backup(options.file);
   if (!copied) return tl::unexpected(std::move(copied.error()));
   Outcome outcome;
   outcome.succeed();

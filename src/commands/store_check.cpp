@@ -72,11 +72,10 @@ class StoreCheck {
 
  private:
   Result<void> tell_damages() {
-    const auto findings = reader_->integrity();
-    if (!findings) return tl::unexpected(findings.error());
-    sums_.damages = findings->size();
+    TRY_LET(const auto findings, reader_->integrity());
+    sums_.damages = findings.size();
     Listing listing(*context_, damage_columns);
-    for (const std::string& finding : *findings) {
+    for (const std::string& finding : findings) {
       listing.add(Record{.type = "damage",
                          .target = {},
                          .time = context_->clock.wall(),
@@ -86,10 +85,9 @@ class StoreCheck {
   }
 
   Result<void> tell_coverage() {
-    const auto all = reader_->coverage();
-    if (!all) return tl::unexpected(all.error());
+    TRY_LET(const auto all, reader_->coverage());
     Listing listing(*context_, coverage_columns);
-    for (const store::Coverage& coverage : *all) {
+    for (const store::Coverage& coverage : all) {
       sums_.add(coverage);
       listing.add(coverage_record(coverage));
     }
@@ -97,11 +95,10 @@ class StoreCheck {
   }
 
   Result<void> tell_mileage() {
-    const auto all = read_mileage(*reader_);
-    if (!all) return tl::unexpected(all.error());
-    if (all->empty()) return {};
+    TRY_LET(const auto all, read_mileage(*reader_));
+    if (all.empty()) return {};
     Listing listing(*context_, odometer_columns);
-    for (const Mileage& mileage : *all) listing.add(odometer_record(mileage));
+    for (const Mileage& mileage : all) listing.add(odometer_record(mileage));
     return listing.end();
   }
 
@@ -182,12 +179,10 @@ class StoreCheck {
 }  // namespace
 
 Result<Outcome> check_store(const StoreOptions& options, Context& context) {
-  auto reader = open_store(options.store, context);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  TRY_LET(auto reader, open_store(options.store, context));
   ProfileShelf shelf(context.profiles);
-  const auto records = StoredRecords::make(**reader, shelf, context);
-  if (!records) return tl::unexpected(records.error());
-  return StoreCheck(**reader, *records, context).run();
+  TRY_LET(const auto records, StoredRecords::make(*reader, shelf, context));
+  return StoreCheck(*reader, records, context).run();
 }
 
 }  // namespace spindle::commands

@@ -109,12 +109,10 @@ Record preset_record(const store::PresetSettings& settings, const StoredRecords&
 
 Result<void> add_all(store::Reader& reader, StoredRecords& records, LineSink& sink) {
   for (const store::Place& place : records.places()) sink.add(place_record(place, records));
-  const auto epochs = reader.epochs();
-  if (!epochs) return tl::unexpected(epochs.error());
-  for (const store::Epoch& epoch : *epochs) sink.add(epoch_record(epoch, records));
-  const auto settings = reader.settings();
-  if (!settings) return tl::unexpected(settings.error());
-  for (const auto& row : *settings) sink.add(preset_record(row, records));
+  TRY_LET(const auto epochs, reader.epochs());
+  for (const store::Epoch& epoch : epochs) sink.add(epoch_record(epoch, records));
+  TRY_LET(const auto settings, reader.settings());
+  for (const auto& row : settings) sink.add(preset_record(row, records));
   const Selection all;
   ResultStream stream(reader, records, all, Told::all, std::nullopt);
   return stream.tell_new([&](const Record& record) { return sink.add(record); });
@@ -128,14 +126,13 @@ Result<Outcome> export_store(const CopyOptions& options, Context& context) {
                                 .message = "an export is JSON Lines",
                                 .hint = "'spindle results -o csv' writes a table of the results"});
   }
-  auto reader = open_store(options.store, context);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  TRY_LET(auto reader, open_store(options.store, context));
   ProfileShelf shelf(context.profiles);
-  auto records = StoredRecords::make(**reader, shelf, context);
+  auto records = StoredRecords::make(*reader, shelf, context);
   if (!records) return tl::unexpected(std::move(records.error()));
   LineSink sink(options, context);
   if (sink.written()) {
-    auto read = add_all(**reader, *records, sink);
+    auto read = add_all(*reader, *records, sink);
     sink.flush();
     if (!read) return tl::unexpected(std::move(read.error()));
   }

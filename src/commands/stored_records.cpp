@@ -98,19 +98,17 @@ Result<StoredRecords> StoredRecords::make(store::Reader& reader, ProfileShelf& s
 }
 
 Result<std::vector<const store::Place*>> StoredRecords::refresh(store::Reader& reader) {
-  auto places = reader.places();
-  if (!places) return tl::unexpected(std::move(places.error()));
+  TRY_LET(auto places, reader.places());
   std::vector<const store::Place*> fresh;
-  for (store::Place& place : *places) {
+  for (store::Place& place : places) {
     if (place_by_id_.contains(place.id)) continue;
     places_.push_back(std::move(place));
     fresh.push_back(&places_.back());
     place_by_id_[places_.back().id] = &places_.back();
   }
   if (fresh.empty()) return fresh;
-  auto tools = reader.tools();
-  if (!tools) return tl::unexpected(std::move(tools.error()));
-  for (store::Tool& tool : *tools) {
+  TRY_LET(auto tools, reader.tools());
+  for (store::Tool& tool : tools) {
     if (tool_by_id_.contains(tool.id)) continue;
     tools_.push_back(std::move(tool));
     tool_by_id_[tools_.back().id] = &tools_.back();

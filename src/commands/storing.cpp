@@ -14,16 +14,15 @@ Result<void> check_storing(Storing storing, const catalogue::Profile& profile) {
 }
 
 Result<void> store(OpenTool& tool, work::ChangeLog& log, Outcome& outcome, Context& context) {
-  auto request = parse_action(std::string(store_action), *tool.profile);
-  if (!request) return tl::unexpected(std::move(request.error()));
-  tell_notes(*request, tool.target, context);
-  const auto result = perform_recorded(*request, tool, log, context);
+  TRY_LET(auto request, parse_action(std::string(store_action), *tool.profile));
+  tell_notes(request, tool.target, context);
+  const auto result = perform_recorded(request, tool, log, context);
   Context own = about(context, tool.target);
   Listing listing(own, performed_columns());
-  if (result) listing.add(performed_record(*request, *result, tool.target, context.clock));
+  if (result) listing.add(performed_record(request, *result, tool.target, context.clock));
   std::optional<Error> error;
   if (!result) error = result.error();
-  if (result == device::ActionResult::not_confirmed) error = not_confirmed(*request);
+  if (result == device::ActionResult::not_confirmed) error = not_confirmed(request);
   if (error) {
     outcome.fail(*error);
     listing.add(*error);

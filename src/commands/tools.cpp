@@ -109,9 +109,8 @@ Result<Outcome> check_tools(Context& context) {
               .message = "no tools file was found",
               .hint = "name one with --tools; 'man 5 spindle-tools' says where it is looked for"});
   }
-  auto checked = files::check_tools(path, context.disk);
-  if (!checked) return tl::unexpected(std::move(checked.error()));
-  return tell_findings(ToolsCheck(std::move(*checked), context).run(), path, "tools file", context);
+  TRY_LET(auto checked, files::check_tools(path, context.disk));
+  return tell_findings(ToolsCheck(std::move(checked), context).run(), path, "tools file", context);
 }
 
 }  // namespace spindle::commands

@@ -93,10 +93,9 @@ class WatchListener final : public Listener {
     if (is_known) return device::RecordedPast();
     device::RecordedPast past;
     if (memory_->is_there()) {
-      const auto last = memory_->last(name);
-      if (!last) return tl::unexpected(last.error());
-      voice_.naming.epoch = *last ? (*last)->epoch : 0;
-      if (*last) past.last = work::last_event_of(**last, context_->clock.wall());
+      TRY_LET(const auto last, memory_->last(name));
+      voice_.naming.epoch = last ? last->epoch : 0;
+      if (last) past.last = work::last_event_of(*last, context_->clock.wall());
     }
     if (options_->since_event) past.last = device::LastEvent{.number = *options_->since_event};
     return past;
@@ -117,30 +116,28 @@ class WatchListener final : public Listener {
 
 Result<Outcome> watch(const WatchOptions& options, Context& context) {
   ProfileShelf shelf(context.profiles);
-  auto tools = prepare_tools(options.targets, options.names, shelf, context);
-  if (!tools) return tl::unexpected(std::move(tools.error()));
-  for (const WatchedTool& tool : *tools) {
+  TRY_LET(auto tools, prepare_tools(options.targets, options.names, shelf, context));
+  for (const WatchedTool& tool : tools) {
     if (auto checked = check_watch(options, tool, shelf, context); !checked) {
       checked.error().asked_of = tool.target().shown;
       return tl::unexpected(std::move(checked.error()));
     }
   }
-  if (options.since_event && tools->size() > 1) {
+  if (options.since_event && tools.size() > 1) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = "--since-event is about one tool, and several are to be watched",
               .hint = "watch one, or leave it out: a store knows the last event of each"});
   }
-  auto memory = Memory::open(options, context);
-  if (!memory) return tl::unexpected(std::move(memory.error()));
+  TRY_LET(auto memory, Memory::open(options, context));
   std::vector<Target> targets;
-  for (const WatchedTool& tool : *tools) targets.push_back(tool.target());
+  for (const WatchedTool& tool : tools) targets.push_back(tool.target());
   SharedLines lines(targets, context);
   const device::OpenTransport open_transport = lines.opener();
-  WatchStream stream(options, tools->size(), columns_for(*tools, shelf, options, context), context);
+  WatchStream stream(options, tools.size(), columns_for(tools, shelf, options, context), context);
   const auto plan = [&](const catalogue::Profile& profile) { return plan_watch(options, profile); };
-  for_each_side_by_side(*tools, [&](WatchedTool& tool) {
-    WatchListener listener(tool.target(), options, **memory, stream, context);
+  for_each_side_by_side(tools, [&](WatchedTool& tool) {
+    WatchListener listener(tool.target(), options, *memory, stream, context);
     watch_tool(tool, open_transport, plan, options.reconnection, listener, context);
   });
   return stream.finish();

@@ -78,9 +78,8 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
   const std::vector<std::string> names =
       options.names.empty() ? to_strings(profile.watched) : options.names;
   if (!names.empty()) {
-    auto values = profile.select(names);
-    if (!values) return tl::unexpected(std::move(values.error()));
-    plan.values = std::move(*values);
+    TRY_LET(auto values, profile.select(names));
+    plan.values = std::move(values);
   }
   return check_purpose(options, profile, std::move(plan));
 }

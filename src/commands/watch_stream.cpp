@@ -112,14 +112,13 @@ TimePoint WatchStream::until() {
 Result<Outcome> WatchStream::finish() {
   status_.clear();
   if (closed_) return tl::unexpected(Error{.code = Errc::closed_pipe});
-  if (auto ended = listing_.end(); !ended) return tl::unexpected(std::move(ended.error()));
+  TRY(listing_.end());
   const bool idle =
       options_->idle_timeout && context_->clock.now() >= last_event_ + *options_->idle_timeout;
   if (idle && activity_ == 0) outcome_.negate();
-  const auto left = out_.drain();
-  if (!left) return tl::unexpected(left.error());
-  if (*left > 0) return give_up(*left);
-  if (auto told = summarise(); !told) return tl::unexpected(std::move(told.error()));
+  TRY_LET(const auto left, out_.drain());
+  if (left > 0) return give_up(left);
+  TRY(summarise());
   return out_.drain().map([&](std::size_t) { return outcome_; });
 }
 

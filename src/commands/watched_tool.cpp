@@ -13,13 +13,10 @@ Result<const KnownProfile*> ProfileShelf::take(const std::string& id) {
   const std::lock_guard lock(mutex_);
   const auto known = profiles_.find(id);
   if (known != profiles_.end()) return known->second.get();
-  auto profile = store_->load(id);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tables = store_->load_code_tables(id);
-  if (!tables) return tl::unexpected(std::move(tables.error()));
+  TRY_LET(auto profile, store_->load(id));
+  TRY_LET(auto tables, store_->load_code_tables(id));
   auto& place = profiles_[id];
-  place =
-      std::make_unique<const KnownProfile>(KnownProfile{std::move(*profile), std::move(*tables)});
+  place = std::make_unique<const KnownProfile>(KnownProfile{std::move(profile), std::move(tables)});
   return place.get();
 }
 
@@ -27,7 +24,7 @@ Result<WatchedTool> WatchedTool::make(Target target, const std::vector<std::stri
                                       ProfileShelf& shelf, const Context& context) {
   WatchedTool tool(std::move(target), names, shelf, context);
   if (tool.target_.profile.empty()) return tool;
-  return tool.adopt_profile(tool.target_.profile).map([&] { return std::move(tool); });
+  return tool.adopt_profile(tool.target_.profile).map([&] { return tool; });
 }
 
 Result<void> WatchedTool::adopt_profile(const std::string& profile) {
@@ -73,20 +70,16 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
   const Duration usual = hurried.common.connect_timeout.value_or(facts.connect);
   hurried.common.connect_timeout = std::min(usual, patience);
   if (known_ == nullptr) {
-    if (auto found = find_profile(hurried); !found) return tl::unexpected(std::move(found.error()));
+    TRY(find_profile(hurried));
   }
   auto device =
       connect_device(target_, known_->profile, hurried, SimulatedOperator::working, late_answers_);
   if (!device) return tl::unexpected(std::move(device.error()));
-  if (auto registers = device->require_known_registers(); !registers) {
-    return tl::unexpected(std::move(registers.error()));
-  }
+  TRY(device->require_known_registers());
   late_answers_ =
       link::SessionOptions::LateAnswers::possible;  // it is opened again after trouble only
   if (known_->profile.link.loopback) {
-    if (auto there = device->require_answer(); !there) {
-      return tl::unexpected(std::move(there.error()));
-    }
+    TRY(device->require_answer());
   }
   std::string identity = device->identity_text();
   return device::Watcher::Link{std::move(*device), std::move(identity)};
@@ -95,19 +88,17 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
 Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
                                                const std::vector<std::string>& names,
                                                ProfileShelf& shelf, const Context& context) {
-  auto resolved = resolve_targets(targets, context);
-  if (!resolved) return tl::unexpected(std::move(resolved.error()));
+  TRY_LET(auto resolved, resolve_targets(targets, context));
   std::vector<WatchedTool> tools;
   std::vector<catalogue::LinkSpec> facts;
-  tools.reserve(resolved->size());
-  for (const Target& target : *resolved) {
-    auto tool = WatchedTool::make(target, names, shelf, context);
-    if (!tool) return tl::unexpected(std::move(tool.error()));
-    const KnownProfile* known = tool->known();
+  tools.reserve(resolved.size());
+  for (const Target& target : resolved) {
+    TRY_LET(auto tool, WatchedTool::make(target, names, shelf, context));
+    const KnownProfile* known = tool.known();
     facts.push_back(known == nullptr ? catalogue::LinkSpec() : known->profile.link);
-    tools.push_back(std::move(*tool));
+    tools.push_back(std::move(tool));
   }
-  return check_same_settings(*resolved, facts).map([&] { return std::move(tools); });
+  return check_same_settings(resolved, facts).map([&] { return std::move(tools); });
 }
 
 }  // namespace spindle::commands

@@ -37,9 +37,8 @@ class Undo {
   Result<void> connect(TimePoint deadline) {
     if (lost_) {
       device_->disconnect();
-      auto opened = (*reopen_)(std::max(deadline - calm_->now(), pause));
-      if (!opened) return tl::unexpected(std::move(opened.error()));
-      *device_ = std::move(*opened);
+      TRY_LET(auto opened, (*reopen_)(std::max(deadline - calm_->now(), pause)));
+      *device_ = std::move(opened);
       lost_ = false;
       silences_ = 0;
     }
@@ -50,11 +49,9 @@ class Undo {
   }
 
   Result<std::int64_t> shown() {
-    const auto parameter = device_->profile().find(action_->action.confirm);
-    if (!parameter) return tl::unexpected(parameter.error());
-    const auto readings = device_->read_each({*parameter}, Limits::skip);
-    if (!readings) return tl::unexpected(readings.error());
-    const auto& value = readings->front().value;
+    TRY_LET(const auto parameter, device_->profile().find(action_->action.confirm));
+    TRY_LET(const auto readings, device_->read_each({parameter}, Limits::skip));
+    const auto& value = readings.front().value;
     if (!value) return tl::unexpected(value.error());
     return value->number.mantissa();
   }

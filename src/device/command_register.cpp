@@ -27,21 +27,18 @@ CommandRegister::CommandRegister(CommandRegister&& other) noexcept
 
 Result<CommandRegister> CommandRegister::of(const catalogue::Profile& profile) {
   const CommandRegisterSpec& facts = *profile.run->command_register();
-  auto command = profile.find(facts.command);
-  if (!command) return tl::unexpected(std::move(command.error()));
-  CommandRegister model(facts, std::move(*command));
+  TRY_LET(auto command, profile.find(facts.command));
+  CommandRegister model(facts, std::move(command));
   if (!facts.stop_register.empty()) {
-    auto stop = profile.find(facts.stop_register);
-    if (!stop) return tl::unexpected(std::move(stop.error()));
-    model.stop_ = std::move(*stop);
+    TRY_LET(auto stop, profile.find(facts.stop_register));
+    model.stop_ = std::move(stop);
   }
   const catalogue::MonitorSpec& monitor = facts.monitor;
   if (monitor.status.empty() && monitor.command_speed.empty() && monitor.feedback_speed.empty()) {
     return model;
   }
-  auto made = MotorMonitor::of(monitor, profile);
-  if (!made) return tl::unexpected(std::move(made.error()));
-  model.monitor_ = std::move(*made);
+  TRY_LET(auto made, MotorMonitor::of(monitor, profile));
+  model.monitor_ = std::move(made);
   return model;
 }
 

@@ -47,20 +47,17 @@ Result<CommandWord> CommandWord::of(const catalogue::Profile& profile) {
                                 .hint = "its profile lacks 'run'",
                                 .name = profile.id});
   }
-  auto monitor = MotorMonitor::of(facts->monitor, profile);
-  if (!monitor) return tl::unexpected(std::move(monitor.error()));
-  CommandWord motor(*facts, std::move(*monitor));
+  TRY_LET(auto monitor, MotorMonitor::of(facts->monitor, profile));
+  CommandWord motor(*facts, std::move(monitor));
   if (motor.has_inputs()) {
     for (std::uint16_t n = facts->inputs.first; n <= facts->inputs.last; ++n) {
-      auto input = profile.find(catalogue::numbered_name(facts->inputs.parameter, n));
-      if (!input) return tl::unexpected(std::move(input.error()));
-      motor.inputs_.push_back(std::move(*input));
+      TRY_LET(auto input, profile.find(catalogue::numbered_name(facts->inputs.parameter, n)));
+      motor.inputs_.push_back(std::move(input));
     }
   }
-  const auto command = profile.find(facts->command);
-  if (!command) return tl::unexpected(command.error());
-  const int low_word = catalogue::register_count(command->encoding) - 1;
-  motor.command_register_ = {static_cast<std::uint16_t>(command->address.value + low_word)};
+  TRY_LET(const auto command, profile.find(facts->command));
+  const int low_word = catalogue::register_count(command.encoding) - 1;
+  motor.command_register_ = {static_cast<std::uint16_t>(command.address.value + low_word)};
   return motor;
 }
 
@@ -87,11 +84,11 @@ Result<catalogue::CommandBits> CommandWord::read_bits(Device& device, std::uint1
   const auto end = static_cast<std::size_t>(std::bit_width(joined(wanted, lower_half)));
   const std::size_t first = facts_.inputs.first;
   const std::size_t count = std::min(inputs_.size(), end > first ? end - first : 0);
-  const auto readings = device.read_each(
-      {inputs_.begin(), inputs_.begin() + static_cast<std::ptrdiff_t>(count)}, Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
+  TRY_LET(const auto readings,
+          device.read_each({inputs_.begin(), inputs_.begin() + static_cast<std::ptrdiff_t>(count)},
+                           Limits::skip));
   std::vector<std::int64_t> numbers;
-  for (const Reading& reading : *readings) {
+  for (const Reading& reading : readings) {
     if (!reading.value) return tl::unexpected(reading.value.error());
     numbers.push_back(reading.value->number.mantissa());
   }

@@ -498,9 +498,8 @@ Result<void> Device::switch_events(EventOutput output) {
 }
 
 Result<std::uint16_t> Device::event_number() {
-  const auto number = profile_->find(profile_->events->number);
-  if (!number) return tl::unexpected(number.error());
-  return read_raw(range_of(*number)).map([](const Registers& registers) {
+  TRY_LET(const auto number, profile_->find(profile_->events->number));
+  return read_raw(range_of(number)).map([](const Registers& registers) {
     return registers.front();
   });
 }
@@ -523,15 +522,12 @@ Result<Registers> Device::event_block() {
 }
 
 Result<std::optional<Registers>> Device::last_event() {
-  const auto number = profile_->find(profile_->events->number);
-  if (!number) return tl::unexpected(number.error());
-  const std::size_t number_at = number->address.value - profile_->events->first;
+  TRY_LET(const auto number, profile_->find(profile_->events->number));
+  const std::size_t number_at = number.address.value - profile_->events->first;
   for (int attempt = 0; attempt < max_event_reads; ++attempt) {
-    auto block = event_block();
-    if (!block) return tl::unexpected(std::move(block.error()));
-    const auto again = event_number();
-    if (!again) return tl::unexpected(again.error());
-    if (*again == (*block)[number_at]) return std::move(*block);
+    TRY_LET(auto block, event_block());
+    TRY_LET(const auto again, event_number());
+    if (again == block[number_at]) return block;
   }
   return std::nullopt;
 }

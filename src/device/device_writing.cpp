@@ -126,7 +126,7 @@ bool is_refusal(const Error& error) {
 Result<void> Device::write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
                                      const Registers& registers) {
   for (const modbus::Pdu& request : write_requests(table, first, registers, profile_->link)) {
-    if (auto written = client_.write(request); !written) return written;
+    TRY(client_.write(request));
   }
   return {};
 }
@@ -142,7 +142,7 @@ Result<void> Device::while_busy(const std::function<Result<void>()>& write) {
     if (!busy) return written;
     const TimePoint next = clock().now() + refusals->retry_every;
     if (next > limit) return written;
-    if (auto slept = clock().sleep_until(next); !slept) return slept;
+    TRY(clock().sleep_until(next));
   }
 }
 
@@ -164,7 +164,7 @@ Result<void> Device::send_while_busy(const Parameter& parameter, const Value& va
     auto sent = send_write(parameter, registers);
     const TimePoint next = clock().now() + pause;
     if (sent || !is_busy(sent.error(), link) || next > limit) return sent;
-    if (auto slept = clock().sleep_until(next); !slept) return slept;
+    TRY(clock().sleep_until(next));
     if (link.busy.empty()) pause *= 2;
     if (!parameter.encoding.is_part()) continue;
     auto now = registers_for(parameter, value);  // what stands beside it may have changed
@@ -179,7 +179,7 @@ Result<Value> Device::settled(const Parameter& parameter, const Value& expected,
                               Proof proof) {
   const TimePoint deadline = clock().now() + limit;
   if (proof == Proof::after_settling) {
-    if (auto slept = clock().sleep_until(deadline); !slept) return tl::unexpected(slept.error());
+    TRY(clock().sleep_until(deadline));
   }
   Duration pause = first_settling_pause;
   while (true) {
@@ -187,9 +187,7 @@ Result<Value> Device::settled(const Parameter& parameter, const Value& expected,
     const bool final = now ? *now == expected : !is_postponed(now.error());
     const TimePoint at = clock().now();
     if (final || at >= deadline) return now;
-    if (auto slept = clock().sleep_until(std::min(at + pause, deadline)); !slept) {
-      return tl::unexpected(slept.error());
-    }
+    TRY(clock().sleep_until(std::min(at + pause, deadline)));
     pause *= 2;
   }
 }
@@ -245,9 +243,7 @@ Written Device::judged(const Parameter& parameter, const Value& before, const Va
 
 /// The registers of a value; those of which only some bits are its own are read first.
 Result<Registers> Device::registers_for(const Parameter& parameter, const Value& value) {
-  if (auto fits = catalogue::check_pair(parameter.encoding, profile_->link); !fits) {
-    return tl::unexpected(std::move(fits.error()));
-  }
+  TRY(catalogue::check_pair(parameter.encoding, profile_->link));
   if (!parameter.encoding.is_part()) return catalogue::encode(parameter, value);
   const auto present = client_.read(range_of(parameter));
   if (!present) return present;
@@ -313,17 +309,15 @@ Result<std::optional<Device::Lock>> Device::unlock_for(const Parameter& paramete
         return glob_match(pattern, parameter.name);
       });
   if (!is_needed) return std::nullopt;
-  auto lock = profile_->find(unlock->parameter);
-  if (!lock) return tl::unexpected(std::move(lock.error()));
-  const auto before = read_value(*lock);
-  if (!before) return tl::unexpected(before.error());
+  TRY_LET(auto lock, profile_->find(unlock->parameter));
+  TRY_LET(const auto before, read_value(lock));
   const Value key{Decimal(unlock->value)};
-  if (*before == key) return std::nullopt;
-  const Written written = write_unlocked(*lock, *before, key, Proof::first_right);
-  if (written.done()) return Lock{std::move(*lock), *before};
+  if (before == key) return std::nullopt;
+  const Written written = write_unlocked(lock, before, key, Proof::first_right);
+  if (written.done()) return Lock{std::move(lock), before};
   Error error = *written.error;
   const bool is_open = written.may_have_changed();
-  if (const auto put_back = is_open ? lock_again({*lock, *before}) : Result<void>(); !put_back) {
+  if (const auto put_back = is_open ? lock_again({lock, before}) : Result<void>(); !put_back) {
     error.message = not_put_back(message_of(error), put_back.error());
   }
   return tl::unexpected(std::move(error));
@@ -353,18 +347,16 @@ void Device::shield(Clock& calm) {
 }
 
 Result<void> Device::send(const catalogue::Action& action, std::int64_t value) {
-  const auto registers = catalogue::encode(as_parameter(action), {Decimal(value)});
-  if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = catalogue::check_pair(action.encoding, profile_->link); !fits) return fits;
-  return while_busy([&] { return write_registers(action.table, action.address, *registers); })
+  TRY_LET(const auto registers, catalogue::encode(as_parameter(action), {Decimal(value)}));
+  TRY(catalogue::check_pair(action.encoding, profile_->link));
+  return while_busy([&] { return write_registers(action.table, action.address, registers); })
       .map_error([&](Error error) { return about(std::move(error), action.name, action.address); });
 }
 
 Result<void> Device::send(const Parameter& parameter, const Decimal& number) {
-  const auto registers = registers_for(parameter, {number});
-  if (!registers) return tl::unexpected(registers.error());
+  TRY_LET(const auto registers, registers_for(parameter, {number}));
   const auto first = parameter.written_at();
-  return write_registers(parameter.table, first, *registers).map_error([&](Error error) {
+  return write_registers(parameter.table, first, registers).map_error([&](Error error) {
     return about(std::move(error), parameter.name, parameter.address);
   });
 }
@@ -375,28 +367,25 @@ Result<void> Device::write_word(modbus::RegisterAddress address, std::uint16_t w
 }
 
 Result<Shown> Device::shows(const std::string& parameter, std::int64_t number) {
-  const auto found = profile_->find(parameter);
-  if (!found) return tl::unexpected(found.error());
-  return read_value(*found).map(
+  TRY_LET(const auto found, profile_->find(parameter));
+  return read_value(found).map(
       [&](const Value& value) { return value.number == Decimal(number) ? Shown::yes : Shown::no; });
 }
 
 Result<ActionResult> Device::perform(const catalogue::Action& action, std::int64_t value) {
   if (action.confirm.empty()) return carry_out(action, value);
-  const auto confirming = profile_->find(action.confirm);
-  if (!confirming) return tl::unexpected(confirming.error());
+  TRY_LET(const auto confirming, profile_->find(action.confirm));
   const Value expected{Decimal(action.confirm_value.value_or(value))};
   if (action.prepare) {
-    const auto now = read_value(*confirming);
-    if (!now) return tl::unexpected(now.error());
-    if (*now == expected) return ActionResult::confirmed;
+    TRY_LET(const auto now, read_value(confirming));
+    if (now == expected) return ActionResult::confirmed;
   }
   auto done = carry_out(action, value);
   if (!done && can_be_read_back(done.error()) && !is_refusal(done.error())) {
-    return found_done(action, *confirming, expected, std::move(done.error()));
+    return found_done(action, confirming, expected, std::move(done.error()));
   }
   if (!done || *done == ActionResult::not_confirmed) return done;
-  return confirm(action, *confirming, expected);
+  return confirm(action, confirming, expected);
 }
 
 /// The answer does not say what became of it, and it is never sent again: its effect does.
@@ -445,7 +434,7 @@ Result<ActionResult> Device::confirm(const catalogue::Action& action, const Para
     if (*now == expected) return ActionResult::confirmed;
     const TimePoint next = clock().now() + confirm_interval;
     if (next > deadline) return ActionResult::not_confirmed;
-    if (auto slept = clock().sleep_until(next); !slept) return tl::unexpected(slept.error());
+    TRY(clock().sleep_until(next));
   }
 }
 
@@ -461,9 +450,9 @@ std::uint16_t Device::bits_to_clear(const catalogue::Preparation& preparation) {
 }
 
 Result<void> Device::prepare(const catalogue::Preparation& preparation) {
-  const auto words = read_raw({modbus::RegisterTable::holding, preparation.address.value, 1});
-  if (!words) return tl::unexpected(words.error());
-  const std::uint16_t word = words->front();
+  TRY_LET(const auto words,
+          read_raw({modbus::RegisterTable::holding, preparation.address.value, 1}));
+  const std::uint16_t word = words.front();
   const auto cleared = static_cast<std::uint16_t>(word & ~unsigned{bits_to_clear(preparation)});
   if (cleared == word) return {};
   return while_busy([&] {
@@ -477,16 +466,14 @@ Result<Shown> Device::await_ready(Duration limit) {
   const auto model = RunModel::of(*profile_);
   const MotorMonitor* monitor = model ? (*model)->monitor() : nullptr;
   if (monitor == nullptr) return Shown::yes;
-  const auto status = profile_->find(monitor->facts().status);
-  if (!status) return tl::unexpected(status.error());
+  TRY_LET(const auto status, profile_->find(monitor->facts().status));
   const TimePoint deadline = clock().now() + limit;
   while (true) {
-    const auto word = read_value(*status);
-    if (!word) return tl::unexpected(word.error());
-    if (!monitor->is_busy(word->number)) return Shown::yes;
+    TRY_LET(const auto word, read_value(status));
+    if (!monitor->is_busy(word.number)) return Shown::yes;
     const TimePoint next = clock().now() + busy_interval;
     if (next > deadline) return Shown::no;
-    if (auto slept = clock().sleep_until(next); !slept) return tl::unexpected(slept.error());
+    TRY(clock().sleep_until(next));
   }
 }
 
@@ -506,11 +493,10 @@ Result<void> Device::broadcast_registers(modbus::RegisterTable table, modbus::Re
 }
 
 Result<void> Device::broadcast(const Parameter& parameter, const Value& value) {
-  const auto registers = catalogue::encode(parameter, value);
-  if (!registers) return tl::unexpected(registers.error());
-  if (auto fits = catalogue::check_pair(parameter.encoding, profile_->link); !fits) return fits;
+  TRY_LET(const auto registers, catalogue::encode(parameter, value));
+  TRY(catalogue::check_pair(parameter.encoding, profile_->link));
   const auto first = parameter.written_at();
-  return broadcast_registers(parameter.table, first, *registers).map_error([&](Error error) {
+  return broadcast_registers(parameter.table, first, registers).map_error([&](Error error) {
     return about(std::move(error), parameter.name, parameter.address);
   });
 }

@@ -134,10 +134,9 @@ Result<void> CounterSource::attach(Device& device, Duration unseen) {
   if (tracker_.last()) {
     tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
   } else {
-    const auto number = device.event_number();
-    if (!number) return tl::unexpected(number.error());
-    tracker_.set_baseline(*number);
-    if (tells_first_) first_ = *number;
+    TRY_LET(const auto number, device.event_number());
+    tracker_.set_baseline(number);
+    if (tells_first_) first_ = number;
     take_waiting();  // pushed before the counter was read, so they are old
   }
   return arm().and_then([this] { return fetch_last(EventOrigin::catch_up).map([](Fetched) {}); });
@@ -145,20 +144,18 @@ Result<void> CounterSource::attach(Device& device, Duration unseen) {
 
 /// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
 Result<void> CounterSource::poll() {
-  const auto number = device_->event_number();
-  if (!number) return tl::unexpected(number.error());
-  if (*number == tracker_.last()) return {};
-  const auto fetched = fetch_last(EventOrigin::poll);
-  if (!fetched) return tl::unexpected(fetched.error());
-  if (*fetched == Fetched::yes) return {};
-  const auto missed = static_cast<std::uint16_t>(*number - tracker_.last().value_or(*number));
-  const bool wrapped = *number < tracker_.last();
+  TRY_LET(const auto number, device_->event_number());
+  if (number == tracker_.last()) return {};
+  TRY_LET(const auto fetched, fetch_last(EventOrigin::poll));
+  if (fetched == Fetched::yes) return {};
+  const auto missed = static_cast<std::uint16_t>(number - tracker_.last().value_or(number));
+  const bool wrapped = number < tracker_.last();
   tell_(EventGap{.missed = missed,
                  .reason = "events came faster than they could be read",
                  .after = tracker_.last(),
-                 .before = static_cast<std::uint16_t>(*number + 1),
+                 .before = static_cast<std::uint16_t>(number + 1),
                  .sequence = wrapped ? Sequence::wrap : Sequence::jump});
-  tracker_.set_baseline(*number);
+  tracker_.set_baseline(number);
   return {};
 }
 
@@ -307,9 +304,8 @@ class FlagSource final : public EventSource {
 Result<void> FlagSource::attach(Device& device, Duration /*unseen*/) {
   device_ = &device;
   if (!seen_) {
-    auto block = device_->event_block();
-    if (!block) return tl::unexpected(std::move(block.error()));
-    seen_ = std::move(*block);
+    TRY_LET(auto block, device_->event_block());
+    seen_ = std::move(block);
     return look(EventOrigin::catch_up);
   }
   tell_(EventGap{.missed = std::nullopt,

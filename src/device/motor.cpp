@@ -41,12 +41,11 @@ Result<MotorMonitor> MotorMonitor::of(const MonitorSpec& facts, const catalogue:
   for (const catalogue::Text* name : {&facts.status, &facts.command_speed, &facts.feedback_speed,
                                       &facts.alarm, &facts.warning, &facts.load}) {
     if (name->empty()) continue;
-    auto parameter = profile.find(*name);
-    if (!parameter) return tl::unexpected(std::move(parameter.error()));
+    TRY_LET(auto parameter, profile.find(*name));
     if (name == &facts.command_speed || name == &facts.feedback_speed) {
-      monitor.speed_unit_ = parameter->unit;
+      monitor.speed_unit_ = parameter.unit;
     }
-    monitor.parameters_.push_back(catalogue::with_bits_for(std::move(*parameter), std::nullopt));
+    monitor.parameters_.push_back(catalogue::with_bits_for(std::move(parameter), std::nullopt));
   }
   const catalogue::Text& speed =
       facts.command_speed.empty() ? facts.feedback_speed : facts.command_speed;
@@ -95,11 +94,10 @@ Result<void> MotorMonitor::note(const Reading& reading, MotorState& state) const
 }
 
 Result<MotorState> MotorMonitor::look(Device& device) const {
-  const auto readings = device.read_each(parameters_, Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
+  TRY_LET(const auto readings, device.read_each(parameters_, Limits::skip));
   MotorState state;
-  for (const Reading& reading : *readings) {
-    if (auto noted = note(reading, state); !noted) return tl::unexpected(std::move(noted.error()));
+  for (const Reading& reading : readings) {
+    TRY(note(reading, state));
   }
   return state;
 }
@@ -113,12 +111,11 @@ bool MotorMonitor::is_still(const Reading& reading) const {
 }
 
 Result<Shown> MotorMonitor::stands_still(Device& device) const {
-  const auto readings = device.read_each(proof_, Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  for (const Reading& reading : *readings) {
+  TRY_LET(const auto readings, device.read_each(proof_, Limits::skip));
+  for (const Reading& reading : readings) {
     if (!reading.value) return tl::unexpected(reading.value.error());
   }
-  const bool still = std::all_of(readings->begin(), readings->end(),
+  const bool still = std::all_of(readings.begin(), readings.end(),
                                  [this](const Reading& reading) { return is_still(reading); });
   return still ? Shown::yes : Shown::no;
 }

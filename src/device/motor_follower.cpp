@@ -52,11 +52,9 @@ class Follower {
       note(*state);
       if (const auto ending = judge(*state, clock.now() - began)) return *ending;
       if (options_->progress) {
-        if (auto told = options_->progress(clock.now() - began, *state); !told) {
-          return tl::unexpected(std::move(told.error()));
-        }
+        TRY(options_->progress(clock.now() - began, *state));
       }
-      if (auto paused = pause(); !paused) return tl::unexpected(std::move(paused.error()));
+      TRY(pause());
     }
     if (!seen_ && last_silence) return tl::unexpected(std::move(*last_silence));
     if (!seen_) return tl::unexpected(not_seen());
@@ -130,12 +128,10 @@ Result<MotorEnding> wait_unseen(Device& device, const MotorFollowOptions& option
   const TimePoint began = clock.now();
   while (clock.now() < options.deadline) {
     if (options.progress) {
-      if (auto told = options.progress(clock.now() - began, {}); !told) {
-        return tl::unexpected(std::move(told.error()));
-      }
+      TRY(options.progress(clock.now() - began, {}));
     }
     const TimePoint next = std::min(options.deadline, clock.now() + options.interval);
-    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+    TRY(clock.sleep_until(next));
   }
   return MotorEnding::unseen;
 }

@@ -67,9 +67,8 @@ bool MotorWatch::knows_running() const {
 
 Result<std::vector<MotorTransition>> MotorWatch::take_turn(Device& device) {
   if (pieces_.empty()) return std::vector<MotorTransition>();
-  const auto readings = device.read_each(next_piece(), Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  return take(device, *readings);
+  TRY_LET(const auto readings, device.read_each(next_piece(), Limits::skip));
+  return take(device, readings);
 }
 
 /// The state as seen last, with what these readings say. What was never read before is taken for
@@ -79,9 +78,7 @@ Result<MotorState> MotorWatch::with(std::span<const Reading> readings) {
   for (const Reading& reading : readings) {
     const std::string& name = reading.parameter.name;
     if (!motor_.tells(name)) continue;
-    if (auto noted = motor_.note(reading, now); !noted) {
-      return tl::unexpected(std::move(noted.error()));
-    }
+    TRY(motor_.note(reading, now));
     if (seen_.insert(name).second) static_cast<void>(motor_.note(reading, state_));
   }
   return now;
@@ -94,12 +91,9 @@ Result<MotorState> MotorWatch::look(Device& device) const {
   std::erase_if(status, [&](const Parameter& each) { return !motor_.tells_running(each.name); });
   auto seen = motor_.look(device);
   if (!seen || !seen->running) return seen;
-  const auto behind = device.read_each(status, Limits::skip);
-  if (!behind) return tl::unexpected(behind.error());
+  TRY_LET(const auto behind, device.read_each(status, Limits::skip));
   MotorState later = *seen;
-  if (auto noted = motor_.note(behind->front(), later); !noted) {
-    return tl::unexpected(std::move(noted.error()));
-  }
+  TRY(motor_.note(behind.front(), later));
   const bool keeps_speed = later.at_speed || !seen->at_speed;
   return later.running && keeps_speed ? seen : motor_.look(device);
 }
@@ -108,32 +102,30 @@ Result<MotorState> MotorWatch::look(Device& device) const {
 /// happened behind it: a speed that was reached, but is no longer, is then not told.
 Result<std::vector<MotorTransition>> MotorWatch::take(Device& device,
                                                       std::span<const Reading> readings) {
-  auto now = with(readings);
-  if (!now) return tl::unexpected(std::move(now.error()));
+  TRY_LET(auto now, with(readings));
   std::vector<MotorTransition> news;
-  if (says_the_same(state_, *now)) return news;
+  if (says_the_same(state_, now)) return news;
   const Clock& clock = device.session().clock();
   const WallTime time = clock.wall();
-  auto later = look(device);
-  if (!later) return tl::unexpected(std::move(later.error()));  // told when it can be read again
+  TRY_LET(auto later, look(device));  // told when it can be read again
   // What was never read by its turn is not judged by chance.
   if (!knows_running()) {
-    later->running = state_.running;
-    later->at_speed = state_.at_speed;
+    later.running = state_.running;
+    later.at_speed = state_.at_speed;
   }
-  if (!seen_.contains(motor_.facts().warning)) later->warning = state_.warning;
-  if (!seen_.contains(motor_.facts().alarm)) later->alarm = state_.alarm;
-  now->at_speed = now->at_speed && later->at_speed;
-  MotorState shown = *later;
-  shown.running = now->running;
-  shown.at_speed = now->at_speed;
-  shown.alarm = now->alarm;
-  shown.warning = now->warning;
-  for (const MotorEvent event : events_between(state_, *now)) news.push_back({event, shown, time});
-  for (const MotorEvent event : events_between(*now, *later)) {
-    news.push_back({event, *later, clock.wall()});
+  if (!seen_.contains(motor_.facts().warning)) later.warning = state_.warning;
+  if (!seen_.contains(motor_.facts().alarm)) later.alarm = state_.alarm;
+  now.at_speed = now.at_speed && later.at_speed;
+  MotorState shown = later;
+  shown.running = now.running;
+  shown.at_speed = now.at_speed;
+  shown.alarm = now.alarm;
+  shown.warning = now.warning;
+  for (const MotorEvent event : events_between(state_, now)) news.push_back({event, shown, time});
+  for (const MotorEvent event : events_between(now, later)) {
+    news.push_back({event, later, clock.wall()});
   }
-  state_ = *later;
+  state_ = later;
   return news;
 }
 

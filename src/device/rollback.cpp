@@ -53,9 +53,8 @@ PutBackReport Rollback::put_back(Attempt attempt, TimePoint& deadline) {
 Result<PutBackReport> Rollback::try_once(Attempt& attempt) {
   const JournalEntry& write = *attempt.write;
   PutBackReport report{.write = write};
-  const auto readings = device_->read_each({write.parameter}, Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  const auto value = readings->front().held();
+  TRY_LET(const auto readings, device_->read_each({write.parameter}, Limits::skip));
+  const auto value = readings.front().held();
   if (!value) {
     report.result = RollbackResult::refused;
     report.trouble = message_of(value.error());
@@ -102,9 +101,8 @@ Result<PutBackReport> Rollback::write_back(PutBackReport report) {
 Result<void> Rollback::connect(TimePoint deadline) {
   if (lost_) {
     device_->disconnect();
-    auto opened = reopen_(std::max(deadline - calm_->now(), pause));
-    if (!opened) return tl::unexpected(std::move(opened.error()));
-    *device_ = std::move(*opened);
+    TRY_LET(auto opened, reopen_(std::max(deadline - calm_->now(), pause)));
+    *device_ = std::move(opened);
     lost_ = false;
     silences_ = 0;
   }

@@ -41,9 +41,8 @@ Result<void> RunFollower::prepare() {
               .hint = "start it at the tool, and watch it with 'spindle watch'",
               .name = start_->name});
   }
-  const auto number = device_->event_number();
-  if (!number) return tl::unexpected(number.error());
-  tracker_.set_baseline(*number);
+  TRY_LET(const auto number, device_->event_number());
+  tracker_.set_baseline(number);
   return arm();
 }
 
@@ -64,9 +63,7 @@ Result<FollowedRun> RunFollower::follow(const FollowOptions& options) {
     if (!over) return tl::unexpected(std::move(over.error()));
     if (*over) return std::move(**over);
     if (!options.progress) continue;
-    if (auto told = options.progress(clock_->now() - began); !told) {
-      return tl::unexpected(std::move(told.error()));
-    }
+    TRY(options.progress(clock_->now() - began));
   }
   return FollowedRun{RunEnding::elapsed};
 }
@@ -98,10 +95,9 @@ Result<void> RunFollower::keep_armed() { return clock_->now() < arm_due_ ? Resul
 
 /// Reads whether the tool runs, and keeps its output armed.
 Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
-  if (auto armed = keep_armed(); !armed) return tl::unexpected(std::move(armed.error()));
-  const auto running = device_->shows(start_->confirm, *start_->value);
-  if (!running) return tl::unexpected(running.error());
-  if (*running == Shown::yes) {
+  TRY(keep_armed());
+  TRY_LET(const auto running, device_->shows(start_->confirm, *start_->value));
+  if (running == Shown::yes) {
     has_run_ = true;
     return std::nullopt;
   }
@@ -114,21 +110,18 @@ Result<std::optional<RunEnding>> RunFollower::look_at_tool() {
 Result<std::optional<ToolEvent>> RunFollower::next_result(TimePoint until) {
   // Frames without end must not keep it; what is left of them is there for the next who listens.
   do {
-    auto frame = device_->session().next_spontaneous(until);
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    if (!*frame) return std::nullopt;
-    auto result =
-        filter_result({EventOrigin::push, modbus::registers_of((*frame)->pdu), (*frame)->wall});
+    TRY_LET(auto frame, device_->session().next_spontaneous(until));
+    if (!frame) return std::nullopt;
+    auto result = filter_result({EventOrigin::push, modbus::registers_of(frame->pdu), frame->wall});
     if (result) return result;
   } while (clock_->now() < until);
   return std::nullopt;
 }
 
 Result<std::optional<ToolEvent>> RunFollower::fetch_result() {
-  auto block = device_->last_event();
-  if (!block) return tl::unexpected(std::move(block.error()));
-  if (!*block) return std::nullopt;
-  return filter_result({EventOrigin::catch_up, std::move(**block), clock_->wall()});
+  TRY_LET(auto block, device_->last_event());
+  if (!block) return std::nullopt;
+  return filter_result({EventOrigin::catch_up, std::move(*block), clock_->wall()});
 }
 
 /// Gives back a new event that is a result. Another one may be all that a run leaves behind:

@@ -25,12 +25,11 @@ Result<StopResult> stop_and_confirm(Device& device, const catalogue::Action& sta
   if (start.confirm.empty()) return StopResult::sent;
   const TimePoint deadline = clock.now() + device.session().options().answer_timeout;
   while (true) {
-    const auto running = device.shows(start.confirm, *start.stop_value);
-    if (!running) return tl::unexpected(running.error());
-    if (*running == Shown::yes) return StopResult::confirmed;
+    TRY_LET(const auto running, device.shows(start.confirm, *start.stop_value));
+    if (running == Shown::yes) return StopResult::confirmed;
     const TimePoint next = clock.now() + confirm_interval;
     if (next > deadline) return StopResult::unconfirmed;
-    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+    TRY(clock.sleep_until(next));
   }
 }
 
@@ -105,9 +104,7 @@ std::optional<StopReport> RunGuard::try_stop() {
 /// One stop, on the connection that is there or on a new one.
 Result<StopResult> RunGuard::try_to_stop(unsigned attempt) {
   if (line_ == Line::lost) {
-    if (auto opened = reopen(limit_ - calm_->now()); !opened) {
-      return tl::unexpected(std::move(opened.error()));
-    }
+    TRY(reopen(limit_ - calm_->now()));
   }
   link::Session& session = device_->session();
   session.set_uninterruptible();
@@ -119,13 +116,12 @@ Result<StopResult> RunGuard::try_to_stop(unsigned attempt) {
 
 Result<void> RunGuard::reopen(Duration patience) {
   if (device_ != nullptr) device_->disconnect();
-  auto opened = reopen_(patience);
-  if (!opened) return tl::unexpected(std::move(opened.error()));
+  TRY_LET(auto opened, reopen_(patience));
   if (device_ == nullptr) {
-    own_.emplace(std::move(*opened));
+    own_.emplace(std::move(opened));
     device_ = &*own_;
   } else {
-    *device_ = std::move(*opened);
+    *device_ = std::move(opened);
   }
   line_ = Line::open;
   silences_ = 0;

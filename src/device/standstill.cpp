@@ -20,7 +20,7 @@ Result<StopResult> await_standstill(const MotorMonitor& monitor, Device& device,
     if (*still == Shown::yes) return StopResult::confirmed;
     const TimePoint next = clock.now() + confirm_interval;
     if (next > deadline) return StopResult::unconfirmed;
-    if (auto slept = clock.sleep_until(next); !slept) return tl::unexpected(slept.error());
+    TRY(clock.sleep_until(next));
   }
 }
 

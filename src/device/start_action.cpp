@@ -22,9 +22,8 @@ class ActionStopper final : public Stopper {
 
 Result<StartAction> StartAction::of(const catalogue::Profile& profile) {
   const catalogue::StartActionSpec& facts = *profile.run->action();
-  auto start = profile.find_action(facts.start);
-  if (!start) return tl::unexpected(std::move(start.error()));
-  return StartAction(facts, std::move(*start));
+  TRY_LET(auto start, profile.find_action(facts.start));
+  return StartAction(facts, std::move(start));
 }
 
 std::unique_ptr<Stopper> StartAction::stopper(catalogue::StopMode /*mode*/) const {

@@ -108,9 +108,8 @@ Result<void> Watcher::watch(const Until& until) {
 
 Result<void> Watcher::connect(const Until& until) {
   if (auto paused = pause(until); !paused || !goes_on(until)) return paused;
-  auto link = open_();
-  if (!link) return tl::unexpected(std::move(link.error()));
-  return attach(std::move(*link));
+  TRY_LET(auto link, open_());
+  return attach(std::move(link));
 }
 
 Result<void> Watcher::pause(const Until& until) {
@@ -157,30 +156,28 @@ void Watcher::tell_trouble(const Error& error) {
 
 Result<void> Watcher::attach(Link link) {
   if (profile_ != &link.device.profile()) {
-    if (auto learned = adopt_profile(link.device.profile()); !learned) return learned;
+    TRY(adopt_profile(link.device.profile()));
   }
   link_ = std::move(link);
   connected_at_ = clock_->now();
   reached_ = true;
   compare_identity(link_->identity);
-  if (auto consulted = consult_record(); !consulted) return consulted;
+  TRY(consult_record());
   return begin();
 }
 
 /// What keeps the events learns of the tool, and says what it knows of it where we know nothing.
 Result<void> Watcher::consult_record() {
   if (!hooks_.on_connected) return {};
-  auto past = hooks_.on_connected(link_->device);
-  if (!past) return tl::unexpected(std::move(past.error()));
+  TRY_LET(auto past, hooks_.on_connected(link_->device));
   const bool is_news = source_ && !std::exchange(recalled_, true);
-  if (is_news && (past->last || past->wants_first)) source_->recall(std::move(past->last));
+  if (is_news && (past.last || past.wants_first)) source_->recall(std::move(past.last));
   return {};
 }
 
 Result<void> Watcher::adopt_profile(const catalogue::Profile& profile) {
-  auto plan = make_plan_(profile);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-  plan_ = std::move(*plan);
+  TRY_LET(auto plan, make_plan_(profile));
+  plan_ = std::move(plan);
   previous_.assign(plan_.values.size(), std::nullopt);
   polled_ = plan_.values;
   motor_.reset();
@@ -233,11 +230,10 @@ Result<void> Watcher::serve(const Until& until) {
   while (!stopped_) {
     const TimePoint end = until();
     if (clock_->now() >= end) break;
-    auto frame = link_->device.session().next_spontaneous(std::min(end, next_due()));
-    if (!frame) return tl::unexpected(std::move(frame.error()));
-    if (*frame) handle(**frame);
+    TRY_LET(auto frame, link_->device.session().next_spontaneous(std::min(end, next_due())));
+    if (frame) handle(*frame);
     if (stopped_) break;
-    if (auto done = run_due(); !done) return done;
+    TRY(run_due());
   }
   return {};
 }
@@ -258,9 +254,9 @@ Result<void> Watcher::run_due() {
   }
   if (profile_->link.keep_alive > Duration::zero() && now >= keep_alive_due_) {
     keep_alive_due_ = now + with_margin(profile_->link.keep_alive);
-    if (auto alive = keep_alive(); !alive) return alive;
+    TRY(keep_alive());
   }
-  if (auto done = run_errand(); !done) return done;
+  TRY(run_errand());
   if (!polls() || now < poll_due_) return {};
   const TimePoint due = poll_due_;
   keep_beat(now);
@@ -323,7 +319,7 @@ Result<void> Watcher::ask(const std::function<Result<void>()>& request) {
 
 Result<void> Watcher::poll() {
   if (source_ && source_->polls()) {
-    if (auto polled = source_->poll(); !polled) return polled;
+    TRY(source_->poll());
     seen_at_ = clock_->now();
   }
   if (!polls_values()) return {};
@@ -336,7 +332,7 @@ Result<void> Watcher::poll() {
 /// The values on every beat; what else has to be known between them.
 Result<void> Watcher::poll_values() {
   if (!meanings_known_) {
-    if (auto learned = learn_meanings(); !learned) return learned;
+    TRY(learn_meanings());
   }
   const std::uint64_t before = requests();
   if (auto read = read_values(); !read || stopped_) return read;
@@ -346,13 +342,12 @@ Result<void> Watcher::poll_values() {
 
 Result<void> Watcher::read_values() {
   if (polled_.empty()) return {};
-  auto readings = link_->device.read_each(polled_, Limits::skip);
-  if (!readings) return tl::unexpected(std::move(readings.error()));
+  TRY_LET(auto readings, link_->device.read_each(polled_, Limits::skip));
   if (motor_) {
-    if (auto told = tell_motor(motor_->take(link_->device, *readings)); !told) return told;
+    TRY(tell_motor(motor_->take(link_->device, readings)));
   }
   for (std::size_t index = 0; index < polled_.size() && !stopped_; ++index) {
-    Reading& reading = (*readings)[index];
+    Reading& reading = readings[index];
     if (!reading.value) return tl::unexpected(std::move(reading.value.error()));
     tell_reading(index, reading);
   }
@@ -367,9 +362,8 @@ Result<void> Watcher::learn_meanings() {
   }
   meanings_known_ = true;
   if (open.empty()) return {};
-  auto readings = link_->device.read_each(open, Limits::skip);
-  if (!readings) return tl::unexpected(std::move(readings.error()));
-  for (Reading& reading : *readings) {
+  TRY_LET(auto readings, link_->device.read_each(open, Limits::skip));
+  for (Reading& reading : readings) {
     for (catalogue::Parameter& parameter : polled_) {
       if (parameter.name == reading.parameter.name) parameter = reading.parameter;
     }

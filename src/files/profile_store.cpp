@@ -131,10 +131,9 @@ Result<const Layer*> read_layer(const std::string& path, Documents documents, co
     if (!sound) findings.add({findings.add_file(path), 1, 1}, "the file has faults of its own");
     return &known->second;
   }
-  auto text = disk.read_trusted(path);
-  if (!text) return tl::unexpected(std::move(text.error()));
+  TRY_LET(auto text, disk.read_trusted(path));
   Layer layer{.path = path, .file = findings.add_file(path), .documents = {}, .head = {}};
-  layer.documents = parse_yaml(*text, layer.file, documents, findings);
+  layer.documents = parse_yaml(text, layer.file, documents, findings);
   if (!layer.documents.empty()) {
     layer.head = read_head(layer.documents.front(), findings);
   } else if (findings.empty()) {
@@ -200,9 +199,8 @@ Result<Chain> read_chain(const std::string& path, Documents documents, const Pla
       chain.root_node.at = chain.layers.back()->head.extends_at;
       break;
     }
-    auto layer = read_layer(next->path, documents, places.disk, library, findings);
-    if (!layer) return tl::unexpected(std::move(layer.error()));
-    chain.layers.push_back(*layer);
+    TRY_LET(auto layer, read_layer(next->path, documents, places.disk, library, findings));
+    chain.layers.push_back(layer);
     next = next_of(chain, places, tables, findings);
   }
   return chain;
@@ -365,9 +363,9 @@ struct OpenChain {
 Result<OpenChain> open_chain(std::string path, Documents documents, const Places& places,
                              Tables tables) {
   OpenChain open(std::move(path));
-  auto chain = read_chain(open.path, documents, places, tables, open.library, open.findings);
-  if (!chain) return tl::unexpected(std::move(chain.error()));
-  open.chain = std::move(*chain);
+  TRY_LET(auto chain,
+          read_chain(open.path, documents, places, tables, open.library, open.findings));
+  open.chain = std::move(chain);
   return open;
 }
 
@@ -379,33 +377,30 @@ Error only_a_base(std::string_view name) {
 }
 
 Result<AnyProfile> load_file(const std::string& path, const Places& places) {
-  auto open = open_chain(path, Documents::first, places, Tables::used);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  Profile profile = build(open->chain, Strictness::load, open->findings).profile;
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
-  return AnyProfile{std::move(profile), open->chain.front().head.abstract};
+  TRY_LET(auto open, open_chain(path, Documents::first, places, Tables::used));
+  Profile profile = build(open.chain, Strictness::load, open.findings).profile;
+  TRY(open.check());
+  return AnyProfile{std::move(profile), open.chain.front().head.abstract};
 }
 
 Result<catalogue::SimulationSpec> load_simulation_of(const std::string& path,
                                                      const Places& places) {
-  auto open = open_chain(path, Documents::all, places, Tables::used);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  const YamlNode* part = nearest_simulation(open->chain, open->findings);
+  TRY_LET(auto open, open_chain(path, Documents::all, places, Tables::used));
+  const YamlNode* part = nearest_simulation(open.chain, open.findings);
   catalogue::SimulationSpec facts;
   if (part != nullptr) {
-    facts = read_simulation(*part, open->findings);
-  } else if (open->chain.root != nullptr) {
-    facts = *open->chain.root->simulation;
+    facts = read_simulation(*part, open.findings);
+  } else if (open.chain.root != nullptr) {
+    facts = *open.chain.root->simulation;
   }
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  TRY(open.check());
   return facts;
 }
 
 Result<catalogue::CodeTables> load_codes_of(const std::string& path, const Places& places) {
-  auto open = open_chain(path, Documents::all, places, Tables::used);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  catalogue::CodeTables codes = collect_texts(open->chain, open->findings);
-  if (auto sound = open->check(); !sound) return tl::unexpected(std::move(sound.error()));
+  TRY_LET(auto open, open_chain(path, Documents::all, places, Tables::used));
+  catalogue::CodeTables codes = collect_texts(open.chain, open.findings);
+  TRY(open.check());
   return codes;
 }
 
@@ -447,9 +442,8 @@ struct ProfileStore::Memory {
   Result<const Made*> take(Kept<Made>& kept, std::string_view name, Make make) {
     const std::lock_guard lock(mutex);
     if (const auto known = kept.find(name); known != kept.end()) return &known->second;
-    auto located = locate(name, places);
-    if (!located) return tl::unexpected(std::move(located.error()));
-    Result<Made> made = make(*located);
+    TRY_LET(auto located, locate(name, places));
+    Result<Made> made = make(located);
     if (!made) return tl::unexpected(std::move(made.error()));
     return &kept.emplace(name, std::move(*made)).first->second;
   }
@@ -506,21 +500,19 @@ Result<catalogue::CodeTables> ProfileStore::load_code_tables(std::string_view na
 }
 
 Result<std::vector<Diagnostic>> ProfileStore::check(std::string_view name_or_file) const {
-  auto located = locate(name_or_file, memory_->places);
-  if (!located) return tl::unexpected(std::move(located.error()));
-  if (located->path.empty())
+  TRY_LET(auto located, locate(name_or_file, memory_->places));
+  if (located.path.empty())
     return std::vector<Diagnostic>();  // it was checked when it was built in
-  auto open = open_chain(located->path, Documents::all, memory_->places, Tables::not_used);
-  if (!open) return tl::unexpected(std::move(open.error()));
-  const ProfileDraft draft = build(open->chain, Strictness::check, open->findings);
-  collect_texts(open->chain, open->findings);
-  if (const YamlNode* part = nearest_simulation(open->chain, open->findings)) {
-    read_simulation(*part, open->findings);
+  TRY_LET(auto open, open_chain(located.path, Documents::all, memory_->places, Tables::not_used));
+  const ProfileDraft draft = build(open.chain, Strictness::check, open.findings);
+  collect_texts(open.chain, open.findings);
+  if (const YamlNode* part = nearest_simulation(open.chain, open.findings)) {
+    read_simulation(*part, open.findings);
     // Its patterns may mean what could not be read.
     const bool known = !draft.incomplete && draft.half_read.empty();
-    if (known) check_simulation(draft.profile, *part, open->findings);
+    if (known) check_simulation(draft.profile, *part, open.findings);
   }
-  return open->findings.list();
+  return open.findings.list();
 }
 
 std::vector<ProfileEntry> ProfileStore::list() const { return list_profiles(memory_->places); }

@@ -312,8 +312,7 @@ class MapReader {
 
 Result<RegisterMap> read_register_map(std::string_view text, const std::string& path,
                                       Numbering numbering) {
-  const auto rows = read_csv(text, path, most_rows + 1);
-  if (!rows) return tl::unexpected(rows.error());
+  TRY_LET(const auto rows, read_csv(text, path, most_rows + 1));
   const auto refuse = [&](std::size_t line, std::string_view message) {
     return tl::unexpected(
         Error{.code = Errc::bad_file,
@@ -321,12 +320,12 @@ Result<RegisterMap> read_register_map(std::string_view text, const std::string& 
               .hint = "the first row names the columns: register, name, type, scale, unit, access, "
                       "description"});
   };
-  if (rows->empty()) return refuse(1, "the file is empty");
-  MapReader reader(rows->front(), numbering);
+  if (rows.empty()) return refuse(1, "the file is empty");
+  MapReader reader(rows.front(), numbering);
   if (!reader.knows_registers()) {
-    return refuse(rows->front().line, "no column is called 'register' or 'address'");
+    return refuse(rows.front().line, "no column is called 'register' or 'address'");
   }
-  for (std::size_t at = 1; at < rows->size(); ++at) reader.read((*rows)[at]);
+  for (std::size_t at = 1; at < rows.size(); ++at) reader.read(rows[at]);
   return reader.take();
 }
 

@@ -173,10 +173,9 @@ std::string beside(const std::string& tools_file, std::string profile) {
 
 /// Everything that can be read, with what is wrong.
 Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
-  const auto text = disk.read_trusted(path);
-  if (!text) return tl::unexpected(text.error());
+  TRY_LET(const auto text, disk.read_trusted(path));
   const std::size_t file = findings.add_file(path);
-  const std::vector<YamlNode> documents = parse_yaml(*text, file, Documents::all, findings);
+  const std::vector<YamlNode> documents = parse_yaml(text, file, Documents::all, findings);
   Tools tools;
   tools.path = path;
   if (!documents.empty()) read_map(document_fields, documents.front(), tools, findings);
@@ -214,9 +213,8 @@ Tools salvage_tools(const std::string& path, const Disk& disk) {
 
 Result<CheckedTools> check_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, disk, findings);
-  if (!tools) return tl::unexpected(std::move(tools.error()));
-  return CheckedTools{std::move(*tools), findings.list()};
+  TRY_LET(auto tools, read_tools_file(path, disk, findings));
+  return CheckedTools{std::move(tools), findings.list()};
 }
 
 std::vector<KeyList> tools_keys() { return {{"document", keys_of<document_fields>()}}; }

@@ -278,9 +278,8 @@ auto Client::believed(Read read) -> decltype(read()) {
   const Session::Mark mark = session_->mark();
   auto done = read();
   if (!done) return done;
-  const auto undisturbed = session_->is_undisturbed_since(mark);
-  if (!undisturbed) return tl::unexpected(undisturbed.error());
-  return *undisturbed ? std::move(done) : read();
+  TRY_LET(const auto undisturbed, session_->is_undisturbed_since(mark));
+  return undisturbed ? std::move(done) : read();
 }
 
 Result<Registers> Client::read_once(const RegisterRange& range) {
@@ -362,7 +361,7 @@ Result<void> Client::read_or_bisect(const PlannedRead& planned, RegisterImage& i
     }
     const auto [head, tail] = split_at(part, part.wanted.size() / 2);
     for (const PlannedRead& half : {head, tail}) {
-      if (auto read = read_or_bisect(half, image, settled); !read) return read;
+      TRY(read_or_bisect(half, image, settled));
     }
   }
   return {};

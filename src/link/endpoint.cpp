@@ -372,18 +372,15 @@ bool looks_like_url(std::string_view text) {
 }
 
 Result<Endpoint> parse_endpoint(std::string_view url) {
-  const auto parts = take_apart(url);
-  if (!parts) return tl::unexpected(parts.error());
+  TRY_LET(const auto parts, take_apart(url));
   Endpoint endpoint;
   endpoint.text = url;
-  endpoint.medium = parts->scheme->medium;
-  if (auto parsed = parse_body(endpoint, *parts); !parsed) return tl::unexpected(parsed.error());
+  endpoint.medium = parts.scheme->medium;
+  TRY(parse_body(endpoint, parts));
   std::set<std::string_view> seen;
-  if (parts->query.empty()) return endpoint;
-  for (const std::string_view item : split(parts->query, '&')) {
-    if (auto applied = apply_option(endpoint, item, seen); !applied) {
-      return tl::unexpected(applied.error());
-    }
+  if (parts.query.empty()) return endpoint;
+  for (const std::string_view item : split(parts.query, '&')) {
+    TRY(apply_option(endpoint, item, seen));
   }
   return check_unit(endpoint).map([&] { return endpoint; });
 }

@@ -46,12 +46,12 @@ Result<void> ReopeningTransport::send(ByteView bytes, TimePoint deadline) {
     if (taken && *taken > 0) continue;
     if (taken) break;
     if (!is_closed(taken.error())) return tl::unexpected(std::move(taken.error()));
-    if (auto opened = reopen(std::move(taken.error())); !opened) return opened;
+    TRY(reopen(std::move(taken.error())));
     break;
   }
   // Its end may be on the way.
   if (hangs_up_ && !brought_nothing_ && !changes_nothing(bytes)) {
-    if (auto opened = reopen({.code = Errc::closed}); !opened) return opened;
+    TRY(reopen({.code = Errc::closed}));
   }
   request_.assign(bytes.begin(), bytes.end());
   auto sent = transport_->send(bytes, deadline);
@@ -71,9 +71,7 @@ Result<std::size_t> ReopeningTransport::receive(std::span<std::uint8_t> into, Ti
     // A look at what is there already waits for no answer, so there is nothing to ask for again.
     const bool is_awaited = clock_->now() < deadline;
     if (!is_closed(taken.error()) || !is_awaited) return taken;
-    if (auto asked = ask_again(std::move(taken.error()), deadline); !asked) {
-      return tl::unexpected(std::move(asked.error()));
-    }
+    TRY(ask_again(std::move(taken.error()), deadline));
   }
 }
 

@@ -256,18 +256,16 @@ Result<modbus::Pdu> Session::transact(const modbus::Pdu& request, const Others& 
 Result<modbus::Pdu> Session::ask(const modbus::Pdu& request, const Others& others) {
   // An answer that repeats its request cannot be another one's, so a stop need not wait here.
   if (quarantined_until_ && !is_repeated_by_answer(request)) {
-    if (auto left = leave_quarantine(); !left) return tl::unexpected(std::move(left.error()));
+    TRY(leave_quarantine());
   }
-  if (auto found = find_echo(request); !found) return tl::unexpected(std::move(found.error()));
+  TRY(find_echo(request));
   const bool proves_itself = has_ids(options_.rules) || is_repeated_by_answer(request) ||
                              modbus::is_write(request.function);
   if (proves_itself) {
-    if (auto passed = let_copies_pass(request); !passed) {
-      return tl::unexpected(std::move(passed.error()));
-    }
+    TRY(let_copies_pass(request));
     return exchange(request);
   }
-  if (auto heard = listen_first(); !heard) return tl::unexpected(std::move(heard.error()));
+  TRY(listen_first());
   const bool provable = has_loopback() && proves_ == Proves::in_doubt;
   const bool behind_late =
       provable && clock_->now() < doubtful_until_ && !doubt_.is_raised(clock_->now());
@@ -312,10 +310,9 @@ Result<modbus::Pdu> Session::ask_carefully(const modbus::Pdu& request, const Oth
     std::optional<modbus::Pdu> believed = *answer;
     if (doubt_.is_raised(now) || beside || may_be_copy) {
       const Duration round_trip = last_round_trip_;
-      auto proved = prove(request, *answer, others);
-      if (!proved) return tl::unexpected(std::move(proved.error()));
+      TRY_LET(auto proved, prove(request, *answer, others));
       last_round_trip_ = round_trip;
-      believed = std::move(*proved);
+      believed = std::move(proved);
     } else {
       ++unproved_;
     }
@@ -358,9 +355,8 @@ Result<std::optional<modbus::Pdu>> Session::prove_by_repeating(const modbus::Pdu
   const std::size_t repetitions = is_rtu() ? once : std::max(once, late_ones_like(answer));
   for (std::size_t count = 0; count < repetitions; ++count) {
     contested_ = {request};
-    auto again = exchange_contested(request, answer);
-    if (!again) return tl::unexpected(std::move(again.error()));
-    if (*again != answer || refutations_ > 0) return std::nullopt;
+    TRY_LET(auto again, exchange_contested(request, answer));
+    if (again != answer || refutations_ > 0) return std::nullopt;
   }
   if (!has_loopback()) {
     const bool may_lose_ours = !transport_->company().empty();
@@ -394,12 +390,11 @@ Result<std::optional<modbus::Pdu>> Session::prove_by_others(const modbus::Pdu& r
     const OtherRead& other = reads[turn % reads.size()];
     contested_ = {other.request};
     if (turn == 0) contested_.push_back(request);
-    auto again = exchange_contested(other.request, accepted);
-    if (!again) return tl::unexpected(std::move(again.error()));
-    if (modbus::exception_of(*again)) return std::nullopt;
-    modbus::Pdu part = part_of(other, *again, request);
+    TRY_LET(auto again, exchange_contested(other.request, accepted));
+    if (modbus::exception_of(again)) return std::nullopt;
+    modbus::Pdu part = part_of(other, again, request);
     if (refutations_ == 0 && agrees(part)) return part;
-    accepted = std::move(*again);
+    accepted = std::move(again);
     parts.push_back(std::move(part));
   }
   // Else a value that never stands still can be proved.
@@ -489,9 +484,7 @@ Result<bool> Session::is_undisturbed_since(const Mark& mark) {
                        !doubt_.is_raised(now);
   if (listens) {
     const Lease lease(*this);
-    if (auto silent = wait_for_silence(now + time_to_listen()); !silent) {
-      return tl::unexpected(std::move(silent.error()));
-    }
+    TRY(wait_for_silence(now + time_to_listen()));
   }
   return doubted_ <= mark.unproved;
 }
@@ -657,7 +650,7 @@ Result<void> Session::find_echo(const modbus::Pdu& request) {
 Result<void> Session::broadcast(const modbus::Pdu& request) {
   const Lease lease(*this);
   if (quarantined_until_) {
-    if (auto left = leave_quarantine(); !left) return left;
+    TRY(leave_quarantine());
   }
   const modbus::Adu adu{.transaction = {}, .unit = {}, .pdu = request};
   return keep_gap()
@@ -676,9 +669,8 @@ Result<std::optional<Spontaneous>> Session::next_spontaneous(TimePoint deadline)
     if (!queue_.empty()) break;
     if (!sorted) return tl::unexpected(std::move(sorted.error()));
     if (expired) return std::nullopt;
-    auto more = fill(deadline);
-    if (!more) return tl::unexpected(std::move(more.error()));
-    expired = !*more || clock_->now() >= deadline;
+    TRY_LET(auto more, fill(deadline));
+    expired = !more || clock_->now() >= deadline;
   }
   std::optional<Spontaneous> oldest = std::move(queue_.front());
   queue_.pop_front();
@@ -712,9 +704,8 @@ Result<modbus::Pdu> Session::await(Outstanding& outstanding) {
       if (!is_rtu()) torn_ = buffer_.size();
       return tl::unexpected(timeout_error(outstanding));
     }
-    auto more = fill(outstanding.deadline);
-    if (!more) return tl::unexpected(std::move(more.error()));
-    expired = !*more || clock_->now() >= outstanding.deadline;
+    TRY_LET(auto more, fill(outstanding.deadline));
+    expired = !more || clock_->now() >= outstanding.deadline;
   }
 }
 
@@ -736,10 +727,9 @@ void Session::strip_echo(Outstanding& outstanding) {
 /// Appends what has arrived; false at the deadline.
 Result<bool> Session::fill(TimePoint deadline) {
   std::array<std::uint8_t, 2 * modbus::max_adu_size> chunk;  // NOLINT: filled by receive()
-  auto count = transport_->receive(chunk, deadline);
-  if (!count) return tl::unexpected(std::move(count.error()));
-  if (*count == 0) return false;
-  const ByteView bytes = ByteView(chunk).first(*count);
+  TRY_LET(auto count, transport_->receive(chunk, deadline));
+  if (count == 0) return false;
+  const ByteView bytes = ByteView(chunk).first(count);
   if (trace_.bytes) trace_.bytes(Direction::received, bytes);
   if (came_.size() < modbus::max_adu_size) came_.insert(came_.end(), bytes.begin(), bytes.end());
   last_activity_ = std::max(last_activity_, clock_->now());
@@ -932,10 +922,9 @@ Result<void> Session::wait_for_silence(TimePoint not_before) {
   const auto silent = [&] { return std::max(not_before, last_activity_ + options_.gap); };
   const TimePoint limit = std::max(clock_->now(), silent()) + options_.answer_timeout;
   while (true) {
-    auto more = fill(silent());
-    if (!more) return tl::unexpected(std::move(more.error()));
-    if (!*more) break;
-    if (auto sorted = sort_buffered(nullptr); !sorted) return sorted;
+    TRY_LET(auto more, fill(silent()));
+    if (!more) break;
+    TRY(sort_buffered(nullptr));
     if (clock_->now() > limit) {
       return tl::unexpected(Error{.code = Errc::malformed_answer,
                                   .message = "the line never falls silent",
@@ -962,7 +951,7 @@ void Session::note_noise(ByteView bytes) {
 /// then prove the line.
 Result<void> Session::leave_quarantine() {
   decide(Decision::resync, "waiting until no late answer can come");
-  if (auto silent = wait_for_silence(*quarantined_until_); !silent) return silent;
+  TRY(wait_for_silence(*quarantined_until_));
   if (options_.proof == SessionOptions::Proof::loopback) {
     auto proved = exchange(modbus::loopback_request(fresh_word()));
     if (!proved) return tl::unexpected(std::move(proved.error()));

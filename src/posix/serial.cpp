@@ -277,7 +277,7 @@ Result<bool> SerialTransport::wait_behind(ssize_t outcome, short event, TimePoin
 
 Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
   while (!bytes.empty()) {
-    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
+    TRY(wait_.check());
     const ssize_t sent = ::write(port_.number(), bytes.data(), bytes.size());
     if (sent > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -296,7 +296,7 @@ Result<void> SerialTransport::send(ByteView bytes, TimePoint deadline) {
 Result<void> SerialTransport::drain() const {
   while (::tcdrain(port_.number()) != 0) {
     if (errno != EINTR) return tl::unexpected(unplugged_error(errno));
-    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
+    TRY(wait_.check());
   }
   return {};
 }
@@ -304,7 +304,7 @@ Result<void> SerialTransport::drain() const {
 Result<std::size_t> SerialTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
   for (;;) {
     // Before every read: an interrupt wins over data that never ends, too.
-    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
+    TRY(wait_.check());
     const ssize_t received = ::read(port_.number(), into.data(), into.size());
     if (received > 0) return static_cast<std::size_t>(received);
     const Result<bool> ready = wait_behind(received, POLLIN, deadline);
@@ -320,13 +320,12 @@ Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
                                                      link::LineSwitching switching,
                                                      const Clock& clock,
                                                      const Interrupt& interrupt) {
-  auto port = Port::open(path);
-  if (!port) return tl::unexpected(std::move(port.error()));
-  if (auto set = port->set(path, settings); !set) return tl::unexpected(std::move(set.error()));
+  TRY_LET(auto port, Port::open(path));
+  TRY(port.set(path, settings));
   if (switching == link::LineSwitching::kernel) {
-    if (auto done = port->switch_by_kernel(); !done) return tl::unexpected(std::move(done.error()));
+    TRY(port.switch_by_kernel());
   }
-  return std::make_unique<SerialTransport>(std::move(*port), name_of(path), port_company(path),
+  return std::make_unique<SerialTransport>(std::move(port), name_of(path), port_company(path),
                                            clock, interrupt);
 }
 

@@ -96,15 +96,14 @@ Result<void> serve_pty(sim::Server& server, const ServeOptions& options, const C
                                 .message = fmt::format("no line does {} baud", options.baud),
                                 .hint = "such as 9600 or 115200"});
   }
-  auto terminal = make_terminal(*speed);
-  if (!terminal) return tl::unexpected(std::move(terminal.error()));
-  const auto link = Link::make(options.pty, terminal->path);
+  TRY_LET(auto terminal, make_terminal(*speed));
+  const auto link = Link::make(options.pty, terminal.path);
   if (!link) return tl::unexpected(link.error());
   if (options.listening) {
-    if (auto told = options.listening(0); !told) return told;
+    TRY(options.listening(0));
   }
   Serving serving(Service{server, options}, clock, interrupt);
-  serving.adopt(std::move(terminal->server), ServedClient::Wire::terminal);
+  serving.adopt(std::move(terminal.server), ServedClient::Wire::terminal);
   serving.run();
   return {};
 }

@@ -71,7 +71,7 @@ class TcpTransport final : public link::Transport {
 
 Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
   while (!bytes.empty()) {
-    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
+    TRY(wait_.check());
     const ssize_t sent = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -92,7 +92,7 @@ Result<void> TcpTransport::send(ByteView bytes, TimePoint deadline) {
 Result<std::size_t> TcpTransport::receive(std::span<std::uint8_t> into, TimePoint deadline) {
   for (;;) {
     // Before every read: an interrupt wins over data that never ends, too.
-    if (auto goes_on = wait_.check(); !goes_on) return tl::unexpected(std::move(goes_on.error()));
+    TRY(wait_.check());
     const ssize_t received = ::recv(socket_.number(), into.data(), into.size(), 0);
     if (received > 0) return static_cast<std::size_t>(received);
     if (received == 0) return tl::unexpected(Error{.code = Errc::closed});

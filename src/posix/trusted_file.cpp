@@ -77,16 +77,14 @@ Result<void> check_link(const std::string& path, const Trust& trust) {
 }  // namespace
 
 Result<std::string> read_trusted_file(const std::string& path, const Trust& trust) {
-  if (auto link = check_link(path, trust); !link) return tl::unexpected(std::move(link.error()));
+  TRY(check_link(path, trust));
   // To open a pipe that nothing writes into must not wait; to read from one that is slow may.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file.valid()) return tl::unexpected(not_opened(path, errno));
   struct stat about = {};
   if (::fstat(file.number(), &about) != 0) return tl::unexpected(not_opened(path, errno));
   if (S_ISDIR(about.st_mode)) return tl::unexpected(unreadable(path, "is a folder, not a file"));
-  if (auto trusted = check_trust(path, ownership_of(about, trust), trust); !trusted) {
-    return tl::unexpected(std::move(trusted.error()));
-  }
+  TRY(check_trust(path, ownership_of(about, trust), trust));
   if (S_ISFIFO(about.st_mode)) static_cast<void>(::fcntl(file.number(), F_SETFL, O_RDONLY));
   std::string text;
   switch (read_whole(file.number(), text)) {

@@ -63,7 +63,7 @@ class TableRenderer final : public PlainRenderer {
   using PlainRenderer::PlainRenderer;
 
   Result<void> begin(std::span<const Column> columns) override {
-    if (Result<void> flushed = end(); !flushed) return flushed;
+    TRY(end());
     columns_.assign(columns.begin(), columns.end());
     widths_.clear();
     places_.assign(columns_.size(), 0);

@@ -42,25 +42,21 @@ bool is_sound(const files::ProfileStore& store, const std::string& path) {
 Result<std::string> row_of(const files::ProfileStore& store, const std::string& folder,
                            const std::string& id, shipped::TableWriter& writer, const Disk& disk) {
   const std::string path = fmt::format("{}/{}.yaml", folder, id);
-  auto yaml = disk.read(path);
-  if (!yaml) return tl::unexpected(std::move(yaml.error()));
-  auto profile = store.load_any(path);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto simulation = store.load_simulation(path);
-  if (!simulation) return tl::unexpected(std::move(simulation.error()));
-  auto codes = store.load_code_tables(path);
-  if (!codes) return tl::unexpected(std::move(codes.error()));
-  if (profile->profile.id != id) {
+  TRY_LET(auto yaml, disk.read(path));
+  TRY_LET(auto profile, store.load_any(path));
+  TRY_LET(auto simulation, store.load_simulation(path));
+  TRY_LET(auto codes, store.load_code_tables(path));
+  if (profile.profile.id != id) {
     return tl::unexpected(Error{.code = Errc::bad_file,
-                                .message = fmt::format("its id is '{}'", profile->profile.id),
+                                .message = fmt::format("its id is '{}'", profile.profile.id),
                                 .name = path});
   }
-  profile->profile.path = {};
-  const auto& bases = profile->profile.bases;
+  profile.profile.path = {};
+  const auto& bases = profile.profile.bases;
   const std::string extends = bases.empty() ? std::string() : bases.front().to_string();
   return fmt::format("    {{{}, {}, {}, {}, &{}, &{}, &{}}},\n", writer.quoted(id),
-                     writer.quoted(*yaml), writer.quoted(extends), profile->is_abstract,
-                     writer.add(profile->profile), writer.add(*simulation), writer.add(*codes));
+                     writer.quoted(yaml), writer.quoted(extends), profile.is_abstract,
+                     writer.add(profile.profile), writer.add(simulation), writer.add(codes));
 }
 
 int write_tables(const std::string& folder, const std::string& output) {

@@ -216,14 +216,13 @@ Result<Fault> parse_fault(std::string_view text) {
   const std::string_view what = text.substr(0, at);
   const std::size_t equals = what.find('=');
 
-  const auto row = find_kind(text, what.substr(0, equals));
-  if (!row) return tl::unexpected(row.error());
-  Fault fault{.kind = (*row)->kind};
+  TRY_LET(const auto row, find_kind(text, what.substr(0, equals)));
+  Fault fault{.kind = row->kind};
   if (equals != std::string_view::npos) {
-    auto parsed = parse_argument(fault, **row, text, what.substr(equals + 1));
+    auto parsed = parse_argument(fault, *row, text, what.substr(equals + 1));
     if (!parsed) return tl::unexpected(std::move(parsed.error()));
-  } else if (needs_argument((*row)->argument)) {
-    return tl::unexpected(bad_argument(text, **row));
+  } else if (needs_argument(row->argument)) {
+    return tl::unexpected(bad_argument(text, *row));
   }
   if (at != std::string_view::npos) {
     auto parsed = parse_when(fault, text, text.substr(at + 1));

@@ -62,8 +62,7 @@ bool needs_radio(OutageKind kind) {
 
 Result<Outage> parse_outage(std::string_view text) {
   const auto equals = text.find('=');
-  const auto kind = parse_kind(text, text.substr(0, std::min(equals, text.find('@'))));
-  if (!kind) return tl::unexpected(kind.error());
+  TRY_LET(const auto kind, parse_kind(text, text.substr(0, std::min(equals, text.find('@')))));
   const auto mark = text.find(every_mark);
   if (equals == std::string_view::npos || mark == std::string_view::npos || mark < equals) {
     return tl::unexpected(bad(text, "how long and how often it happens is missing"));
@@ -76,7 +75,7 @@ Result<Outage> parse_outage(std::string_view text) {
   if (*lasts <= Duration::zero() || *lasts >= *every) {
     return tl::unexpected(bad(text, "it must last some time, and less than the interval"));
   }
-  return Outage{*kind, *lasts, *every};
+  return Outage{kind, *lasts, *every};
 }
 
 std::vector<OutageHelp> outage_help() {

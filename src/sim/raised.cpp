@@ -29,9 +29,8 @@ Result<Raised> parse_raised(std::string_view text, std::uint16_t highest) {
   }
   Raised raised{.code = static_cast<std::uint16_t>(*code)};
   if (at == std::string_view::npos) return raised;
-  const auto after = parse_duration(text.substr(at + 1));
-  if (!after) return tl::unexpected(after.error());
-  raised.after = *after;
+  TRY_LET(const auto after, parse_duration(text.substr(at + 1)));
+  raised.after = after;
   return raised;
 }
 

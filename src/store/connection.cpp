@@ -80,7 +80,7 @@ Result<std::unique_ptr<Connection>> Connection::open(const std::string& name, in
     sqlite3_busy_timeout(handle, longest_wait_ms);
   }
   connection->judge(answer);
-  if (auto opened = connection->outcome(); !opened) return tl::unexpected(opened.error());
+  TRY(connection->outcome());
   return connection;
 }
 

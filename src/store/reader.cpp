@@ -179,7 +179,7 @@ Result<ListOf<Read>> all_of(Connection& connection, Statement& statement, const 
     Rows rows = statement.rows();
     while (rows.next()) all.push_back(read(rows));
   }
-  if (auto done = connection.outcome(); !done) return tl::unexpected(done.error());
+  TRY(connection.outcome());
   return all;
 }
 
@@ -289,7 +289,7 @@ class FileReader : public Reader {
       }
       if (tool) found = LastEvents(*connection_).find(*tool);
     }
-    if (auto read = connection_->end_transaction(); !read) return tl::unexpected(read.error());
+    TRY(connection_->end_transaction());
     return found;
   }
 
@@ -300,14 +300,14 @@ class FileReader : public Reader {
       Rows rows = statement.query();
       if (rows.next()) id = rows.integer(0);
     }
-    if (auto read = connection_->outcome(); !read) return tl::unexpected(read.error());
+    TRY(connection_->outcome());
     return id;
   }
 
   Result<std::vector<Coverage>> coverage() override {
     connection_->run("BEGIN");
     auto found = store::coverage(*connection_);
-    if (auto read = connection_->end_transaction(); !read) return tl::unexpected(read.error());
+    TRY(connection_->end_transaction());
     return found;
   }
 
@@ -340,11 +340,10 @@ Result<void> copy_pages(Connection& from, Connection& to) {
 }
 
 Result<void> FileReader::backup(const std::string& path) {
-  if (auto made = make_own_file(path, Errc::usage); !made) return made;
-  auto copy = Connection::open(path, SQLITE_OPEN_READWRITE, path);
-  if (!copy) return tl::unexpected(copy.error());
-  auto copied = copy_pages(*connection_, **copy);
-  copy->reset();
+  TRY(make_own_file(path, Errc::usage));
+  TRY_LET(auto copy, Connection::open(path, SQLITE_OPEN_READWRITE, path));
+  auto copied = copy_pages(*connection_, *copy);
+  copy.reset();
   if (!copied) {
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
@@ -365,9 +364,8 @@ Result<std::unique_ptr<Connection>> opened(const std::string& name, int flags,
   auto connection = Connection::open(name, flags, path);
   if (!connection) return connection;
   (*connection)->run("PRAGMA query_only = ON");
-  const auto found = check_open(**connection);
-  if (!found) return tl::unexpected(found.error());
-  if (*found == Found::nothing) return tl::unexpected(nothing_there(path));
+  TRY_LET(const auto found, check_open(**connection));
+  if (found == Found::nothing) return tl::unexpected(nothing_there(path));
   return connection;
 }
 
@@ -392,9 +390,8 @@ Result<std::unique_ptr<Reader>> Reader::open(const std::string& path) {
   const auto found = examine(whole);
   if (!found) return tl::unexpected(found.error());
   if (!is_there(whole)) return tl::unexpected(nothing_there(whole));
-  auto connection = open_for_reading(whole);
-  if (!connection) return tl::unexpected(connection.error());
-  return std::make_unique<FileReader>(std::move(*connection));
+  TRY_LET(auto connection, open_for_reading(whole));
+  return std::make_unique<FileReader>(std::move(connection));
 }
 
 }  // namespace spindle::store

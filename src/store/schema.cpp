@@ -154,7 +154,7 @@ Result<std::optional<Found>> judge_header(Connection& file) {
              number_of(file, "SELECT count(*) FROM sqlite_master") == 0) {
     found = Found::nothing;
   }
-  if (auto read = file.outcome(); !read) return tl::unexpected(read.error());
+  TRY(file.outcome());
   return found;
 }
 
@@ -180,9 +180,9 @@ std::string unchanging(const std::string& path) {
 
 Result<Found> examine(const std::string& path) {
   if (!is_there(path)) return Found::nothing;
-  auto file = Connection::open(unchanging(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, path);
-  if (!file) return tl::unexpected(file.error());
-  const auto found = judge_header(**file);
+  TRY_LET(auto file,
+          Connection::open(unchanging(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, path));
+  const auto found = judge_header(*file);
   if (found && *found) return **found;
   if (found) return tl::unexpected(not_ours(path));
   // A store that was cut off while it was made is no database before its journal is rolled back.
@@ -191,12 +191,11 @@ Result<Found> examine(const std::string& path) {
 }
 
 Result<Found> check_open(Connection& connection) {
-  const auto found = judge_header(connection);
-  if (!found) return tl::unexpected(found.error());
-  if (!*found) return tl::unexpected(not_ours(connection.path()));
+  TRY_LET(const auto found, judge_header(connection));
+  if (!found) return tl::unexpected(not_ours(connection.path()));
   const std::int64_t version = number_of(connection, "PRAGMA user_version");
-  if (auto read = connection.outcome(); !read) return tl::unexpected(read.error());
-  if (version <= known_version) return **found;
+  TRY(connection.outcome());
+  if (version <= known_version) return *found;
   return tl::unexpected(
       Error{.code = Errc::bad_file,
             .message = fmt::format("is a store of version {}, this program knows versions up to {}",

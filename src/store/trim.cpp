@@ -107,9 +107,7 @@ void tell(Connection& connection, const Trimmed& trimmed, WallTime before, WallT
 
 Result<Trimmed> trim(Connection& connection, WallTime before, WallTime now) {
   const std::vector<Cut> what = cuts(connection, before, now);
-  if (auto may = check_sinks(connection, newest_of(connection, what)); !may) {
-    return tl::unexpected(may.error());
-  }
+  TRY(check_sinks(connection, newest_of(connection, what)));
   Trimmed trimmed;
   trimmed.events = delete_events(connection, what);
   trimmed.gaps = delete_gaps(connection, before);

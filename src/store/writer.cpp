@@ -52,9 +52,8 @@ class FileWriter : public Writer {
   }
 
   Result<Trimmed> trim(WallTime before, WallTime now) override {
-    auto trimmed = transaction([&] { return store::trim(*connection_, before, now); });
-    if (!trimmed) return tl::unexpected(trimmed.error());
-    return *trimmed;
+    TRY_LET(auto trimmed, transaction([&] { return store::trim(*connection_, before, now); }));
+    return trimmed;
   }
 
  private:
@@ -79,10 +78,10 @@ class FileWriter : public Writer {
     auto result = work();
     if (is_refused(result)) {
       connection_->roll_back();
-      if (auto begun = connection_->outcome(); !begun) return tl::unexpected(begun.error());
+      TRY(connection_->outcome());
       return result;
     }
-    if (auto done = connection_->end_transaction(); !done) return tl::unexpected(done.error());
+    TRY(connection_->end_transaction());
     copy_log();
     return result;
   }
@@ -109,18 +108,17 @@ class FileWriter : public Writer {
 };
 
 Result<std::unique_ptr<Connection>> open_database(const std::string& path) {
-  const auto found = examine(path);
-  if (!found) return tl::unexpected(found.error());
-  if (*found == Found::nothing) {
+  TRY_LET(const auto found, examine(path));
+  if (found == Found::nothing) {
     const auto made = make_own_file(path, Errc::usage);
     // Nothing was stored in one that is there, or SQLite can still undo what was begun.
     if (!made && made.error().code != Errc::usage) return tl::unexpected(made.error());
   }
   auto connection = Connection::open(path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, path);
   if (!connection) return tl::unexpected(connection.error());
-  if (auto ours = check_open(**connection); !ours) return tl::unexpected(ours.error());
+  TRY(check_open(**connection));
   for (const auto& step : {migrate, set_durable}) {
-    if (auto done = step(**connection); !done) return tl::unexpected(done.error());
+    TRY(step(**connection));
   }
   return connection;
 }
@@ -129,14 +127,12 @@ Result<std::unique_ptr<Connection>> open_database(const std::string& path) {
 
 Result<std::unique_ptr<Writer>> Writer::open(const std::string& path) {
   const std::string whole = std::filesystem::absolute(path).lexically_normal().string();
-  if (auto ready = prepare_folder(whole); !ready) return tl::unexpected(ready.error());
-  auto lock = WriterLock::take(whole);
-  if (!lock) return tl::unexpected(lock.error());
-  auto connection = open_database(whole);
-  if (!connection) return tl::unexpected(connection.error());
-  Connection& opened = **connection;
-  auto writer = std::make_unique<FileWriter>(std::move(*lock), std::move(*connection));
-  if (auto prepared = opened.outcome(); !prepared) return tl::unexpected(prepared.error());
+  TRY(prepare_folder(whole));
+  TRY_LET(auto lock, WriterLock::take(whole));
+  TRY_LET(auto connection, open_database(whole));
+  Connection& opened = *connection;
+  auto writer = std::make_unique<FileWriter>(std::move(lock), std::move(connection));
+  TRY(opened.outcome());
   return writer;
 }
 

@@ -66,7 +66,7 @@ Result<void> ChangeLog::append(const std::string& line) {
         Error{.code = Errc::bad_file, .message = "neither XDG_STATE_HOME nor HOME is set"});
   }
   if (!folder_made_) {
-    if (auto made = disk_->make_folders(folder, Privacy::own); !made) return made;
+    TRY(disk_->make_folders(folder, Privacy::own));
     folder_made_ = true;
   }
   return disk_->append_line(folder + "/changes.jsonl", line);

@@ -18,23 +18,20 @@ constexpr Duration neighbours_answer = std::chrono::milliseconds(150);
 
 Result<std::string> WordSetup::group_in_words() {
   if (facts().group.empty()) return std::string();
-  const auto parameter = tool().profile->find(facts().group);
-  if (!parameter) return tl::unexpected(parameter.error());
+  TRY_LET(const auto parameter, tool().profile->find(facts().group));
   device::Device& device = tool().device;
   link::Session& session = device.session();
   const auto parent_of_present = [&]() -> Result<std::optional<std::int64_t>> {
-    const auto readings = device.read_each({*parameter}, device::Limits::skip);
-    if (!readings) return tl::unexpected(readings.error());
-    const auto& value = readings->front().value;
+    TRY_LET(const auto readings, device.read_each({parameter}, device::Limits::skip));
+    const auto& value = readings.front().value;
     if (!value) return std::nullopt;
     return value->number.mantissa();
   };
-  const auto own_parent = parent_of_present();
-  if (!own_parent) return tl::unexpected(own_parent.error());
+  TRY_LET(const auto own_parent, parent_of_present());
   const modbus::UnitId unit = session.options().unit;
   const Duration usual = session.options().answer_timeout;
   std::vector<std::string> children;
-  if (*own_parent == unit.value) children.emplace_back("others");
+  if (own_parent == unit.value) children.emplace_back("others");
   session.set_answer_timeout(std::min(usual, neighbours_answer));
   device.set_retries(0);
   for (const Target& neighbour : neighbours()) {
@@ -51,10 +48,10 @@ Result<std::string> WordSetup::group_in_words() {
         "started",
         tool().target.shown, fmt::join(children, ", "));
   }
-  const bool is_child = *own_parent && **own_parent > 0 && **own_parent != unit.value;
+  const bool is_child = own_parent && *own_parent > 0 && *own_parent != unit.value;
   if (!is_child) return std::string();
   return fmt::format("{} belongs to the group of unit {}, which is not started with it",
-                     tool().target.shown, **own_parent);
+                     tool().target.shown, *own_parent);
 }
 
 /// The other drivers of the tools file on the same line.

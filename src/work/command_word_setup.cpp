@@ -62,23 +62,21 @@ Result<void> WordSetup::read_settings() {
   for (const catalogue::Text* name : {&run.analog, &run.watchdog}) {
     if (!name->empty()) names.push_back(*name);
   }
-  auto wanted = tool().profile->select(names);
-  if (!wanted) return tl::unexpected(std::move(wanted.error()));
-  const auto readings = tool().device.read_each(*wanted, device::Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  for (const device::Reading& reading : *readings) {
+  TRY_LET(auto wanted, tool().profile->select(names));
+  TRY_LET(const auto readings, tool().device.read_each(wanted, device::Limits::skip));
+  for (const device::Reading& reading : readings) {
     if (!reading.value) return tl::unexpected(reading.value.error());
   }
-  const auto value = [&](std::size_t at) { return *(*readings)[at].value; };
+  const auto value = [&](std::size_t at) { return *readings[at].value; };
   found_.word = static_cast<std::uint16_t>(value(0).number.mantissa());
   found_.mode = value(1).number.mantissa();
-  found_.stopping = device::time_of((*readings)[2], device::longest_stop(*tool().profile));
+  found_.stopping = device::time_of(readings[2], device::longest_stop(*tool().profile));
   std::size_t next = 3;
   found_.analog = run.analog.empty() ? run.digital : value(next++).number.mantissa();
   if (!run.watchdog.empty()) found_.watchdog = value(next);
-  auto bits = plan_->motor->read_bits(tool().device, std::numeric_limits<std::uint16_t>::max());
-  if (!bits) return tl::unexpected(std::move(bits.error()));
-  found_.bits = *bits;
+  TRY_LET(auto bits,
+          plan_->motor->read_bits(tool().device, std::numeric_limits<std::uint16_t>::max()));
+  found_.bits = bits;
   return {};
 }
 
@@ -127,7 +125,7 @@ std::uint16_t WordSetup::standard_word() const {
 }
 
 Result<void> WordSetup::check_ready() {
-  if (auto rest = check_at_rest(); !rest) return rest;
+  TRY(check_at_rest());
   if (!facts().modes.contains(found_.mode)) {
     return tl::unexpected(not_ready(
         tool().target,

@@ -87,21 +87,20 @@ Result<void> check_transactions(const Target& target, const catalogue::Profile& 
 Result<void> find_profile(OpenTool& tool, const Environment& environment) {
   auto answer = ask_identity(tool);
   if (!answer) return tl::unexpected(std::move(answer.error()));
-  auto identification = match_identity(*answer, {}, environment);
-  if (!identification) return tl::unexpected(std::move(identification.error()));
-  if (identification->candidates.empty()) {
-    const bool later = identification->generation == catalogue::Generation::later;
+  TRY_LET(auto identification, match_identity(*answer, {}, environment));
+  if (identification.candidates.empty()) {
+    const bool later = identification.generation == catalogue::Generation::later;
     return tl::unexpected(
         with_target(unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
                                     fmt::format("no profile fits what the tool says of itself: {}",
-                                                fmt::join(identification->identity.notes, "; "))),
+                                                fmt::join(identification.identity.notes, "; "))),
                     tool.target));
   }
-  const auto told_apart = check_transactions(tool.target, *identification->matched);
+  const auto told_apart = check_transactions(tool.target, *identification.matched);
   if (!told_apart) return tl::unexpected(told_apart.error());
   // Products that their answer does not tell apart share the register map of their common base.
-  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification->matched));
-  tool.device.use(*tool.profile, std::move(identification->identity));
+  tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification.matched));
+  tool.device.use(*tool.profile, std::move(identification.identity));
   return {};
 }
 
@@ -165,12 +164,8 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
                                       const Environment& environment,
                                       SimulatedOperator simulated_operator,
                                       link::SessionOptions::LateAnswers late_answers) {
-  if (auto meant = check_addressing(target, profile); !meant) {
-    return tl::unexpected(std::move(meant.error()));
-  }
-  if (auto told_apart = check_transactions(target, profile); !told_apart) {
-    return tl::unexpected(std::move(told_apart.error()));
-  }
+  TRY(check_addressing(target, profile));
+  TRY(check_transactions(target, profile));
   device::LinkOptions options = link_options(target, profile, environment);
   options.late_answers = late_answers;
   auto device = device::Device::open(
@@ -186,11 +181,10 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
 Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
                          const Environment& environment) {
   auto kept = std::make_unique<const catalogue::Profile>(std::move(profile));
-  auto device = connect_device(target, *kept, environment);
-  if (!device) return tl::unexpected(std::move(device.error()));
+  TRY_LET(auto device, connect_device(target, *kept, environment));
   Target resolved = target;
   resolved.endpoint = with_port(resolved.endpoint, *kept);
-  return OpenTool{std::move(resolved), std::move(kept), std::move(*device)};
+  return OpenTool{std::move(resolved), std::move(kept), std::move(device)};
 }
 
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,

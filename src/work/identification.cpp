@@ -24,19 +24,17 @@ struct Match {
 Result<std::vector<catalogue::Profile>> profiles_to_match(const std::string& only,
                                                           const Environment& environment) {
   if (only.empty()) return environment.profiles.load_all();
-  auto profile = environment.profiles.load(only);
-  if (!profile) return tl::unexpected(std::move(profile.error()));
+  TRY_LET(auto profile, environment.profiles.load(only));
   std::vector<catalogue::Profile> profiles;
-  profiles.push_back(std::move(*profile));
+  profiles.push_back(std::move(profile));
   return profiles;
 }
 
 Result<std::vector<Match>> matches_of(ByteView answer, const std::string& only,
                                       const Environment& environment) {
-  auto profiles = profiles_to_match(only, environment);
-  if (!profiles) return tl::unexpected(std::move(profiles.error()));
+  TRY_LET(auto profiles, profiles_to_match(only, environment));
   std::vector<Match> matches;
-  for (catalogue::Profile& profile : *profiles) {
+  for (catalogue::Profile& profile : profiles) {
     if (!profile.identity) continue;
     auto identity = catalogue::decode_identity(*profile.identity, answer);
     const auto generation = catalogue::generation_of(*profile.identity, identity);
@@ -57,17 +55,16 @@ Match* best_of(std::vector<Match>& matches) {
 
 Result<Identification> match_identity(ByteView answer, const std::string& only,
                                       const Environment& environment) {
-  auto matches = matches_of(answer, only, environment);
-  if (!matches) return tl::unexpected(std::move(matches.error()));
+  TRY_LET(auto matches, matches_of(answer, only, environment));
   Identification result;
-  for (const Match& match : *matches) {
+  for (const Match& match : matches) {
     if (!match.fits()) continue;
     result.candidates.push_back(match.profile.id);
     if (result.candidates.size() > 1) result.series += " or ";
     result.series += match.profile.series;
   }
   if (result.candidates.size() == 1) result.profile = result.candidates.front();
-  Match* best = best_of(*matches);
+  Match* best = best_of(matches);
   if (best == nullptr) {
     result.identity.raw.assign(answer.begin(), answer.end());
     result.identity.notes.emplace_back("this is not the identity of any known product");

@@ -43,11 +43,10 @@ Result<Setting> parse_setting(std::string_view option, const Parameter& paramete
 }
 
 Result<void> add_speed(const Parameter& parameter, MotorPlan& plan) {
-  auto setting = parse_setting("--speed", parameter, plan.options.speed);
-  if (!setting) return tl::unexpected(std::move(setting.error()));
-  plan.speed = setting->second.number;
+  TRY_LET(auto setting, parse_setting("--speed", parameter, plan.options.speed));
+  plan.speed = setting.second.number;
   plan.speed_unit = unit_in_words(parameter.unit);
-  plan.settings.push_back(std::move(*setting));
+  plan.settings.push_back(std::move(setting));
   return {};
 }
 
@@ -61,21 +60,20 @@ std::string settings_in_words(const std::vector<Setting>& settings) {
 
 Result<void> MotorSetup::check_at_rest() {
   if (monitor_ == nullptr) return {};
-  const auto state = monitor_->look(tool_->device);
-  if (!state) return tl::unexpected(state.error());
+  TRY_LET(const auto state, monitor_->look(tool_->device));
   const auto refuse = [this](std::string message, std::string hint) {
     return tl::unexpected(not_ready(tool_->target, std::move(message), std::move(hint)));
   };
-  if (state->alarm != 0) {
+  if (state.alarm != 0) {
     return refuse(
-        fmt::format("alarm {:02X}h is present, so the motor was not started", state->alarm),
+        fmt::format("alarm {:02X}h is present, so the motor was not started", state.alarm),
         "'spindle alarms' shows what it means");
   }
-  if (state->running || state->command_speed.value_or(Decimal(0)) != Decimal(0)) {
+  if (state.running || state.command_speed.value_or(Decimal(0)) != Decimal(0)) {
     return refuse("the motor runs already, so it was not started",
                   "wait until it stands still, or stop it with 'spindle remote-stop'");
   }
-  if (state->busy) {
+  if (state.busy) {
     return refuse("the driver is busy, so the motor was not started", "try again in a second");
   }
   return {};
@@ -87,9 +85,8 @@ Parameter MotorSetup::written_as(const Parameter& parameter, const Value& /*befo
 }
 
 Result<void> MotorSetup::write_one(const Parameter& parameter, const Value& value) {
-  const auto before = tool_->device.read_each({parameter}, device::Limits::skip);
-  if (!before) return tl::unexpected(before.error());
-  const device::Reading& reading = before->front();
+  TRY_LET(const auto before, tool_->device.read_each({parameter}, device::Limits::skip));
+  const device::Reading& reading = before.front();
   if (!reading.value) return tl::unexpected(reading.value.error());
   if (*reading.value == value) return {};
   auto written = changer_.make(written_as(parameter, *reading.value, value), *reading.value, value);

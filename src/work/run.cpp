@@ -112,9 +112,7 @@ Result<RunReport> run_guarded(Run& run, catalogue::StopMode mode, OpenTool& tool
                               const Environment& environment, RunObserver& observer) {
   UninterruptibleLine line(tool, environment);
   Guardian guardian(tool, environment, observer);
-  if (auto started = guardian.start(run.settings_in_words(), mode); !started) {
-    return tl::unexpected(std::move(started.error()));
-  }
+  TRY(guardian.start(run.settings_in_words(), mode));
   if (auto ready = run.prepare(); !ready) {
     return tl::unexpected(with_left(std::move(ready.error()), run.put_back()));
   }

@@ -52,9 +52,7 @@ Result<void> check_identity_bytes(const catalogue::Profile& profile,
 Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profile,
                                                  const catalogue::SimulationSpec& start,
                                                  const SimulatedToolOptions& options) {
-  if (auto known = check_identity_bytes(profile, options.bm.identity_bytes); !known) {
-    return tl::unexpected(std::move(known.error()));
-  }
+  TRY(check_identity_bytes(profile, options.bm.identity_bytes));
   return sim::make_simulated_bus(profile, start, device_options(options));
 }
 
@@ -63,13 +61,10 @@ Result<std::unique_ptr<sim::Server>> make_server(const catalogue::Profile& profi
 Result<SimulatedTool> make_simulated_tool(const std::string& profile,
                                           const SimulatedToolOptions& options,
                                           const Environment& environment) {
-  auto loaded = environment.profiles.load(profile);
-  if (!loaded) return tl::unexpected(std::move(loaded.error()));
-  auto start = environment.profiles.load_simulation(profile);
-  if (!start) return tl::unexpected(std::move(start.error()));
-  auto server = make_server(*loaded, *start, options);
-  if (!server) return tl::unexpected(std::move(server.error()));
-  return SimulatedTool{std::move(*loaded), std::move(*server)};
+  TRY_LET(auto loaded, environment.profiles.load(profile));
+  TRY_LET(auto start, environment.profiles.load_simulation(profile));
+  TRY_LET(auto server, make_server(loaded, start, options));
+  return SimulatedTool{std::move(loaded), std::move(server)};
 }
 
 modbus::SerialSettings simulated_line(const catalogue::LinkSpec& facts,
@@ -88,12 +83,11 @@ device::OpenTransport with_simulated_tools(const Environment& environment,
     SimulatedToolOptions wanted = options;
     wanted.baud = endpoint.baud;
     wanted.units = units_for(endpoint, facts);
-    auto tool = make_simulated_tool(endpoint.profile, wanted, environment);
-    if (!tool) return tl::unexpected(std::move(tool.error()));
+    TRY_LET(auto tool, make_simulated_tool(endpoint.profile, wanted, environment));
     return sim::make_sim_transport(
-        std::move(tool->server), tool->profile.link.framing, {}, environment.clock,
+        std::move(tool.server), tool.profile.link.framing, {}, environment.clock,
         environment.interrupt,
-        {.character_time = character_time(simulated_line(tool->profile.link, endpoint.baud))});
+        {.character_time = character_time(simulated_line(tool.profile.link, endpoint.baud))});
   };
 }
 

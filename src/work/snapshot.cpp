@@ -78,26 +78,24 @@ Result<ToolSnapshot> take_snapshot(OpenTool& tool, Secrets secrets, const Enviro
                                    const link::Progress& progress) {
   const catalogue::Profile& profile = tool.device.profile();
   const auto stored = catalogue::stored_parameters(profile);
-  const auto readings = tool.device.read_each(stored, device::Limits::read, progress);
-  if (!readings) return tl::unexpected(readings.error());
+  TRY_LET(const auto readings, tool.device.read_each(stored, device::Limits::read, progress));
   ToolSnapshot taken{.snapshot = {.time = to_text(environment.clock.wall()),
                                   .version = std::string(environment.version),
                                   .target = tool.target.shown,
                                   .profile = profile.id,
                                   .fingerprint = catalogue::fingerprint(stored),
                                   .identity = identity_of(tool.device)}};
-  taken.snapshot.entries.reserve(readings->size());
-  for (std::size_t i = 0; i < readings->size(); ++i) {
-    add((*readings)[i], stored[i], tool.target, secrets, taken);
+  taken.snapshot.entries.reserve(readings.size());
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    add(readings[i], stored[i], tool.target, secrets, taken);
   }
   return taken;
 }
 
 Result<files::BackupFile> read_backup_file(const std::string& path,
                                            const Environment& environment) {
-  auto text = environment.disk.read(path);
-  if (!text) return tl::unexpected(std::move(text.error()));
-  return files::read_backup(*text, path);
+  TRY_LET(auto text, environment.disk.read(path));
+  return files::read_backup(text, path);
 }
 
 std::string file_name_of(const std::string& target) {

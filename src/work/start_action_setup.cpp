@@ -55,10 +55,9 @@ Result<void> StartActionSetup::look() {
   }
   selected_.clear();
   for (const ActionRequest& request : plan_->selections) {
-    const auto before = shown_by(request.action);
-    if (!before) return tl::unexpected(before.error());
+    TRY_LET(const auto before, shown_by(request.action));
     selected_.push_back({request, std::nullopt});
-    if (*before) selected_.back().before = (*before)->number.mantissa();
+    if (before) selected_.back().before = before->number.mantissa();
   }
   return {};
 }
@@ -66,20 +65,17 @@ Result<void> StartActionSetup::look() {
 /// Empty where the tool does not say.
 Result<std::optional<catalogue::Value>> StartActionSetup::shown_by(const Action& action) {
   if (action.confirm.empty()) return std::nullopt;
-  const auto parameter = tool_->profile->find(action.confirm);
-  if (!parameter) return tl::unexpected(parameter.error());
-  const auto readings = tool_->device.read_each({*parameter}, device::Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  if (!readings->front().value) return std::nullopt;
-  return *readings->front().value;
+  TRY_LET(const auto parameter, tool_->profile->find(action.confirm));
+  TRY_LET(const auto readings, tool_->device.read_each({parameter}, device::Limits::skip));
+  if (!readings.front().value) return std::nullopt;
+  return *readings.front().value;
 }
 
 Result<std::string> StartActionSetup::describe() {
   std::vector<std::string> words;
   for (const catalogue::StartOption& option : plan_->facts.selections) {
-    auto described = describe(option.action);
-    if (!described) return tl::unexpected(std::move(described.error()));
-    if (*described) words.push_back(std::move(**described));
+    TRY_LET(auto described, describe(option.action));
+    if (described) words.push_back(std::move(*described));
   }
   return fmt::format("{}", fmt::join(words, ", "));
 }
@@ -92,10 +88,9 @@ Result<std::optional<std::string>> StartActionSetup::describe(std::string_view n
       std::find_if(plan_->selections.begin(), plan_->selections.end(),
                    [&](const ActionRequest& request) { return request.action.name == name; });
   if (selected != plan_->selections.end()) return describe_value(*selected);
-  const auto shown = shown_by(*known);
-  if (!shown) return tl::unexpected(shown.error());
-  if (!*shown) return fmt::format("{} not known", last_words(known->confirm));
-  return describe_value({.action = *known, .value = (*shown)->number.mantissa()});
+  TRY_LET(const auto shown, shown_by(*known));
+  if (!shown) return fmt::format("{} not known", last_words(known->confirm));
+  return describe_value({.action = *known, .value = shown->number.mantissa()});
 }
 
 Result<std::string> StartActionSetup::describe_value(const ActionRequest& request) {
@@ -107,9 +102,8 @@ Result<std::string> StartActionSetup::describe_value(const ActionRequest& reques
   const auto parameter = tool_->profile->find(
       catalogue::numbered_name(request.action.tells, static_cast<std::uint16_t>(request.value)));
   if (!parameter) return words;
-  const auto readings = tool_->device.read_each({*parameter}, device::Limits::skip);
-  if (!readings) return tl::unexpected(readings.error());
-  const auto& told = readings->front().value;
+  TRY_LET(const auto readings, tool_->device.read_each({*parameter}, device::Limits::skip));
+  const auto& told = readings.front().value;
   const std::string unit = unit_of(*parameter, tool_->target);
   const bool unit_lacks = unit.empty() && !parameter->unit.empty();
   return fmt::format("{} ({} {}{}{})", words, last_words(parameter->name),

@@ -18,12 +18,11 @@ bool leaves_open(const Result<device::StopResult>& stopped) {
 
 Result<device::StopResult> stop_motor(OpenTool& tool, catalogue::StopMode mode,
                                       const Environment& environment) {
-  const auto model = device::RunModel::of(*tool.profile);
-  if (!model) return tl::unexpected(model.error());
+  TRY_LET(const auto model, device::RunModel::of(*tool.profile));
   if (tool.target.addressing == Addressing::broadcast) {
-    return broadcast_stop(tool.device, **model, mode).map([] { return device::StopResult::sent; });
+    return broadcast_stop(tool.device, *model, mode).map([] { return device::StopResult::sent; });
   }
-  const auto stopper = (*model)->stopper(mode);
+  const auto stopper = model->stopper(mode);
   tool.device.set_retries(0);  // it is better to send the stop soon, and again
   tool.device.session().skip_verification();
   stopper->observe(tool.device);

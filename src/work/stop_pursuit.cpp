@@ -87,9 +87,8 @@ Result<device::Device> StopPursuit::open(Duration patience) {
 /// are others is not written to.
 Result<device::Device> StopPursuit::connect() {
   if (profile_ == nullptr) {
-    auto profile = load_profile(target_, environment_);
-    if (!profile) return tl::unexpected(std::move(profile.error()));
-    auto adopted = adopt(std::make_unique<const Profile>(std::move(*profile)));
+    TRY_LET(auto profile, load_profile(target_, environment_));
+    auto adopted = adopt(std::make_unique<const Profile>(std::move(profile)));
     if (!adopted) return tl::unexpected(std::move(adopted.error()));
   }
   auto device = connect_device(target_, *profile_, environment_);

@@ -35,9 +35,8 @@ Error unknown_target(const std::string& text, const files::Tools& tools) {
 }
 
 Result<Target> target_of_url(const std::string& url, const Environment& environment) {
-  auto endpoint = link::parse_endpoint(url);
-  if (!endpoint) return tl::unexpected(std::move(endpoint.error()));
-  Target target{.shown = url, .endpoint = std::move(*endpoint)};
+  TRY_LET(auto endpoint, link::parse_endpoint(url));
+  Target target{.shown = url, .endpoint = std::move(endpoint)};
   target.profile =
       environment.common.profile.empty() ? target.endpoint.profile : environment.common.profile;
   return target;
@@ -201,13 +200,12 @@ Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& text
 
 Result<Target> resolve_target(const std::string& text, const Environment& environment,
                               const OneTool& words) {
-  auto targets = resolve_targets({text}, environment);
-  if (!targets) return tl::unexpected(std::move(targets.error()));
-  if (targets->size() == 1) return std::move(targets->front());
+  TRY_LET(auto targets, resolve_targets({text}, environment));
+  if (targets.size() == 1) return std::move(targets.front());
   return tl::unexpected(Error{
       .code = Errc::usage,
-      .message = fmt::format("'{}' is {} tools, and {}", text, targets->size(), words.why),
-      .hint = words.remedy.empty() ? fmt::format("{} {}", words.instead, targets->front().shown)
+      .message = fmt::format("'{}' is {} tools, and {}", text, targets.size(), words.why),
+      .hint = words.remedy.empty() ? fmt::format("{} {}", words.instead, targets.front().shown)
                                    : std::string(words.remedy)});
 }
 

@@ -14,7 +14,7 @@ test_packages=(
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
   python3-jsonschema mandoc dpkg-dev lintian sqlite3
-  python3-scipy python3-statsmodels
+  python3-scipy python3-statsmodels chromium
 )
 
 # Prints those of the named packages that are not installed, one a line.

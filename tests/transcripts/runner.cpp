@@ -21,6 +21,7 @@
 //   %file NAME … %end     a file in the transcript's own folder, and on the disk in memory that
 //                         backups are kept on
 //   %store FILE [damaged] a store of tests/support/sample_store.hpp, in the transcript's folder
+//   %report-store FILE    the store of tests/support/report_store.hpp: a shift of three tools
 //   %profile NAME         a file of tests/profiles/good, in the transcript's own folder
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
 //   %disk full|empty      whether it takes any more
@@ -62,6 +63,7 @@
 #include "spindle/work/connect.hpp"
 #include "support/fake_clock.hpp"
 #include "support/memory_disk.hpp"
+#include "support/report_store.hpp"
 #include "support/rig.hpp"
 #include "support/sample_store.hpp"
 #include "support/serial_bank.hpp"
@@ -403,6 +405,7 @@ class Player {
     }
     if (words.at(0) == "profiles") stage_.add_profiles(words.at(1));
     if (words.at(0) == "store") stage_.make_store(words);
+    if (words.at(0) == "report-store") test::make_shift(words.at(1));
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
     if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <utility>
 
 namespace spindle {
 
@@ -120,3 +121,25 @@ std::string hint_of(const Error& error);
 std::string describe(const Error& error);
 
 }  // namespace spindle
+
+// Leaving a function with the error of what it asked for is said in one word.
+
+#define SPINDLE_JOINED(a, b) a##b
+#define SPINDLE_NAMED(a, b) SPINDLE_JOINED(a, b)
+#define SPINDLE_TRY_LET(tried, declaration, ...)               \
+  auto tried = (__VA_ARGS__);                                  \
+  if (!tried) return tl::unexpected(std::move(tried).error()); \
+  declaration = std::move(*tried)
+#define SPINDLE_TRY(tried, ...)                        \
+  do {                                                 \
+    if (auto tried = (__VA_ARGS__); !tried) {          \
+      return tl::unexpected(std::move(tried).error()); \
+    }                                                  \
+  } while (false)
+
+/// `TRY(result);` returns from the function with the error of this Result, where it is one.
+#define TRY(...) SPINDLE_TRY(SPINDLE_NAMED(tried_, __COUNTER__), __VA_ARGS__)
+
+/// `TRY_LET(auto value, result);` the same, and declares what the Result holds otherwise.
+#define TRY_LET(declaration, ...) \
+  SPINDLE_TRY_LET(SPINDLE_NAMED(tried_, __COUNTER__), declaration, __VA_ARGS__)
