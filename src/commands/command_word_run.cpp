@@ -75,7 +75,7 @@ Result<WordPlan> make_plan(const RemoteStartOptions& options, const Profile& pro
                      });
   if (planned && options.watchdog) planned = plan_watchdog(*options.watchdog, plan);
   if (planned) planned = check_turns(plan);
-  return planned.map([&] { return plan; });
+  return planned.map([&] { return std::move(plan); });
 }
 
 class Plan final : public RunPlan {

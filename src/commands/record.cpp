@@ -15,7 +15,7 @@ namespace spindle::commands {
 namespace {
 
 /// How long what was heard may take to be stored when the program ends.
-constexpr Duration farewell = std::chrono::seconds(15);
+constexpr Duration farewell = std::chrono::seconds(8);
 
 Error no_tools(const Context& context) {
   Error error{.code = Errc::usage, .message = "there is no tool to record"};
@@ -89,7 +89,8 @@ Result<Outcome> record(const RecordOptions& options, Context& context) {
   };
   for_each_side_by_side(tools, [&](WatchedTool& tool) {
     const auto index = static_cast<std::size_t>(&tool - tools.data());
-    watch_tool(tool, open_transport, plan, options.watch.reconnection, *recorded[index], context);
+    watch_tool(tool, open_transport, plan, device::Reconnection::whatever, *recorded[index],
+               context);
   });
   const std::size_t left = recorder.journal().close(farewell);
   if (left > 0) stream.fail(not_stored(left, path));

@@ -19,6 +19,11 @@ constexpr Duration settings_every = std::chrono::minutes(1);
 constexpr unsigned most_unanswered = 3;
 /// People are told of one tool's link at most so often.
 constexpr Duration link_told_every = std::chrono::minutes(1);
+/// The link is opened again a moment later.
+Error not_settled(std::string message) {
+  return {.code = Errc::storage, .message = std::move(message)};
+}
+
 }  // namespace
 
 Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
@@ -27,7 +32,10 @@ Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOpti
       stream_(&stream),
       context_(&context),
       journal_(
-          writer, options, [](const store::Entry&, const store::Stored&) {},
+          writer, options,
+          [this](const store::Entry& entry, const store::Stored& stored) {
+            if (const auto* gap = std::get_if<store::NewGap>(&entry)) tell_gap(*gap, stored);
+          },
           [this](const std::optional<Error>& error) {
             if (error) {
               stream_->fault(*error);
@@ -37,25 +45,58 @@ Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOpti
           }) {}
 
 Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::string& target) {
-  const std::lock_guard lock(mutex_);
   const store::ToolName own = {said.maker, fmt::format("{}@{}", said.serial, target)};
-  TRY_LET(const auto has_own, writer_->has_tool(own));
-  const auto holder = std::find_if(claims_.begin(), claims_.end(), [&](const auto& claim) {
-    return claim.second == said && claim.first != target;
-  });
-  const bool is_taken = holder != claims_.end();
-  const store::ToolName& name = is_taken || has_own ? own : said;
-  claims_.insert_or_assign(target, name);
-  if (is_taken && told_.insert({own, target}).second) {
+  TRY_LET(const bool has_own, writer_->has_tool(own));
+  std::string holder;
+  bool is_news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto other = std::find_if(claims_.begin(), claims_.end(), [&](const auto& claim) {
+      return claim.second == said && claim.first != target;
+    });
+    if (other != claims_.end()) holder = other->first;
+    // A tool that moved is met once more before its old link is known to be dead.
+    const bool is_first = !holder.empty() && !has_own && met_.insert({target, said}).second;
+    if (is_first)
+      return tl::unexpected(
+          not_settled("another tool that is connected says its "
+                      "serial number: it is looked at again"));
+    claims_.insert_or_assign(target, holder.empty() && !has_own ? said : own);
+    is_news = !holder.empty() && told_.insert(own).second;
+  }
+  if (is_news) {
     stream_->fault(Error{
         .code = Errc::mismatch,
         .message = fmt::format("serial number {} is also that of {}: its results are recorded "
                                "under the serial number '{}'",
-                               said.serial, holder->first, own.serial),
+                               said.serial, holder, own.serial),
         .hint = "give every tool a serial number of its own",
         .target = target});
   }
-  return name;
+  return holder.empty() && !has_own ? said : own;
+}
+
+Result<void> Recorder::settle(store::RowId tool, RecordedTool& listener) {
+  const std::lock_guard lock(mutex_);
+  const auto found = listeners_.find(tool);
+  const bool is_new = found == listeners_.end() || found->second != &listener;
+  const bool was_here = found != listeners_.end();
+  if (was_here && (is_new || !listener.is_of(tool)) && journal_.waiting() > 0) {
+    return tl::unexpected(not_settled("what the tool told before is still being stored"));
+  }
+  listeners_.insert_or_assign(tool, &listener);
+  return {};
+}
+
+/// A gap that the journal itself made.
+void Recorder::tell_gap(const store::NewGap& entry, const store::Stored& stored) {
+  RecordedTool* listener = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = listeners_.find(entry.gap.tool);
+    if (found != listeners_.end()) listener = found->second;
+  }
+  if (listener != nullptr) listener->tell_stream(work::news_of(entry.gap), stored.epoch, stored.id);
 }
 
 void Recorder::release(const std::string& target) {
@@ -86,7 +127,9 @@ device::WatchControl RecordedTool::tell(const device::WatchEvent& news) {
 void RecordedTool::left(const Result<void>& watched, const std::optional<Error>& unreached) {
   flush_gap();
   flush_link();
-  if (tool_) recorder_->journal().add_lazily(store::Seen{*tool_, now()});
+  // Of a tool that is not connected it is not known what it did until now.
+  if (tool_ && is_up_) recorder_->journal().add_lazily(store::Seen{*tool_, now()});
+  recorder_->release(target_.shown);
   const std::lock_guard lock(voice_mutex_);
   // A signal is how a recorder is usually ended.
   const bool signalled = recorder_->context().interrupt.signalled();
@@ -143,7 +186,16 @@ void RecordedTool::record(const device::LinkChange& news) {
 }
 
 void RecordedTool::record(const device::PolledValue& news) {
-  happen(voice_.records->value(news, "change", now()), news);
+  const report::Record record = voice_.records->value(news, "change", now());
+  // What it points to ends with the watch, and the journal may tell it later.
+  recorder_->journal().add(
+      store::Happening{
+          .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
+      [this, news, parameter = *news.parameter](const store::Entry&, const store::Stored& stored) {
+        device::PolledValue kept = news;
+        kept.parameter = &parameter;
+        tell_stream(kept, stored.epoch, stored.id);
+      });
 }
 
 void RecordedTool::record(const device::PollLag& news) {
@@ -169,6 +221,7 @@ void RecordedTool::flush_gap() {
   const device::EventGap news = *std::exchange(gap_, std::nullopt);
   store::Gap row = work::row_of(news, seen_, now());
   row.tool = *tool_;
+  seen_ = row.ended + std::chrono::milliseconds(1);  // two gaps without numbers are never one
   recorder_->journal().add(store::NewGap{std::move(row)},
                            [this, news](const store::Entry&, const store::Stored& stored) {
                              if (stored.as == store::Stored::As::known) return;
@@ -207,6 +260,7 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
                     .torque_unit = target_.torque_unit,
                     .since = now()});
   if (!place) return tl::unexpected(place.error());
+  TRY(recorder_->settle(tool, *this));
   TRY_LET(const auto last, writer.last(tool));
   {
     const std::lock_guard lock(voice_mutex_);
@@ -216,11 +270,15 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
     epochs_ = {};
     counted_ = last ? std::optional(last->number) : std::nullopt;
     seen_ = last ? last->seen : now();
+    wanted_.clear();
+    read_at_.clear();
+    unanswered_ = 0;
   }
   tool_ = tool;
   place_ = *place;
   flush_link();
-  if (identity) record_total(*identity, last);
+  // Where events still wait to be stored, the last one that is stored is none to count from.
+  if (identity && recorder_->journal().waiting() == 0) record_total(*identity, last);
   if (rows_) {
     for (const std::int64_t preset : rows_->presets()) want_settings(preset);
   }
@@ -247,17 +305,22 @@ void RecordedTool::want_settings(const device::ToolEvent& news) {
   const auto preset = rows_->preset_of(news.block);
   const auto& presets = rows_->presets();
   if (!preset || std::find(presets.begin(), presets.end(), *preset) == presets.end()) return;
-  if (std::find(wanted_.begin(), wanted_.end(), *preset) != wanted_.end()) return;
-  const auto read = read_at_.find(*preset);
+  if (rows_->is_preset_change(news.block)) read_at_.erase(*preset);
+  want_settings(*preset);
+}
+
+void RecordedTool::want_settings(std::int64_t preset) {
+  if (std::find(wanted_.begin(), wanted_.end(), preset) != wanted_.end()) return;
+  const auto read = read_at_.find(preset);
   const bool is_old =
       read == read_at_.end() || recorder_->context().clock.now() >= read->second + settings_every;
-  if (is_old || rows_->is_preset_change(news.block)) wanted_.push_back(*preset);
+  if (is_old) wanted_.push_back(preset);
 }
 
 /// The settings of all presets are read at first, a few at a time, so that no event waits for long.
 std::optional<device::Errand> RecordedTool::next_errand() {
   const TimePoint clock_now = recorder_->context().clock.now();
-  if (tool_ && clock_now >= seen_due_) {
+  if (tool_ && is_up_ && clock_now >= seen_due_) {
     seen_due_ = clock_now + seen_every;
     recorder_->journal().add_lazily(store::Seen{*tool_, now()});
   }
@@ -281,6 +344,7 @@ std::optional<device::Errand> RecordedTool::next_errand() {
   }
   return device::Errand{.wanted = std::move(parameters),
                         .take = [this, presets](const std::vector<device::Reading>& readings) {
+                          unanswered_ = 0;
                           for (const std::int64_t preset : presets) {
                             auto row = rows_->settings_row(preset, readings);
                             if (!row) continue;

@@ -3,7 +3,9 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "spindle/work/event_rows.hpp"
@@ -12,6 +14,8 @@
 #include "watching.hpp"
 
 namespace spindle::commands {
+
+class RecordedTool;
 
 /// What all tools of one `record` share: the store, its journal, and who has which name there.
 class Recorder {
@@ -31,14 +35,21 @@ class Recorder {
   Result<store::ToolName> claim(const store::ToolName& said, const std::string& target);
   /// The target's tool is not connected any more.
   void release(const std::string& target);
+  /// What this tool is told by from now on. Error `storage` while what it told another listener, or
+  /// this one of another tool meanwhile, waits to be stored: its last event is not known then.
+  Result<void> settle(store::RowId tool, RecordedTool& listener);
 
  private:
+  void tell_gap(const store::NewGap& entry, const store::Stored& stored);
+
   store::Writer* writer_;
   WatchStream* stream_;
   Context* context_;
   std::mutex mutex_ = {};
-  std::map<std::string, store::ToolName> claims_ = {};  ///< by target
-  std::map<store::ToolName, std::string> told_ = {};    ///< names of which an error spoke
+  std::map<std::string, store::ToolName> claims_ = {};          ///< by target
+  std::set<std::pair<std::string, store::ToolName>> met_ = {};  ///< once already, by target
+  std::set<store::ToolName> told_ = {};                         ///< names of which an error spoke
+  std::map<store::RowId, RecordedTool*> listeners_ = {};
   work::Journal journal_;
 };
 
@@ -52,6 +63,10 @@ class RecordedTool final : public Listener {
   device::WatchControl tell(const device::WatchEvent& news) override;
   void left(const Result<void>& watched, const std::optional<Error>& unreached) override;
   device::RecordHooks hooks() override;
+
+  [[nodiscard]] bool is_of(store::RowId tool) const { return tool_ == tool; }
+  /// To be called behind the commit, by any thread.
+  void tell_stream(const device::WatchEvent& news, std::int64_t epoch, store::RowId id);
 
  private:
   void record(const device::ToolEvent& news);
@@ -71,7 +86,6 @@ class RecordedTool final : public Listener {
   void happen(report::Record record, device::WatchEvent news);
   void note_link(const device::LinkChange& news);
   void note_pending();
-  void tell_stream(const device::WatchEvent& news, std::int64_t epoch, store::RowId id);
   [[nodiscard]] WallTime now() const { return recorder_->context().clock.wall(); }
 
   const catalogue::Profile unknown_ = {};

@@ -96,12 +96,19 @@ Result<void> Watcher::watch(const Until& until) {
   while (goes_on(until)) {
     auto done = link_ ? serve(until) : connect(until);
     if (done) continue;
-    if (!may_pass(done.error())) return done;
+    if (!may_pass(done.error()) && !goes_on_behind(done.error())) return done;
     tell_trouble(done.error());
     if (reconnection_ == Reconnection::never) return done;
     link_.reset();
   }
   return {};
+}
+
+/// Whether it is tried again what no retry mends by itself, which may be mended.
+bool Watcher::goes_on_behind(const Error& error) const {
+  if (reconnection_ != Reconnection::whatever) return false;
+  const ExitStatus status = error.status();
+  return status == ExitStatus::refused || status == ExitStatus::mismatch;
 }
 
 // ---- connecting ----
@@ -142,7 +149,7 @@ void Watcher::tell_trouble(const Error& error) {
     attempts_ = 0;
   } else {
     ++attempts_;
-    if (reconnection_ == Reconnection::forever) {
+    if (reconnection_ != Reconnection::never) {
       const LinkState state = reached_ ? LinkState::reconnecting : LinkState::connecting;
       tell(LinkChange{state, attempts_, message_of(error)});
     }
@@ -158,6 +165,7 @@ Result<void> Watcher::attach(Link link) {
   if (profile_ != &link.device.profile()) {
     TRY(adopt_profile(link.device.profile()));
   }
+  hears_ = false;
   link_ = std::move(link);
   connected_at_ = clock_->now();
   reached_ = true;
@@ -221,6 +229,7 @@ Result<void> Watcher::begin() {
   beat_ = {.since = poll_due_, .missed = beat_.missed};
   meanings_known_ = false;
   if (!source_) return {};
+  hears_ = true;
   return source_->attach(link_->device, now - seen_at_).map([this] { seen_at_ = clock_->now(); });
 }
 
@@ -413,7 +422,7 @@ void Watcher::tell_reading(std::size_t index, Reading& reading) {
 // ---- events ----
 
 void Watcher::hear_waiting() {
-  if (source_) source_->handle_waiting();
+  if (hears_) source_->handle_waiting();
 }
 
 void Watcher::handle(const link::Spontaneous& frame) {
@@ -429,7 +438,7 @@ void Watcher::tell(const WatchEvent& news) {
 // ---- leaving ----
 
 void Watcher::disarm() {
-  if (link_ && source_) source_->disarm();
+  if (link_ && hears_) source_->disarm();
 }
 
 }  // namespace spindle::device

@@ -82,9 +82,10 @@ class GapRanges {
     if (!gap.missed || gap.at_least) ++epoch.unknown_gaps;
     const bool is_at_begin = name.second > 0 && gap.before &&
                              (epoch.of_rows.empty() || *gap.before <= epoch.of_rows.front().first);
-    if (is_at_begin && epoch.reason == EpochReason::wrap) {
+    const bool falls = !gap.after || (gap.before && *gap.after >= *gap.before);
+    if (is_at_begin && falls && epoch.reason == EpochReason::wrap) {
       add_wrap({name.first, name.second - 1}, name, gap);
-    } else if (!gap.after || !gap.before || is_at_begin) {
+    } else if (!gap.after || !gap.before || (is_at_begin && falls)) {
       add_counted(epoch, gap, is_at_begin);
     } else if (*gap.after < *gap.before) {
       cover(epoch, *gap.after + 1, *gap.before - 1);

@@ -30,13 +30,13 @@ class FileWriter : public Writer {
     return transaction([&] { return journal_.tool(name, model); });
   }
   Result<bool> has_tool(const ToolName& name) override {
-    return transaction([&] { return journal_.has_tool(name); });
+    return reading([&] { return journal_.has_tool(name); });
   }
   Result<RowId> place(const Place& place) override {
     return transaction([&] { return journal_.place(place); });
   }
   Result<std::optional<Last>> last(RowId tool) override {
-    return transaction([&] { return journal_.last(tool); });
+    return reading([&] { return journal_.last(tool); });
   }
 
   Result<std::vector<Stored>> commit(std::span<const Entry> entries) override {
@@ -69,6 +69,16 @@ class FileWriter : public Writer {
   template <typename Value>
   static bool is_refused(const Value& /*value*/) {
     return false;
+  }
+
+  /// Waits for no other program that writes.
+  template <typename Work>
+  auto reading(const Work& work) -> Result<decltype(work())> {
+    const std::lock_guard guard(mutex_);
+    connection_->run("BEGIN");
+    auto result = work();
+    TRY(connection_->end_transaction());
+    return result;
   }
 
   template <typename Work>

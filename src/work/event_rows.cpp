@@ -151,6 +151,9 @@ store::ToolName name_of(const device::Device& device, const std::string& target)
 }
 
 void EpochFollower::note(const device::EventGap& gap) {
+  // Either it was restarted, or its counter began again behind 65535: never the same epoch.
+  const bool fell = gap.after && gap.before && *gap.before <= *gap.after;
+  if (gap.sequence == device::Sequence::doubtful && fell) pending_ = store::EpochReason::unsure;
   if (gap.sequence == device::Sequence::wrap) pending_ = store::EpochReason::wrap;
   if (gap.sequence == device::Sequence::restart) pending_ = store::EpochReason::restart;
 }

@@ -67,9 +67,10 @@ void Journal::add_lazily(store::Entry entry) {
 
 void Journal::take(Item item) {
   auto* event = std::get_if<store::NewEvent>(&item.entry);
-  // What is no event has half as much room again: it says what became of the events.
-  const std::size_t room = options_.capacity + (event == nullptr ? options_.capacity / 2 : 0);
-  const bool has_room = waiting_.size() < room;
+  // What is told of links and values leaves room for events, and a gap is told whatever there is.
+  const bool is_gap = std::holds_alternative<store::NewGap>(item.entry);
+  const std::size_t room = event != nullptr ? options_.capacity : options_.capacity / 2;
+  const bool has_room = is_gap || waiting_.size() < room;
   if (event != nullptr && !has_room) return lose(*event);
   if (!has_room) return;
   if (event != nullptr) find_lost_again(*event);
@@ -166,6 +167,9 @@ bool Journal::commit(std::unique_lock<std::mutex>& lock) {
     done.push_back(std::move(waiting_.front()));
     waiting_.pop_front();
   }
+  // What no store takes is missing: a gap says so, in front of the next event of its tool.
+  const auto* lost = stored ? nullptr : std::get_if<store::NewEvent>(&done.front().entry);
+  if (lost != nullptr) lose(*lost);
   const bool recovered = stored && std::exchange(failure_, std::nullopt);
   one_by_one_ = one_by_one_ && waiting_.size() > 0;
   retry_ = {};
@@ -187,7 +191,8 @@ bool Journal::commit(std::unique_lock<std::mutex>& lock) {
 
 /// Whether what failed is given up: it is one entry, and no store would take it.
 bool Journal::note_failure(const Error& error) {
-  const bool may_pass = error.status() == ExitStatus::storage;
+  const ExitStatus status = error.status();
+  const bool may_pass = status == ExitStatus::storage || status == ExitStatus::bad_file;
   if (!may_pass && one_by_one_) return true;
   one_by_one_ = one_by_one_ || !may_pass;
   retry_ = std::clamp(retry_ * 2, options_.first_retry, options_.last_retry);

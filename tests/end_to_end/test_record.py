@@ -215,6 +215,60 @@ class Recorded(unittest.TestCase):
         self.assertEqual(self.store.numbers(), [(0, 65534), (0, 65535), (1, 0), (1, 1)])
         self.assertEqual(self.store.ask("SELECT reason FROM epoch ORDER BY ordinal"), [("first",), ("wrap",)])
 
+    def test_a_wrap_while_the_recorder_is_away_begins_an_epoch(self):
+        with EventServer(first=NUMBERS - 6) as tool:
+            with Recording(self.path, tool.url, *PROFILE) as recorder:
+                support.wait_until(lambda: tool.caught_up, "the recorder listens")
+                tool.event()
+                support.wait_until(lambda: stored(self.store, NUMBERS - 5), "it is stored")
+                recorder.end()
+            tool.miss(25)
+            with Recording(self.path, tool.url, *PROFILE) as recorder:
+                support.wait_until(lambda: recorder.records("event"), "the last one is fetched")
+                support.wait_until(lambda: tool.caught_up, "the recorder listens")
+                tool.event()
+                support.wait_until(lambda: len(recorder.records("event")) == 2, "it is told")
+                recorder.end()
+        numbers = self.store.numbers()
+        self.assertEqual([number for _, number in numbers], [NUMBERS - 6, NUMBERS - 5, 20, 21])
+        self.assertEqual([epoch for epoch, _ in numbers], [0, 0, 1, 1])
+
+    def test_a_stop_while_the_link_is_down_does_not_say_that_it_listened(self):
+        with EventServer() as tool:
+            with Recording(self.path, tool.url, *PROFILE) as recorder:
+                support.wait_until(lambda: tool.caught_up, "the recorder listens")
+                tool.event()
+                support.wait_until(lambda: stored(self.store, 1962), "it is stored")
+                before = self.store.ask("SELECT max(at) FROM event")[0][0]
+                port = tool.port
+                tool.__exit__(None, None, None)
+                support.wait_until(lambda: "lost" in [r["state"] for r in recorder.records("link")],
+                                   "the link is lost")
+                lost = max(int(at) for at, in self.store.ask("SELECT max(at) FROM happening"))
+                support.wait_until(lambda: len(recorder.records("link")) > 3, "time passes")
+                recorder.end()
+            self.assertGreater(port, 0)
+        seen = self.store.ask("SELECT max(seen) FROM place")[0][0] or before
+        self.assertLessEqual(seen, lost + 1)
+
+    def test_a_tool_that_was_replaced_is_stored_under_its_own_name(self):
+        with EventServer(serial=1) as tool:
+            with Recording(self.path, tool.url, *PROFILE) as recorder:
+                support.wait_until(lambda: tool.caught_up, "the recorder listens")
+                tool.event()
+                support.wait_until(lambda: len(recorder.records("event")) == 2, "it is told")
+                other = EventServer(first=77, serial=2)
+                tool.tool, tool.number = other.tool, 77
+                tool.cut()
+                support.wait_until(lambda: tool.caught_up, "the recorder listens again")
+                tool.event()
+                support.wait_until(lambda: stored(self.store, 78), "it is stored")
+                recorder.end()
+        rows = self.store.ask("SELECT serial, number FROM event JOIN tool ON tool.id = event.tool"
+                              " ORDER BY event.id")
+        self.assertEqual([number for serial, number in rows if serial == "1"], [1961, 1962])
+        self.assertEqual([number for serial, number in rows if serial == "2"][-1], 78)
+
     def test_a_store_has_one_writer(self):
         with EventServer() as tool, Recording(self.path, tool.url, *PROFILE) as recorder:
             support.wait_until(lambda: tool.caught_up, "the recorder listens")

@@ -373,3 +373,23 @@ TEST_CASE("flag: an interrupt is no gap where nothing happened") {
   CHECK(bench.events.empty());
   CHECK(bench.gaps.empty());
 }
+
+TEST_CASE("counter: a failed attach forgets nothing of how long the tool was not listened to") {
+  Bench bench("doga-bm");
+  bench.happen();
+  const ToolEvent last = standing(bench);
+  bench.happen();
+  bench.events.clear();
+  bench.source = EventSource::make(bench.profile, EventMode::declared, bench.clock,
+                                   [&bench](const auto& news) {
+                                     if (const auto* gap = std::get_if<EventGap>(&news))
+                                       bench.gaps.push_back(*gap);
+                                   });
+  bench.source->recall(device::LastEvent{*last.number, last.block, 24h});
+  bench.wire.fate = test::next_meet(test::Fate::has_no_answer, 8);
+  CHECK(!bench.attach());
+  bench.wire.fate = {};
+  REQUIRE(bench.attach());
+  REQUIRE(bench.gaps.size() == 1);
+  CHECK(bench.gaps.front().sequence == device::Sequence::doubtful);
+}

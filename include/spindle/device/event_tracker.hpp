@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -60,7 +61,7 @@ class EventTracker {
   /// tool that began to count anew in that time can have come to it.
   void look_again(Duration unseen) {
     recent_.clear();
-    unseen_ = unseen;
+    unseen_ = std::max(unseen_.value_or(Duration::zero()), unseen);
   }
 
   [[nodiscard]] std::optional<std::uint16_t> last() const { return last_; }

@@ -47,7 +47,12 @@ using WatchEvent =
     std::variant<ToolEvent, PolledValue, EventGap, PollLag, LinkChange, MotorTransition>;
 
 enum class Samples : std::uint8_t { changes, changes_and_first, all };
-enum class Reconnection : std::uint8_t { forever, never };
+/// What is done when a link is lost.
+enum class Reconnection : std::uint8_t {
+  forever,  ///< it is opened again; what no retry can mend ends the watch
+  never,
+  whatever,  ///< as `forever`, also behind a refusal and another product, which may be mended
+};
 
 struct WatchPlan {
   EventMode events = EventMode::declared;
@@ -147,6 +152,7 @@ class Watcher {
   void tell_trouble(const Error& error);
   void disarm();
   [[nodiscard]] bool goes_on(const Until& until) const;
+  [[nodiscard]] bool goes_on_behind(const Error& error) const;
   [[nodiscard]] TimePoint next_due() const;
   [[nodiscard]] Duration back_off(unsigned failures) const;
 
@@ -179,6 +185,7 @@ class Watcher {
   bool served_ = false;       ///< this link has kept the tool alive, or brought an event
   bool reached_ = false;      ///< there was a link
   bool caveat_told_ = false;
+  bool hears_ = false;     ///< the source has this link
   bool recalled_ = false;  ///< the source knows what the record says of this tool
   bool stopped_ = false;
   std::optional<Error> trouble_ = std::nullopt;  ///< the last one
