@@ -44,7 +44,8 @@ th[scope=row]{border-bottom:1px solid #d5dbe1;vertical-align:top}
 .w{text-align:left;white-space:normal;min-width:16ch}
 .bad{color:#a61b1b;font-weight:600}
 .box{border:2px solid #a61b1b;padding:8px 14px;margin:16px 0;max-width:80ch}
-.figures{display:grid;grid-template-columns:repeat(2,minmax(0,464px));gap:16px 32px;align-items:start}
+.chart-pair{margin:12px 0}
+.figures{margin-top:16px;display:grid;grid-template-columns:repeat(2,minmax(0,464px));gap:16px 32px;align-items:start}
 ul{margin:4px 0 8px;padding-left:20px;max-width:90ch}
 @media screen and (max-width:900px){.figures{grid-template-columns:minmax(0,480px)}}
 @media screen and (max-width:640px){body{padding:14px}h1{font-size:22px}}

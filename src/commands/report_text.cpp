@@ -1,11 +1,15 @@
 #include "report_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 
 #include "exact_numbers.hpp"
+#include "report_figures.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
 #include "spindle/chart/ticks.hpp"
@@ -244,11 +248,20 @@ std::string exclusions_text(const work::Study& study) {
 
 /// What the figures rest on, where it is not certain.
 std::string notes_text(const Assessed& assessed) {
+  std::set<std::string> evidence;
+  for (const CodeRow& row : code_rows(assessed)) {
+    if (!row.evidence.empty()) evidence.insert(row.evidence);
+  }
+  std::string text;
+  if (!evidence.empty()) {
+    text = fmt::format("What error codes mean: by evidence {}.\n", fmt::join(evidence, ", "));
+  }
   const bool has_own =
       std::any_of(assessed.strata.begin(), assessed.strata.end(), [](const AssessedStratum& each) {
         return each.stratum->limits[Quantity::torque].origin == work::LimitsOrigin::tool;
       });
-  return has_own ? std::string(limit_assumption) + '\n' : std::string();
+  if (has_own) text.append(limit_assumption) += '\n';
+  return text;
 }
 
 }  // namespace

@@ -212,6 +212,16 @@ TEST_CASE("settings that were read just behind a result are those that it was ma
   CHECK(limits_text(strata.front()->limits[Quantity::torque]) == Texts{"2.576", "3.024"});
 }
 
+TEST_CASE("a target torque of 0 is none") {
+  Bench bench;
+  bench.facts.settings = {settings(0, 271, 10)};
+  bench.result(1, 271);
+  bench.result(2, 90, 333).columns[Column::target_torque] = 0;
+  bench.result(3, 271);
+  Study study = study_of(bench);
+  CHECK(strata_of(study, bench).size() == 1);
+}
+
 TEST_CASE("a result is taken out by its name only, and stays in the yield") {
   Bench bench;
   bench.exclusions = {{.serial = "42", .epoch = 0, .number = 2, .reason = "test screw"},
