@@ -156,9 +156,9 @@ class Page {
     if (is_interactive()) add("{}{}", uplot_style(), zoom_style());
     out_ += "</style>\n</head>\n<body>\n";
     add("<h1>Fastening results</h1>\n<p class=\"lead\">{}</p>\n", when);
-    add("<p class=\"quiet\">{}. Times are those of the computer that recorded. Made {} by spindle "
-        "{}.</p>\n",
-        escape(tool_names()), zone().minute(facts_->made), escape(facts_->version));
+    add("<p class=\"quiet\">{}. All times are {}, by the clock of the computer that recorded. Made "
+        "{} by spindle {}.</p>\n",
+        escape(tool_names()), zone().name(), zone().minute(facts_->made), escape(facts_->version));
     if (assessed_->unmet.empty()) return;
     out_ += "<div class=\"box\"><strong class=\"bad\">Not met</strong>\n<ul>\n";
     for (const std::string& line : assessed_->unmet) add("<li>{}</li>\n", escape(line));

@@ -228,6 +228,7 @@ std::string stratum_text(const AssessedStratum& assessed, const work::Study& stu
       {"QUANTITY", "N", "MEAN", "S", "S WITHIN", "PP", "PPK", "95 %", "STABLE"}};
   std::string histograms;
   for (const Quantity quantity : work::quantities) {
+    if (!has_values(assessed, quantity)) continue;
     rows.push_back(quantity_row(assessed.quantities[quantity], stratum, zone));
     histograms += histogram_line(assessed.quantities[quantity], stratum);
   }

@@ -384,7 +384,8 @@ class Study::ToolCourse {
 
   void count(const store::EventView& event, bool is_ok, const ProductFacts& product,
              StudiedResult& result, Stratum& stratum) {
-    if (event.remembered) ++stratum.of_unknown_age;
+    const bool was_fetched = event.source == "catch-up" && !event.tool_time;
+    if (event.remembered || was_fetched) ++stratum.of_unknown_age;
     result.is_excluded = exclude(event);
     if (result.is_excluded) ++stratum.excluded;
     if (is_ok) {

@@ -248,7 +248,10 @@ TEST_CASE("the resolution is that of the tool") {
 TEST_CASE("results of unknown age are counted") {
   Bench bench;
   bench.result(1, 271).remembered = true;
-  bench.result(2, 271);
+  bench.result(2, 271).source = "catch-up";
+  bench.result(3, 271).source = "catch-up";
+  bench.events.back().tool_time = bench_second(3);
+  bench.result(4, 271).source = "push";
   Study study = study_of(bench);
-  CHECK(strata_of(study, bench).front()->of_unknown_age == 1);
+  CHECK(strata_of(study, bench).front()->of_unknown_age == 2);
 }
