@@ -251,6 +251,9 @@ class Completer {
     std::vector<Candidate> values;
     if (kind == "FORMAT") values = candidates_of(format_words);
     if (kind == "WHEN") values = candidates_of(color_words);
+    if (kind == "RULES") values = candidates_of(rule_set_words);
+    if (kind == "WHAT") values = candidates_of(included_words);
+    if (kind == "STUDY") values = candidates_of(study_words);
     if (kind == "NUMBERING") values = candidates_of(files::numbering_words);
     if (kind == "TABLE") values = candidates_of(modbus::table_words);
     if (kind == "KIND") values = candidates_of(catalogue::event_kind_words);

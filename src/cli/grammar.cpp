@@ -496,17 +496,6 @@ void add_record(CLI::App& app, ParseState& draft) {
   add_command(app, draft, words, draft.options.record, commands::record, bind_record);
 }
 
-constexpr auto rule_set_words =
-    enum_table<statistics::RuleSet>({{"standard", statistics::RuleSet::standard},
-                                     {"atlas", statistics::RuleSet::atlas},
-                                     {"western-electric", statistics::RuleSet::western_electric}});
-
-/// What --include and --study take: one word each, so that there is room for others.
-enum class Included : std::uint8_t { not_completed };
-constexpr auto included_words = enum_table<Included>({{"not-completed", Included::not_completed}});
-constexpr auto study_words = enum_table<commands::MachineStudy>(
-    {{"", commands::MachineStudy::no}, {"machine", commands::MachineStudy::yes}});
-
 std::string report_words() {
   return "Nothing is asked of a tool: results are those that 'spindle record' stored. Results of\n"
          "one tool, preset and settings are one stratum; nothing is pooled. OK results and NG\n"
@@ -551,8 +540,8 @@ void bind_report(Binder& bind, commands::ReportOptions& options) {
         return one_of(included_words)(option, text).map([](Included) { return true; });
       },
       "not-completed: also results that did not come to their end");
-  bind.repeatable("--exclude", "SERIAL/EPOCH/NUMBER", options.excluded,
-                  "take a result out of the statistics, repeatable; it is named");
+  bind.repeatable("--exclude", "KEY", options.excluded,
+                  "take the result SERIAL/EPOCH/NUMBER out of the statistics, repeatable");
   bind.repeatable("--reason", "TEXT", options.reasons, "why, one for each --exclude");
   bind.option("--shift-break", "DURATION", options.shift_break, to_duration,
               "a longer pause ends a run of neighbours (default 30min)");
@@ -578,6 +567,9 @@ void add_report(CLI::App& app, ParseState& draft) {
                 bind_report(bind, options);
                 bind.check([&options, note_file]() -> std::optional<Error> {
                   note_file(options.file);
+                  if (options.interactive && options.file.empty()) {
+                    return usage("--interactive is about the page", "add -f FILE.html");
+                  }
                   return std::nullopt;
                 });
               });

@@ -23,6 +23,19 @@ inline constexpr auto format_words = enum_table<report::Format>({{"table", repor
                                                                  {"json", report::Format::json},
                                                                  {"csv", report::Format::csv}});
 
+/// What --rules, --include and --study of report take.
+inline constexpr auto rule_set_words =
+    enum_table<statistics::RuleSet>({{"standard", statistics::RuleSet::standard},
+                                     {"atlas", statistics::RuleSet::atlas},
+                                     {"western-electric", statistics::RuleSet::western_electric}});
+
+/// What a report leaves out unless it is asked for.
+enum class Included : std::uint8_t { not_completed };
+inline constexpr auto included_words =
+    enum_table<Included>({{"not-completed", Included::not_completed}});
+inline constexpr auto study_words = enum_table<commands::MachineStudy>(
+    {{"", commands::MachineStudy::no}, {"machine", commands::MachineStudy::yes}});
+
 /// What was typed, understood; nothing has been touched yet.
 struct Invocation {
   /// What is wanted of the program: a command's deed, or to know what runs here (--version).

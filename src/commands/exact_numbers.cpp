@@ -22,7 +22,7 @@ std::optional<Decimal> to_decimal(double value) {
 }
 
 report::Cell number_or_null(const std::optional<Decimal>& value) {
-  return value ? report::Cell(*value) : report::Cell(std::monostate());
+  return value ? report::Cell(work::without_zeros(*value)) : report::Cell(std::monostate());
 }
 
 report::Cell number_or_null(const std::optional<double>& value) {

@@ -17,6 +17,8 @@
 namespace spindle::commands {
 namespace {
 
+constexpr std::string_view standard_output = "-";
+
 /// Limits of one joint for results of several would be one index over different things.
 Result<void> check_limits(const ReportOptions& options, const work::Study& study) {
   if (options.limits.empty() && options.angle_limits.empty()) return {};
@@ -26,10 +28,23 @@ Result<void> check_limits(const ReportOptions& options, const work::Study& study
   }
   if (joints.size() <= 1) return {};
   Error error{.code = Errc::usage,
-              .message = fmt::format("limits are those of one joint, and these results are of {}",
-                                     counted(joints.size(), "preset and target")),
+              .message = fmt::format(
+                  "limits are those of one joint, and these results are of {} presets or targets",
+                  joints.size()),
               .hint = "choose one by --preset, --tool and --since"};
   error.name = options.limits.empty() ? "--angle-limits" : "--limits";
+  return tl::unexpected(std::move(error));
+}
+
+/// Before anything is read for it.
+Result<void> check_file(const ReportOptions& options, const Context& context) {
+  const bool is_kept = !options.file.empty() && options.file != standard_output &&
+                       options.overwrite == Overwrite::refuse && context.disk.exists(options.file);
+  if (!is_kept) return {};
+  Error error{.code = Errc::usage,
+              .message = "this file exists already",
+              .hint = "choose another name, or add --force to replace it"};
+  error.name = options.file;
   return tl::unexpected(std::move(error));
 }
 
@@ -46,7 +61,7 @@ Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
                                                   .made = context.clock.wall(),
                                                   .version = std::string(context.version),
                                                   .options = options});
-  if (options.file == "-") return context.io.out(page);
+  if (options.file == standard_output) return context.io.out(page);
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
@@ -89,7 +104,7 @@ Summary summary_of(const Assessed& assessed, const ReportOptions& options) {
   if (!assessed.unmet.empty()) {
     sentence += fmt::format(", {} not met", counted(assessed.unmet.size(), "requirement"));
   }
-  if (!options.file.empty() && options.file != "-") sentence += ": " + options.file;
+  if (!options.file.empty() && options.file != standard_output) sentence += ": " + options.file;
   return {.counts = {{"strata", count(assessed.strata.size())},
                      {"results", count(results)},
                      {"missed", number(static_cast<std::int64_t>(missed))},
@@ -108,6 +123,9 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   if (!study_options) return tl::unexpected(study_options.error());
   auto exclusions = exclusions_of(options);
   if (!exclusions) return tl::unexpected(std::move(exclusions.error()));
+  if (auto checked = check_file(options, context); !checked) {
+    return tl::unexpected(std::move(checked.error()));
+  }
   auto reader =
       work::store_place(options.store, context.state_folder).and_then(&store::Reader::open);
   if (!reader) return tl::unexpected(std::move(reader.error()));

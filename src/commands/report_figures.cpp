@@ -254,13 +254,13 @@ chart::RunChart run_chart_of(Subject subject, Quantity quantity, const work::Stu
                              const ReportZone& zone) {
   const Stratum& first = *subject.front().stratum;
   const Places places(subject, study);
-  chart::RunChart chart{
-      .caption = {.title = fmt::format("Run chart of {}, {}", name_of(quantity),
-                                       subject_name(first, study)),
-                  .description = "Every result in the order in which it was stored."},
-      .course = places.course(zone),
-      .quantity = quantity_of(quantity, first),
-      .samples = {}};
+  chart::RunChart chart{.caption = {.title = fmt::format("Run chart of {}", name_of(quantity)),
+                                    .description = fmt::format(
+                                        "{}. Every result in the order in which it was stored.",
+                                        subject_name(first, study))},
+                        .course = places.course(zone),
+                        .quantity = quantity_of(quantity, first),
+                        .samples = {}};
   std::vector<WallTime> times;
   for (const AssessedStratum& each : subject) {
     const Stratum& stratum = *each.stratum;
@@ -299,11 +299,10 @@ std::string histogram_figure(const AssessedStratum& assessed, Quantity which,
   if (!classes) return {};
   const statistics::Moments& moments = quantity.assessment.moments;
   chart::Histogram chart{
-      .caption = {.title = fmt::format("Histogram of {}, {}", name_of(which),
-                                       subject_name(stratum, study)),
-                  .description =
-                      fmt::format("From {} to {} {}.", zone.minute(stratum.results.front().at),
-                                  zone.minute(stratum.results.back().at), zone.name())},
+      .caption = {.title = fmt::format("Histogram of {}", name_of(which)),
+                  .description = fmt::format("{}, from {} to {} {}.", subject_name(stratum, study),
+                                             zone.minute(stratum.results.front().at),
+                                             zone.minute(stratum.results.back().at), zone.name())},
       .quantity = quantity_of(which, stratum),
       .step = step,
       .first = classes->first_step,
@@ -337,10 +336,11 @@ std::string control_figure(const AssessedStratum& assessed, Quantity which,
   chart::ControlChart chart = control_chart_of(assessed, which, places);
   const bool has_groups =
       quantity.assessment.chart->limits.kind == statistics::ChartKind::subgroups;
-  chart.caption = {
-      .title = fmt::format("Control chart of {}, {}{}", name_of(which),
-                           subject_name(stratum, study), has_groups ? ", means of 5 in a row" : ""),
-      .description = "Control limits come from the baseline, never from the specification."};
+  chart.caption = {.title = fmt::format("Control chart of {}{}", name_of(which),
+                                        has_groups ? ": means of 5 in a row" : ""),
+                   .description = fmt::format(
+                       "{}. Control limits come from the baseline, never from the specification.",
+                       subject_name(stratum, study))};
   chart.course = places.course(zone);
   if (!places.is_time()) chart.course.name = has_groups ? "Subgroup" : "Result";
   chart.baseline = baseline_of(quantity, chart);

@@ -44,7 +44,8 @@ th[scope=row]{border-bottom:1px solid #d5dbe1;vertical-align:top}
 .w{text-align:left;white-space:normal;min-width:16ch}
 .bad{color:#a61b1b;font-weight:600}
 .box{border:2px solid #a61b1b;padding:8px 14px;margin:16px 0;max-width:80ch}
-.figures{display:grid;grid-template-columns:repeat(2,minmax(0,464px));gap:16px 32px;align-items:start}
+.chart-pair{margin:12px 0}
+.figures{margin-top:16px;display:grid;grid-template-columns:repeat(2,minmax(0,464px));gap:16px 32px;align-items:start}
 ul{margin:4px 0 8px;padding-left:20px;max-width:90ch}
 @media screen and (max-width:900px){.figures{grid-template-columns:minmax(0,480px)}}
 @media screen and (max-width:640px){body{padding:14px}h1{font-size:22px}}
@@ -155,9 +156,9 @@ class Page {
     if (is_interactive()) add("{}{}", uplot_style(), zoom_style());
     out_ += "</style>\n</head>\n<body>\n";
     add("<h1>Fastening results</h1>\n<p class=\"lead\">{}</p>\n", when);
-    add("<p class=\"quiet\">{}. Times are those of the computer that recorded. Made {} by spindle "
-        "{}.</p>\n",
-        escape(tool_names()), zone().minute(facts_->made), escape(facts_->version));
+    add("<p class=\"quiet\">{}. All times are {}, by the clock of the computer that recorded. Made "
+        "{} by spindle {}.</p>\n",
+        escape(tool_names()), zone().name(), zone().minute(facts_->made), escape(facts_->version));
     if (assessed_->unmet.empty()) return;
     out_ += "<div class=\"box\"><strong class=\"bad\">Not met</strong>\n<ul>\n";
     for (const std::string& line : assessed_->unmet) add("<li>{}</li>\n", escape(line));

@@ -181,6 +181,7 @@ std::string numbers_table(const AssessedStratum& assessed, const work::Study& st
   std::string rows;
   std::string remarks;
   for (const Quantity quantity : work::quantities) {
+    if (!has_values(assessed, quantity)) continue;
     rows += numbers_row(assessed, quantity, zone);
     remarks += remarks_text(assessed, quantity, zone);
   }

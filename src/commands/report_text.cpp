@@ -1,11 +1,15 @@
 #include "report_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 
 #include "exact_numbers.hpp"
+#include "report_figures.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
 #include "spindle/chart/ticks.hpp"
@@ -224,6 +228,7 @@ std::string stratum_text(const AssessedStratum& assessed, const work::Study& stu
       {"QUANTITY", "N", "MEAN", "S", "S WITHIN", "PP", "PPK", "95 %", "STABLE"}};
   std::string histograms;
   for (const Quantity quantity : work::quantities) {
+    if (!has_values(assessed, quantity)) continue;
     rows.push_back(quantity_row(assessed.quantities[quantity], stratum, zone));
     histograms += histogram_line(assessed.quantities[quantity], stratum);
   }
@@ -244,11 +249,20 @@ std::string exclusions_text(const work::Study& study) {
 
 /// What the figures rest on, where it is not certain.
 std::string notes_text(const Assessed& assessed) {
+  std::set<std::string> evidence;
+  for (const CodeRow& row : code_rows(assessed)) {
+    if (!row.evidence.empty()) evidence.insert(row.evidence);
+  }
+  std::string text;
+  if (!evidence.empty()) {
+    text = fmt::format("What error codes mean: by evidence {}.\n", fmt::join(evidence, ", "));
+  }
   const bool has_own =
       std::any_of(assessed.strata.begin(), assessed.strata.end(), [](const AssessedStratum& each) {
         return each.stratum->limits[Quantity::torque].origin == work::LimitsOrigin::tool;
       });
-  return has_own ? std::string(limit_assumption) + '\n' : std::string();
+  if (has_own) text.append(limit_assumption) += '\n';
+  return text;
 }
 
 }  // namespace

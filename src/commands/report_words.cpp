@@ -120,6 +120,10 @@ std::string origin_of(const work::QuantityLimits& limits, const Stratum& stratum
   return limits.why_none;
 }
 
+bool has_values(const AssessedStratum& stratum, Quantity quantity) {
+  return quantity == Quantity::torque || !stratum.quantities[quantity].values.values.empty();
+}
+
 std::string code_name(std::int64_t code) {
   return code == 0 ? "no code" : fmt::format("E{}", code);
 }
@@ -249,8 +253,7 @@ std::vector<std::string> left_out_of(const Stratum& stratum, const work::StudyOp
   }
   if (stratum.of_unknown_age > 0) {
     lines.push_back(
-        fmt::format("remembered by the tool when it was found: {}; their times are "
-                    "\"not later than\"",
+        fmt::format("fetched from the tool's memory: {}; their times are \"not later than\"",
                     stratum.of_unknown_age));
   }
   return lines;

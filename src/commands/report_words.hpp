@@ -38,6 +38,9 @@ std::string range_of(const work::QuantityLimits& limits);
 std::string origin_of(const work::QuantityLimits& limits, const Stratum& stratum,
                       const ReportZone& zone);
 
+/// Whether there is something to say of it: not of the angle where a product measures none.
+bool has_values(const AssessedStratum& stratum, Quantity quantity);
+
 /// "E333 11, E335 4".
 std::string codes_of(const Stratum& stratum);
 /// The same of those that count so.

@@ -18,7 +18,7 @@ constexpr std::size_t most_samples = 6000;
 constexpr std::string_view policy =
     "default-src 'none'; style-src 'unsafe-inline'; "
     "script-src 'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8=' "
-    "'sha256-ERcgd/JqMbwB0uYZJrRfaTU+vNzMZ+I7h8/wGZOFHtQ='";
+    "'sha256-31L2CGY0LRWSQBNJB/e4PjUvBHqjedR8DdpNMfgYqf0='";
 
 constexpr std::string_view script = R"zoom(
 "use strict";
@@ -29,6 +29,20 @@ for (const place of document.querySelectorAll(".zoom")) {
     const utc = new Date(seconds * 1e3);
     return new Date((seconds + data.offset * 60 + utc.getTimezoneOffset() * 60) * 1e3);
   };
+  const two = (number) => String(number).padStart(2, "0");
+  const clock = (seconds) => {
+    const at = shifted(seconds);
+    return two(at.getHours()) + ":" + two(at.getMinutes());
+  };
+  const day = (seconds) => {
+    const at = shifted(seconds);
+    return at.getFullYear() + "-" + two(at.getMonth() + 1) + "-" + two(at.getDate());
+  };
+  const moment = (seconds) => day(seconds) + " " + clock(seconds) + ":" + two(shifted(seconds).getSeconds());
+  const ticks = (_, splits) => splits.map((at, index) => {
+    const isNewDay = index === 0 || day(at) !== day(splits[index - 1]);
+    return isNewDay ? clock(at) + "\n" + day(at) : clock(at);
+  });
   const drawLevels = (plot) => {
     const pen = plot.ctx;
     pen.save();
@@ -49,26 +63,35 @@ for (const place of document.querySelectorAll(".zoom")) {
     }
     pen.restore();
   };
-  const line = (label, color, isMark) => ({
+  const line = (label, color, values, isMark) => ({
     label,
     stroke: color,
     width: isMark ? 0 : 1,
     paths: isMark ? () => null : undefined,
     points: isMark ? { show: true, size: 6, fill: color } : { size: 4 },
-    value: (_, value) => (value === null ? "\u2013" : value.toFixed(data.decimals)),
+    value: (plot, _, series, index) =>
+      index === null || values[index] === null ? "\u2013" : values[index].toFixed(data.decimals),
   });
   const options = {
-    width: place.clientWidth,
+    title: data.title,
+    width: Math.min(place.clientWidth, 960),
     height: 320,
-    tzDate: shifted,
     scales: { x: { time: data.time }, y: { range: () => [data.low, data.high] } },
-    series: [data.time ? {} : { label: "Result" }, line("OK", "#28618d", false), line("NG", "#b42318", true)],
-    axes: [{}, { label: data.name, size: 70 }],
+    series: [
+      data.time ? { label: "Time", value: (_, at) => (at === null ? "\u2013" : moment(at)) } : { label: "Result" },
+      line("OK", "#28618d", data.ok, false),
+      line("NG", "#b42318", data.ng, true),
+    ],
+    axes: [data.time ? { values: ticks } : {}, { label: data.name, size: 70 }],
     hooks: { draw: [drawLevels] },
   };
   place.classList.add("zoom-on");
-  const plot = new uPlot(options, [data.x, data.ok, data.ng], target);
-  window.addEventListener("resize", () => plot.setSize({ width: place.clientWidth, height: 320 }));
+  // What lies outside of the scale stands at its edge; the legend has the value.
+  const atEdge = (value) => (value === null ? null : Math.min(Math.max(value, data.low), data.high));
+  const plot = new uPlot(options, [data.x, data.ok, data.ng.map(atEdge)], target);
+  window.addEventListener("resize", () => {
+    plot.setSize({ width: Math.min(place.clientWidth, 960), height: 320 });
+  });
 }
 )zoom";
 
@@ -91,6 +114,14 @@ std::vector<chart::Sample> thinned(std::span<const chart::Sample> samples) {
       }
       if (least == part.size() || part[at].value < part[least].value) least = at;
       if (most == part.size() || part[at].value > part[most].value) most = at;
+    }
+    // A pause stays one: what is no number ends the line.
+    const bool is_interrupted = std::any_of(
+        part.begin(), part.end(), [](const chart::Sample& each) { return each.is_first; });
+    if (is_interrupted && !kept.empty()) {
+      chart::Sample nothing = kept.back();
+      nothing.value = std::nan("");
+      kept.push_back(nothing);
     }
     std::vector<std::size_t> chosen = {least, most, ng};
     std::sort(chosen.begin(), chosen.end());
@@ -155,9 +186,9 @@ std::string data_of(const chart::RunChart& chart) {
   };
   const std::string unit = chart.quantity.unit.empty() ? "" : ", " + chart.quantity.unit;
   return fmt::format(
-      R"({{"time":{},"offset":{},"decimals":{},"name":{},"low":{:.6f},"high":{:.6f},"levels":{},"x":{},"ok":{},"ng":{}}})",
-      is_time, chart.course.utc_offset_minutes, chart.quantity.decimals,
-      text_of(chart.quantity.name + unit), low, high,
+      R"({{"title":{},"time":{},"offset":{},"decimals":{},"name":{},"low":{:.6f},"high":{:.6f},"levels":{},"x":{},"ok":{},"ng":{}}})",
+      text_of(chart.caption.title), is_time, chart.course.utc_offset_minutes,
+      chart.quantity.decimals, text_of(chart.quantity.name + unit), low, high,
       list_of(chart.levels,
               [&](const chart::Level& level) {
                 return fmt::format(R"({{"value":{:.6f},"limit":{},"from":{},"to":{}}})",

@@ -159,6 +159,12 @@ Completeness completeness_of(std::int64_t code, const ProductFacts& product) {
   return Completeness::unclear;
 }
 
+/// The target torque that an event was made with; a tool that says 0 does not say it.
+std::optional<std::int64_t> target_of(const store::EventView& event) {
+  const auto& target = event.columns[Column::target_torque];
+  return target.value_or(0) > 0 ? target : std::nullopt;
+}
+
 bool is_measurement(const StudiedResult& result, const StudyOptions& options) {
   if (result.is_excluded) return false;
   if (result.completeness == Completeness::not_completed) return options.include_not_completed;
@@ -320,7 +326,7 @@ class Study::ToolCourse {
   const store::PresetSettings* settings_of(const store::EventView& event) {
     const auto& preset = event.columns[Column::preset];
     if (!preset) return nullptr;
-    const auto& target = event.columns[Column::target_torque];
+    const auto target = target_of(event);
     const auto& all = settings_of(*preset);
     const auto fits = [&](const store::PresetSettings* row) {
       const auto& own = (*row)[Setting::target_torque];
@@ -345,7 +351,7 @@ class Study::ToolCourse {
   Stratum& stratum_of(const store::EventView& event, const store::Place& place,
                       const ProductFacts& product) {
     const store::PresetSettings* settings = settings_of(event);
-    auto target = event.columns[Column::target_torque];
+    auto target = target_of(event);
     if (!target && settings != nullptr) target = (*settings)[Setting::target_torque];
     auto& of_preset = strata[event.columns[Column::preset]];
     if (!of_preset.empty()) {
@@ -378,7 +384,8 @@ class Study::ToolCourse {
 
   void count(const store::EventView& event, bool is_ok, const ProductFacts& product,
              StudiedResult& result, Stratum& stratum) {
-    if (event.remembered) ++stratum.of_unknown_age;
+    const bool was_fetched = event.source == "catch-up" && !event.tool_time;
+    if (event.remembered || was_fetched) ++stratum.of_unknown_age;
     result.is_excluded = exclude(event);
     if (result.is_excluded) ++stratum.excluded;
     if (is_ok) {

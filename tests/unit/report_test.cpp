@@ -199,6 +199,31 @@ TEST_CASE("a page needs nothing else, and what comes from outside is text") {
   CHECK(contains(page, "VDI/VDE 2645-2"));
 }
 
+TEST_CASE("a page that zooms has two scripts, whatever a unit is called") {
+  Told told;
+  told.options.interactive = true;
+  told.bench.facts.places.front().torque_unit = "</script><script>alert(1)</script>";
+  told.add(60);
+  const std::string page = told.page();
+  std::size_t scripts = 0;
+  for (auto at = page.find("<script>"); at != std::string::npos;
+       at = page.find("<script>", at + 1)) {
+    ++scripts;
+  }
+  CHECK(scripts == 2);
+  CHECK_FALSE(contains(page, "</script><script>alert"));
+  CHECK(contains(page, "script-src 'sha256-"));
+  CHECK_FALSE(contains(page, "script-src 'unsafe"));
+}
+
+TEST_CASE("what a product does not measure is not told") {
+  Told told;
+  told.add(40);
+  for (auto& event : told.bench.events) event.columns[Column::a3] = std::nullopt;
+  CHECK_FALSE(contains(told.text(), "angle a3"));
+  CHECK_FALSE(contains(told.page(), "angle a3"));
+}
+
 TEST_CASE("many strata are small charts, and the page says which stand in full") {
   Told told;
   for (std::int64_t preset = 1; preset <= 20; ++preset) {

@@ -212,6 +212,16 @@ TEST_CASE("settings that were read just behind a result are those that it was ma
   CHECK(limits_text(strata.front()->limits[Quantity::torque]) == Texts{"2.576", "3.024"});
 }
 
+TEST_CASE("a target torque of 0 is none") {
+  Bench bench;
+  bench.facts.settings = {settings(0, 271, 10)};
+  bench.result(1, 271);
+  bench.result(2, 90, 333).columns[Column::target_torque] = 0;
+  bench.result(3, 271);
+  Study study = study_of(bench);
+  CHECK(strata_of(study, bench).size() == 1);
+}
+
 TEST_CASE("a result is taken out by its name only, and stays in the yield") {
   Bench bench;
   bench.exclusions = {{.serial = "42", .epoch = 0, .number = 2, .reason = "test screw"},
@@ -238,7 +248,10 @@ TEST_CASE("the resolution is that of the tool") {
 TEST_CASE("results of unknown age are counted") {
   Bench bench;
   bench.result(1, 271).remembered = true;
-  bench.result(2, 271);
+  bench.result(2, 271).source = "catch-up";
+  bench.result(3, 271).source = "catch-up";
+  bench.events.back().tool_time = bench_second(3);
+  bench.result(4, 271).source = "push";
   Study study = study_of(bench);
-  CHECK(strata_of(study, bench).front()->of_unknown_age == 1);
+  CHECK(strata_of(study, bench).front()->of_unknown_age == 2);
 }
