@@ -117,7 +117,7 @@ TEST_CASE("a shift of today is seen against the baseline, not hidden in new limi
 TEST_CASE("one limit has an index of its own, and none of two sides") {
   Told told;
   told.bench.options.limits[Quantity::torque] =
-      GivenLimits{.lower = std::nullopt, .upper = Decimal(28, -1)};
+      files::JointLimits{.lower = std::nullopt, .upper = Decimal(28, -1)};
   told.add(60);
   const statistics::Indices indices = told.torque().performance;
   CHECK(indices.index->name == statistics::IndexName::ppu);
@@ -271,9 +271,10 @@ TEST_CASE("requirements that cannot be read are refused") {
 TEST_CASE("limits and exclusions that cannot be read are refused") {
   for (const char* text : {"2.44", ":", "2.98:2.44", "a:b", "1:2:3"}) {
     CAPTURE(text);
-    CHECK_FALSE(study_options_of({.limits = text}));
+    CHECK_FALSE(study_options_of({.limits = text}, {}));
   }
-  CHECK(study_options_of({.limits = "2.44:"})->limits[Quantity::torque]->lower == Decimal(244, -2));
+  CHECK(study_options_of({.limits = "2.44:"}, {})->limits[Quantity::torque]->lower ==
+        Decimal(244, -2));
   CHECK_FALSE(exclusions_of({.excluded = {"42/0/1"}}));
   CHECK_FALSE(exclusions_of({.excluded = {"42/0"}, .reasons = {"x"}}));
   CHECK_FALSE(exclusions_of({.excluded = {"/0/1"}, .reasons = {"x"}}));
