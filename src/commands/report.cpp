@@ -119,7 +119,7 @@ Summary summary_of(const Assessed& assessed, const ReportOptions& options) {
 Result<Outcome> report(const ReportOptions& options, Context& context) {
   const auto requirements = read_requirements(options.required);
   if (!requirements) return tl::unexpected(requirements.error());
-  const auto study_options = study_options_of(options);
+  const auto study_options = study_options_of(options, context.tools);
   if (!study_options) return tl::unexpected(study_options.error());
   auto exclusions = exclusions_of(options);
   if (!exclusions) return tl::unexpected(std::move(exclusions.error()));

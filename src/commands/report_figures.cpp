@@ -41,7 +41,8 @@ std::string subject_name(const Stratum& stratum, const work::Study& study) {
 }
 
 std::string origin_word(const work::QuantityLimits& limits) {
-  return limits.origin == work::LimitsOrigin::tool ? "tool's own" : "given";
+  if (limits.origin == work::LimitsOrigin::tool) return "tool's own";
+  return limits.origin == work::LimitsOrigin::file ? "tools file" : "given";
 }
 
 /// Specification limits and target.

@@ -149,27 +149,11 @@ Result<void> take(Result<T> from, T& into) {
   return std::move(from).map([&](T value) { into = std::move(value); });
 }
 
-Result<work::GivenLimits> read_limits(std::string_view option, const std::string& text) {
-  const auto refuse = [&] {
-    return tl::unexpected(bad_option(option, fmt::format("'{}' are no limits", text),
-                                     "write LOWER:UPPER, such as 2.44:2.98, or one of the two"));
-  };
-  const auto parts = split(text, ':');
-  if (parts.size() != 2) return refuse();
-  work::GivenLimits limits;
-  for (const bool is_lower : {true, false}) {
-    const std::string_view part = parts[is_lower ? 0 : 1];
-    if (part.empty()) continue;
-    const auto limit = Decimal::parse(part);
-    if (!limit) return refuse();
-    (is_lower ? limits.lower : limits.upper) = *limit;
-  }
-  if (!limits.lower && !limits.upper) return refuse();
-  if (limits.lower && limits.upper && *limits.lower >= *limits.upper) {
-    return tl::unexpected(
-        bad_option(option, "the upper limit is not above the lower one", "write LOWER:UPPER"));
-  }
-  return limits;
+Result<files::JointLimits> read_limits(std::string_view option, const std::string& text) {
+  const auto limits = files::parse_limits(text);
+  if (limits) return *limits;
+  return tl::unexpected(bad_option(option, fmt::format("'{}' are no limits", text),
+                                   "write LOWER:UPPER, such as 2.44:2.98, or one of the two"));
 }
 
 }  // namespace
@@ -196,20 +180,24 @@ Result<ReportSelection> select_for_report(const ReportOptions& options, store::R
   return selection;
 }
 
-Result<work::StudyOptions> study_options_of(const ReportOptions& options) {
+Result<work::StudyOptions> study_options_of(const ReportOptions& options,
+                                            const files::Tools& tools) {
   work::StudyOptions study{.shift_break = options.shift_break,
                            .include_not_completed = options.include_not_completed,
                            .preset = options.preset};
+  for (const files::Tool& tool : tools.tools) {
+    for (const auto& [preset, limits] : tool.limits) study.joints[{tool.name, preset}] = limits;
+  }
   const auto add = [&](std::string_view option, const std::string& text,
                        Quantity quantity) -> Result<void> {
     if (text.empty()) return {};
-    return read_limits(option, text).map([&](work::GivenLimits limits) {
+    return read_limits(option, text).map([&](const files::JointLimits& limits) {
       study.limits[quantity] = limits;
     });
   };
   return add("--limits", options.limits, Quantity::torque)
       .and_then([&] { return add("--angle-limits", options.angle_limits, Quantity::angle); })
-      .map([&] { return study; });
+      .map([&] { return std::move(study); });
 }
 
 Result<std::vector<work::Exclusion>> exclusions_of(const ReportOptions& options) {

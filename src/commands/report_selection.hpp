@@ -22,7 +22,8 @@ Result<ReportSelection> select_for_report(const ReportOptions& options, store::R
                                           Context& context);
 
 /// The study that the options mean. Errors: `usage`.
-Result<work::StudyOptions> study_options_of(const ReportOptions& options);
+Result<work::StudyOptions> study_options_of(const ReportOptions& options,
+                                            const files::Tools& tools);
 Result<std::vector<work::Exclusion>> exclusions_of(const ReportOptions& options);
 
 }  // namespace spindle::commands

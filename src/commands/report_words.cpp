@@ -111,6 +111,8 @@ std::string origin_of(const work::QuantityLimits& limits, const Stratum& stratum
   switch (limits.origin) {
     case work::LimitsOrigin::given:
       return "given";
+    case work::LimitsOrigin::file:
+      return "of the tools file";
     case work::LimitsOrigin::tool:
       return fmt::format("tool's own, read {}",
                          zone.beside(stratum.facts.settings->since, stratum.results.front().at));

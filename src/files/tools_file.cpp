@@ -10,6 +10,7 @@
 #include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
 #include "spindle/base/duration.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/files/profile_store.hpp"
 
 namespace spindle::files {
@@ -97,6 +98,27 @@ void read_verified(const YamlNode& node, Tool& tool, const Asked& asked) {
   tool.verified = read_words(node, asked.findings);
 }
 
+void read_limits(const YamlNode& node, Tool& tool, const Asked& asked) {
+  constexpr std::uint64_t last_preset = 65'535;
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) {
+    const auto preset = parse_unsigned(entry.key, last_preset);
+    if (!preset) {
+      asked.findings.add(entry.key_at, fmt::format("'{}' is no number of a preset", entry.key));
+    }
+    const auto text = to_text(entry.value, asked.findings);
+    if (!text) continue;
+    const auto limits = parse_limits(*text);
+    if (!limits) {
+      asked.findings.add(
+          entry.value.at,
+          fmt::format("'{}' are no limits; write \"2.44:2.98\", or one of the two", *text));
+    } else if (preset) {
+      tool.limits[static_cast<std::int64_t>(*preset)] = *limits;
+    }
+  }
+}
+
 constexpr Field<Tool> tool_fields[] = {
     field<&Tool::url>("url", Need::required),
     field<&Tool::profile>("profile"),
@@ -106,6 +128,7 @@ constexpr Field<Tool> tool_fields[] = {
     custom("retries", Need::optional, "number 0..100", read_retries),
     word<modbus::transaction_words, &Tool::transactions>("transaction"),
     custom("verified", Need::optional, "list of text", read_verified),
+    custom("limits", Need::optional, "map of preset to text", read_limits),
 };
 
 Tool read_tool(const YamlEntry& entry, Diagnostics& findings) {
@@ -193,6 +216,21 @@ Error refusal_of(const Diagnostics& findings) {
 }
 
 }  // namespace
+
+std::optional<JointLimits> parse_limits(std::string_view text) {
+  const auto parts = split(text, ':');
+  if (parts.size() != 2 || text.size() == 1) return std::nullopt;
+  JointLimits limits;
+  for (const bool is_lower : {true, false}) {
+    const std::string_view part = parts[is_lower ? 0 : 1];
+    if (part.empty()) continue;
+    auto& limit = is_lower ? limits.lower : limits.upper;
+    limit = Decimal::parse(part);
+    if (!limit) return std::nullopt;
+  }
+  if (limits.lower && limits.upper && *limits.lower >= *limits.upper) return std::nullopt;
+  return limits;
+}
 
 bool may_name_tools(std::string_view word) { return word.starts_with('@') || is_tool_name(word); }
 

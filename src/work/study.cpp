@@ -90,10 +90,15 @@ QuantityLimits angle_limits(const StratumFacts& facts) {
   return limits;
 }
 
-PerQuantity<QuantityLimits> limits_of(const StratumFacts& facts, const StudyOptions& options) {
+PerQuantity<QuantityLimits> limits_of(const StratumFacts& facts, const std::string& target,
+                                      const StudyOptions& options) {
   PerQuantity<QuantityLimits> limits;
   for (const Quantity quantity : quantities) {
     limits[quantity] = quantity == Quantity::torque ? torque_limits(facts) : angle_limits(facts);
+    const auto joint = options.joints.find({target, facts.preset.value_or(-1)});
+    if (quantity == Quantity::torque && joint != options.joints.end()) {
+      limits[quantity] = {joint->second.lower, joint->second.upper, LimitsOrigin::file, {}};
+    }
     const auto& given = options.limits[quantity];
     if (given) {
       limits[quantity] = {given->lower, given->upper, LimitsOrigin::given, {}};
@@ -372,7 +377,7 @@ class Study::ToolCourse {
                       .settings = settings != nullptr ? std::optional(*settings) : std::nullopt,
                       .firmware = place.firmware,
                       .torque_unit = place.torque_unit};
-    stratum->limits = limits_of(stratum->facts, study_->options_);
+    stratum->limits = limits_of(stratum->facts, place.name, study_->options_);
     stratum->steps = product.steps;
     if (!of_preset.empty()) {
       stratum->change =
@@ -432,7 +437,7 @@ class Study::ToolCourse {
 };
 
 Study::Study(const StoreFacts& facts, StudyOptions options, std::vector<Exclusion> exclusions)
-    : facts_(&facts), options_(options), exclusions_(std::move(exclusions)) {
+    : facts_(&facts), options_(std::move(options)), exclusions_(std::move(exclusions)) {
   for (const store::Gap& gap : facts.gaps) {
     auto& course = courses_[gap.tool];
     if (!course) course = std::make_unique<ToolCourse>(gap.tool, *this);

@@ -26,7 +26,7 @@ bool contains(std::string_view text, std::string_view part) {
 }
 
 /// A report on what is added to a bench.
-struct Told {
+struct Printed {
   Bench bench = {};
   ReportOptions options = {};
 
@@ -77,71 +77,71 @@ struct Told {
 }  // namespace
 
 TEST_CASE("one aborted rundown does not ruin Ppk") {
-  Told told;
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  told.add(100);
-  const double before = told.torque().performance.index->value;
-  told.bench.result(101, 135, 333);
-  CHECK(told.torque().performance.index->value == before);
-  CHECK(contains(told.text(), "not completed and left out of the statistics: 1 (E333 1)"));
-  told.bench.options.include_not_completed = true;
-  CHECK(told.torque().performance.index->value < 1);
-  CHECK(contains(told.text(), "not completed, yet in the statistics as you asked: 1 (E333 1)"));
+  Printed printed;
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  printed.add(100);
+  const double before = printed.torque().performance.index->value;
+  printed.bench.result(101, 135, 333);
+  CHECK(printed.torque().performance.index->value == before);
+  CHECK(contains(printed.text(), "not completed and left out of the statistics: 1 (E333 1)"));
+  printed.bench.options.include_not_completed = true;
+  CHECK(printed.torque().performance.index->value < 1);
+  CHECK(contains(printed.text(), "not completed, yet in the statistics as you asked: 1 (E333 1)"));
 }
 
 TEST_CASE("what the limits rejected is in the index") {
-  Told told;
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  told.add(100);
-  const double before = told.torque().performance.index->value;
-  told.bench.result(101, 300, 335);
-  CHECK(told.torque().moments.count() == 101);
-  CHECK(told.torque().performance.index->value < before / 2);
+  Printed printed;
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  printed.add(100);
+  const double before = printed.torque().performance.index->value;
+  printed.bench.result(101, 300, 335);
+  CHECK(printed.torque().moments.count() == 101);
+  CHECK(printed.torque().performance.index->value < before / 2);
 }
 
 TEST_CASE("a shift of today is seen against the baseline, not hidden in new limits") {
-  Told told;
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  told.add(200);
-  const statistics::ControlLimits before = told.torque().chart->limits;
-  told.add(40, 276, 201);
-  const statistics::Assessment after = told.torque();
+  Printed printed;
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  printed.add(200);
+  const statistics::ControlLimits before = printed.torque().chart->limits;
+  printed.add(40, 276, 201);
+  const statistics::Assessment after = printed.torque();
   CHECK(after.chart->limits.baseline.count < 200);
   CHECK(after.chart->limits.upper == before.upper);
   CHECK(after.chart->limits.upper != doctest::Approx(2.981));
   CHECK(after.chart->stability.verdict == statistics::Verdict::unstable);
   CHECK_FALSE(after.capability);
-  CHECK(contains(told.page(), "baseline: "));
+  CHECK(contains(printed.page(), "baseline: "));
 }
 
 TEST_CASE("one limit has an index of its own, and none of two sides") {
-  Told told;
-  told.bench.options.limits[Quantity::torque] =
-      GivenLimits{.lower = std::nullopt, .upper = Decimal(28, -1)};
-  told.add(60);
-  const statistics::Indices indices = told.torque().performance;
+  Printed printed;
+  printed.bench.options.limits[Quantity::torque] =
+      files::JointLimits{.lower = std::nullopt, .upper = Decimal(28, -1)};
+  printed.add(60);
+  const statistics::Indices indices = printed.torque().performance;
   CHECK(indices.index->name == statistics::IndexName::ppu);
   CHECK_FALSE(indices.centred);
-  CHECK(contains(told.text(), "limits up to 2.8 (given)"));
-  CHECK(contains(told.text(), "one limit"));
-  CHECK(contains(told.page(), "Ppu"));
+  CHECK(contains(printed.text(), "limits up to 2.8 (given)"));
+  CHECK(contains(printed.text(), "one limit"));
+  CHECK(contains(printed.page(), "Ppu"));
 }
 
 TEST_CASE("few values, no limits and a coarse resolution are said") {
-  Told told;
-  told.add(29);
-  CHECK(contains(told.text(), "no limits (the settings of the preset were not read)"));
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  CHECK(contains(told.text(), "only 29 values, 30 are needed"));
-  told.bench.events.clear();
-  for (std::int64_t at = 1; at <= 60; ++at) told.bench.result(at, 271 + (at % 9 == 0 ? 1 : 0));
-  CHECK(contains(told.text(), "too coarse"));
-  CHECK(contains(told.page(), "too coarse"));
+  Printed printed;
+  printed.add(29);
+  CHECK(contains(printed.text(), "no limits (the settings of the preset were not read)"));
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  CHECK(contains(printed.text(), "only 29 values, 30 are needed"));
+  printed.bench.events.clear();
+  for (std::int64_t at = 1; at <= 60; ++at) printed.bench.result(at, 271 + (at % 9 == 0 ? 1 : 0));
+  CHECK(contains(printed.text(), "too coarse"));
+  CHECK(contains(printed.page(), "too coarse"));
 }
 
-TEST_CASE("what was missed and what was taken out is told everywhere") {
-  Told told;
-  told.bench.facts.gaps = {{.tool = 1,
+TEST_CASE("what was missed and what was taken out is printed everywhere") {
+  Printed printed;
+  printed.bench.facts.gaps = {{.tool = 1,
                             .after = 10,
                             .before = 15,
                             .missed = 4,
@@ -149,12 +149,12 @@ TEST_CASE("what was missed and what was taken out is told everywhere") {
                             .began = bench_second(10),
                             .ended = bench_second(15),
                             .reason = "link lost"}};
-  told.bench.exclusions = {{.serial = "42", .epoch = 0, .number = 3, .reason = "test <screw>"}};
-  told.add(10);
-  told.add(20, 271, 15);
-  CHECK(contains(told.text(), "missed 4 or more"));
-  CHECK(contains(told.text(), "excluded: 42/0/3: test <screw> (torque 2.70, angle 6310)"));
-  const std::string page = told.page();
+  printed.bench.exclusions = {{.serial = "42", .epoch = 0, .number = 3, .reason = "test <screw>"}};
+  printed.add(10);
+  printed.add(20, 271, 15);
+  CHECK(contains(printed.text(), "missed 4 or more"));
+  CHECK(contains(printed.text(), "excluded: 42/0/3: test <screw> (torque 2.70, angle 6310)"));
+  const std::string page = printed.page();
   CHECK(contains(page, "4 or more"));
   CHECK(contains(page, "link lost"));
   CHECK(contains(page, "Excluded by hand: 42/0/3"));
@@ -162,32 +162,32 @@ TEST_CASE("what was missed and what was taken out is told everywhere") {
 }
 
 TEST_CASE("times have a zone") {
-  Told told;
-  told.add(30);
-  CHECK(contains(told.text(), "UTC+01:00"));
-  CHECK(contains(told.page(), "UTC+01:00"));
+  Printed printed;
+  printed.add(30);
+  CHECK(contains(printed.text(), "UTC+01:00"));
+  CHECK(contains(printed.page(), "UTC+01:00"));
 }
 
-TEST_CASE("Cmk is told only when it was asked for, with its condition") {
-  Told told;
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  told.add(100);
-  CHECK_FALSE(contains(told.text(), "Cmk"));
-  CHECK_FALSE(contains(told.page(), "Cmk"));
-  told.options.machine = MachineStudy::yes;
-  CHECK(contains(told.text(), "Cmk"));
-  CHECK(contains(told.page(), "no test by VDI/VDE 2645-2"));
+TEST_CASE("Cmk is printed only when it was asked for, with its condition") {
+  Printed printed;
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  printed.add(100);
+  CHECK_FALSE(contains(printed.text(), "Cmk"));
+  CHECK_FALSE(contains(printed.page(), "Cmk"));
+  printed.options.machine = MachineStudy::yes;
+  CHECK(contains(printed.text(), "Cmk"));
+  CHECK(contains(printed.page(), "no test by VDI/VDE 2645-2"));
 }
 
 TEST_CASE("a page needs nothing else, and what comes from outside is text") {
-  Told told;
-  told.bench.facts.places.front().name = "<script>alert(1)</script>\"'&";
-  told.bench.facts.tools.front().name.serial = "</style><img onerror=y>";
-  told.bench.facts.places.front().torque_unit = "<b>";
-  told.bench.facts.settings = {settings(0, 271, 10)};
-  told.add(60);
-  told.bench.result(100, 260, 335);
-  const std::string page = told.page();
+  Printed printed;
+  printed.bench.facts.places.front().name = "<script>alert(1)</script>\"'&";
+  printed.bench.facts.tools.front().name.serial = "</style><img onerror=y>";
+  printed.bench.facts.places.front().torque_unit = "<b>";
+  printed.bench.facts.settings = {settings(0, 271, 10)};
+  printed.add(60);
+  printed.bench.result(100, 260, 335);
+  const std::string page = printed.page();
   CHECK_FALSE(contains(page, "<script"));
   CHECK_FALSE(contains(page, "<img"));
   CHECK_FALSE(contains(page, "<b>"));
@@ -200,11 +200,11 @@ TEST_CASE("a page needs nothing else, and what comes from outside is text") {
 }
 
 TEST_CASE("a page that zooms has two scripts, whatever a unit is called") {
-  Told told;
-  told.options.interactive = true;
-  told.bench.facts.places.front().torque_unit = "</script><script>alert(1)</script>";
-  told.add(60);
-  const std::string page = told.page();
+  Printed printed;
+  printed.options.interactive = true;
+  printed.bench.facts.places.front().torque_unit = "</script><script>alert(1)</script>";
+  printed.add(60);
+  const std::string page = printed.page();
   std::size_t scripts = 0;
   for (auto at = page.find("<script>"); at != std::string::npos;
        at = page.find("<script>", at + 1)) {
@@ -216,40 +216,40 @@ TEST_CASE("a page that zooms has two scripts, whatever a unit is called") {
   CHECK_FALSE(contains(page, "script-src 'unsafe"));
 }
 
-TEST_CASE("what a product does not measure is not told") {
-  Told told;
-  told.add(40);
-  for (auto& event : told.bench.events) event.columns[Column::a3] = std::nullopt;
-  CHECK_FALSE(contains(told.text(), "angle a3"));
-  CHECK_FALSE(contains(told.page(), "angle a3"));
+TEST_CASE("what a product does not measure is not printed") {
+  Printed printed;
+  printed.add(40);
+  for (auto& event : printed.bench.events) event.columns[Column::a3] = std::nullopt;
+  CHECK_FALSE(contains(printed.text(), "angle a3"));
+  CHECK_FALSE(contains(printed.page(), "angle a3"));
 }
 
 TEST_CASE("many strata are small charts, and the page says which stand in full") {
-  Told told;
+  Printed printed;
   for (std::int64_t preset = 1; preset <= 20; ++preset) {
     for (std::int64_t i = 0; i < 30; ++i) {
-      told.bench.result(preset * 100 + i, 271 + i % 3).columns[Column::preset] = preset;
+      printed.bench.result(preset * 100 + i, 271 + i % 3).columns[Column::preset] = preset;
     }
   }
-  const std::string page = told.page();
+  const std::string page = printed.page();
   CHECK(contains(page, "Drawn in full: the 6 of 20 tools and presets with most results"));
   CHECK(contains(page, "Other tools and presets"));
   CHECK(page.size() < 600'000);
 }
 
 TEST_CASE("requirements are met by the index, or by its lower bound") {
-  Told told;
-  told.bench.facts.settings = {settings(0, 271, 3)};
-  told.add(100);
-  const statistics::Index index = *told.torque().performance.index;
+  Printed printed;
+  printed.bench.facts.settings = {settings(0, 271, 3)};
+  printed.add(100);
+  const statistics::Index index = *printed.torque().performance.index;
   REQUIRE(index.low < index.value);
-  told.options.required = {fmt::format("ppk={:.3f}", index.value - 0.01), "yield=100%"};
-  CHECK(told.unmet().empty());
-  told.options.required_of = RequiredOf::lower_bound;
-  CHECK(told.unmet().size() == 2);
-  told.options.required = {"ppk=1.0", "angle.ppk=0.1", "pp=0.1"};
-  told.options.required_of = RequiredOf::index;
-  const auto unmet = told.unmet();
+  printed.options.required = {fmt::format("ppk={:.3f}", index.value - 0.01), "yield=100%"};
+  CHECK(printed.unmet().empty());
+  printed.options.required_of = RequiredOf::lower_bound;
+  CHECK(printed.unmet().size() == 2);
+  printed.options.required = {"ppk=1.0", "angle.ppk=0.1", "pp=0.1"};
+  printed.options.required_of = RequiredOf::index;
+  const auto unmet = printed.unmet();
   REQUIRE(unmet.size() == 1);
   CHECK(unmet.front() == "station3 preset 1: angle.ppk=0.1 is not met: it cannot be judged");
 }
@@ -271,9 +271,10 @@ TEST_CASE("requirements that cannot be read are refused") {
 TEST_CASE("limits and exclusions that cannot be read are refused") {
   for (const char* text : {"2.44", ":", "2.98:2.44", "a:b", "1:2:3"}) {
     CAPTURE(text);
-    CHECK_FALSE(study_options_of({.limits = text}));
+    CHECK_FALSE(study_options_of({.limits = text}, {}));
   }
-  CHECK(study_options_of({.limits = "2.44:"})->limits[Quantity::torque]->lower == Decimal(244, -2));
+  CHECK(study_options_of({.limits = "2.44:"}, {})->limits[Quantity::torque]->lower ==
+        Decimal(244, -2));
   CHECK_FALSE(exclusions_of({.excluded = {"42/0/1"}}));
   CHECK_FALSE(exclusions_of({.excluded = {"42/0"}, .reasons = {"x"}}));
   CHECK_FALSE(exclusions_of({.excluded = {"/0/1"}, .reasons = {"x"}}));

@@ -175,7 +175,17 @@ TEST_CASE("limits are the tool's own as they were read, or those given") {
     CHECK(limits_text(stratum.limits[Quantity::angle]) == Texts{"5900", "none"});
     CHECK(stratum.facts.settings->since == bench_second(0));
   }
-  bench.options.limits[Quantity::torque] = GivenLimits{.lower = Decimal(25, -1), .upper = {}};
+  bench.options.joints[{"station3", 2}] = {.lower = Decimal(1), .upper = Decimal(2)};
+  bench.options.joints[{"station3", 1}] = {.lower = Decimal(26, -1), .upper = Decimal(29, -1)};
+  {
+    Study study = study_of(bench);
+    const Stratum& stratum = *strata_of(study, bench).front();
+    CHECK(limits_text(stratum.limits[Quantity::torque]) == Texts{"2.6", "2.9"});
+    CHECK(stratum.limits[Quantity::torque].origin == LimitsOrigin::file);
+    CHECK(limits_text(stratum.limits[Quantity::angle]) == Texts{"5900", "none"});
+  }
+  bench.options.limits[Quantity::torque] =
+      files::JointLimits{.lower = Decimal(25, -1), .upper = {}};
   Study study = study_of(bench);
   const Stratum& stratum = *strata_of(study, bench).front();
   CHECK(limits_text(stratum.limits[Quantity::torque]) == Texts{"2.5", "none"});

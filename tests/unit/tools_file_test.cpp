@@ -81,6 +81,18 @@ TEST_CASE("all torque units of the manual's family are known") {
   }
 }
 
+TEST_CASE("limits are those of joints, by preset") {
+  const ToolsFile file("tools: {a: {url: u, limits: {1: \"2.44:2.98\", 12: \"1.4:\"}}}\n");
+  const auto tools = load_tools(file.path(), posix::source_disk());
+  REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
+  const auto& limits = tools->tools[0].limits;
+  REQUIRE(limits.size() == 2);
+  CHECK(limits.at(1).lower == Decimal(244, -2));
+  CHECK(limits.at(1).upper == Decimal(298, -2));
+  CHECK(limits.at(12).lower == Decimal(14, -1));
+  CHECK_FALSE(limits.at(12).upper);
+}
+
 TEST_CASE("faults are told with their place") {
   struct Row {
     const char* text;
@@ -97,6 +109,11 @@ TEST_CASE("faults are told with their place") {
       {"tools:\n  a: {url: x}\n  a: {url: y}\n", "3:3: key 'a' is given twice"},
       {"tools:\n  a: {url: x, torque-unit: Nm}\n",
        "2:28: unknown torque unit 'Nm'; did you mean 'N.m'?"},
+      {"tools:\n  a: {url: x, limits: {1: \"3:2\"}}\n",
+       "2:27: '3:2' are no limits; write \"2.44:2.98\", or one of the two"},
+      {"tools:\n  a: {url: x, limits: {one: \"2:3\"}}\n", "2:24: 'one' is no number of a preset"},
+      {"tools:\n  a: {url: x, limits: \"2:3\"}\n",
+       "2:23: a mapping of keys to values is expected here, not a single value"},
       {"tools:\n  a: {url: x, verified: start}\n",
        "2:25: a list is expected here, not a single value"},
       {"tools:\n  a: {url: x, verified: [start, start]}\n", "2:33: 'start' is given twice"},

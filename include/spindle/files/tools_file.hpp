@@ -7,12 +7,23 @@
 #include <vector>
 
 #include "spindle/base/clock.hpp"
+#include "spindle/base/decimal.hpp"
 #include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::files {
+
+/// Between which a joint's torque has to lie, in the tool's unit. One of the two may be missing.
+struct JointLimits {
+  std::optional<Decimal> lower = std::nullopt;
+  std::optional<Decimal> upper = std::nullopt;
+};
+
+/// Reads "2.44:2.98", "2.44:" or ":2.98". Empty for anything else, and where the upper one is not
+/// above the lower one.
+std::optional<JointLimits> parse_limits(std::string_view text);
 
 /// One named tool of the tools file (contract, section 2.1).
 struct Tool {
@@ -27,6 +38,8 @@ struct Tool {
   std::optional<std::uint32_t> retries = std::nullopt;  ///< of reads; likewise
   std::optional<modbus::TransactionIds> transactions = std::nullopt;  ///< tcp; likewise
   std::vector<std::string> verified = {};  ///< actions that were checked on this tool
+  std::vector<std::string> verified = {};               ///< actions that were checked on this tool
+  std::map<std::int64_t, JointLimits> limits = {};      ///< of the joints, by preset
   SourceLocation url_at = {};
   SourceLocation profile_at = {};
   SourceLocation verified_at = {};

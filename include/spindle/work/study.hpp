@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "spindle/base/decimal.hpp"
 #include "spindle/catalogue/profile.hpp"
+#include "spindle/files/tools_file.hpp"
 #include "spindle/store/rows.hpp"
 
 /// Results of a store, sorted into what may be judged together. Says nothing of statistics.
@@ -68,6 +70,7 @@ struct StudiedResult {
 enum class LimitsOrigin : std::uint8_t {
   none,   ///< there are no limits
   tool,   ///< those by which the tool itself judges
+  file,   ///< those of the joint, by the tools file
   given,  ///< those of the joint, by the user
 };
 
@@ -134,17 +137,17 @@ struct Exclusion {
   bool is_found = false;
 };
 
-/// Limits that win over those of the tools.
-struct GivenLimits {
-  std::optional<Decimal> lower = std::nullopt;
-  std::optional<Decimal> upper = std::nullopt;
-};
+/// A preset of a target, by its name.
+using Joint = std::pair<std::string, std::int64_t>;
 
 struct StudyOptions {
   Duration shift_break = std::chrono::minutes(30);  ///< a longer pause ends a run of neighbours
   bool include_not_completed = false;
   std::optional<std::int64_t> preset = std::nullopt;
-  PerQuantity<std::optional<GivenLimits>> limits = {};
+  /// Limits that win over all others.
+  PerQuantity<std::optional<files::JointLimits>> limits = {};
+  /// Torque limits that win over those of the tools.
+  std::map<Joint, files::JointLimits> joints = {};
 };
 
 /// What a store says beside its events.
