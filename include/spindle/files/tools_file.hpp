@@ -37,9 +37,8 @@ struct Tool {
   std::optional<Duration> gap = std::nullopt;           ///< silence before a request; likewise
   std::optional<std::uint32_t> retries = std::nullopt;  ///< of reads; likewise
   std::optional<modbus::TransactionIds> transactions = std::nullopt;  ///< tcp; likewise
-  std::vector<std::string> verified = {};  ///< actions that were checked on this tool
-  std::vector<std::string> verified = {};               ///< actions that were checked on this tool
-  std::map<std::int64_t, JointLimits> limits = {};      ///< of the joints, by preset
+  std::vector<std::string> verified = {};           ///< actions that were checked on this tool
+  std::map<std::int64_t, JointLimits> limits = {};  ///< of the joints, by preset
   SourceLocation url_at = {};
   SourceLocation profile_at = {};
   SourceLocation verified_at = {};
