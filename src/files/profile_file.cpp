@@ -243,7 +243,8 @@ constexpr Field<catalogue::EventColumn> column_fields[] = {
 };
 
 constexpr Field<catalogue::EventSetting> setting_fields[] = {
-    word<catalogue::setting_kind_words, &catalogue::EventSetting::is>("is", Need::required),
+    word<catalogue::setting_kind_words, &catalogue::EventSetting::is>("is", Need::required,
+                                                                      "setting"),
     field<&catalogue::EventSetting::parameter>("parameter", Need::required),
 };
 
