@@ -96,7 +96,7 @@ void Recorder::tell_gap(const store::NewGap& entry, const store::Stored& stored)
     const auto found = listeners_.find(entry.gap.tool);
     if (found != listeners_.end()) listener = found->second;
   }
-  if (listener != nullptr) listener->tell_stream(work::news_of(entry.gap), stored.epoch, stored.id);
+  if (listener != nullptr) listener->tell_gap(work::news_of(entry.gap), stored);
 }
 
 void Recorder::release(const std::string& target) {
@@ -160,13 +160,14 @@ void RecordedTool::record(const device::ToolEvent& news) {
   gap_.reset();
   seen_ = news.time;
   want_settings(news);
-  recorder_->journal().add(std::move(entry), [this, news](const store::Entry& stored_entry,
-                                                          const store::Stored& stored) {
-    const auto& event = std::get<store::NewEvent>(stored_entry);
-    if (stored.as == store::Stored::As::known) return;
-    if (event.gap) tell_stream(work::news_of(*event.gap), stored.epoch, stored.gap);
-    tell_stream(news, stored.epoch, stored.id);
-  });
+  recorder_->journal().add(
+      std::move(entry), [this, news, serial = serial_](const store::Entry& stored_entry,
+                                                       const store::Stored& stored) {
+        const auto& event = std::get<store::NewEvent>(stored_entry);
+        if (stored.as == store::Stored::As::known) return;
+        if (event.gap) tell_stream(work::news_of(*event.gap), serial, stored.epoch, stored.gap);
+        tell_stream(news, serial, stored.epoch, stored.id);
+      });
 }
 
 void RecordedTool::record(const device::EventGap& news) {
@@ -191,10 +192,11 @@ void RecordedTool::record(const device::PolledValue& news) {
   recorder_->journal().add(
       store::Happening{
           .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
-      [this, news, parameter = *news.parameter](const store::Entry&, const store::Stored& stored) {
+      [this, news, serial = serial_, parameter = *news.parameter](const store::Entry&,
+                                                                  const store::Stored& stored) {
         device::PolledValue kept = news;
         kept.parameter = &parameter;
-        tell_stream(kept, stored.epoch, stored.id);
+        tell_stream(kept, serial, stored.epoch, stored.id);
       });
 }
 
@@ -210,8 +212,9 @@ void RecordedTool::happen(report::Record record, device::WatchEvent news) {
   recorder_->journal().add(
       store::Happening{
           .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
-      [this, news = std::move(news)](const store::Entry&, const store::Stored& stored) {
-        tell_stream(news, stored.epoch, stored.id);
+      [this, news = std::move(news), serial = serial_](const store::Entry&,
+                                                       const store::Stored& stored) {
+        tell_stream(news, serial, stored.epoch, stored.id);
       });
 }
 
@@ -222,11 +225,12 @@ void RecordedTool::flush_gap() {
   store::Gap row = work::row_of(news, seen_, now());
   row.tool = *tool_;
   seen_ = row.ended + std::chrono::milliseconds(1);  // two gaps without numbers are never one
-  recorder_->journal().add(store::NewGap{std::move(row)},
-                           [this, news](const store::Entry&, const store::Stored& stored) {
-                             if (stored.as == store::Stored::As::known) return;
-                             tell_stream(news, stored.epoch, stored.id);
-                           });
+  recorder_->journal().add(
+      store::NewGap{std::move(row)},
+      [this, news, serial = serial_](const store::Entry&, const store::Stored& stored) {
+        if (stored.as == store::Stored::As::known) return;
+        tell_stream(news, serial, stored.epoch, stored.id);
+      });
 }
 
 void RecordedTool::flush_link() {
@@ -235,10 +239,19 @@ void RecordedTool::flush_link() {
   happen(voice_.records->link(news, now()), news);
 }
 
-void RecordedTool::tell_stream(const device::WatchEvent& news, std::int64_t epoch,
-                               store::RowId id) {
+void RecordedTool::tell_gap(const device::EventGap& news, const store::Stored& stored) {
+  std::string serial;
+  {
+    const std::lock_guard lock(voice_mutex_);
+    serial = serial_;
+  }
+  tell_stream(news, serial, stored.epoch, stored.id);
+}
+
+void RecordedTool::tell_stream(const device::WatchEvent& news, const std::string& serial,
+                               std::int64_t epoch, store::RowId id) {
   const std::lock_guard lock(voice_mutex_);
-  voice_.naming = {.serial = serial_, .epoch = epoch, .id = id};
+  voice_.naming = {.serial = serial, .epoch = epoch, .id = id};
   recorder_->stream().tell(news, voice_);
 }
 

@@ -65,8 +65,8 @@ class RecordedTool final : public Listener {
   device::RecordHooks hooks() override;
 
   [[nodiscard]] bool is_of(store::RowId tool) const { return tool_ == tool; }
-  /// To be called behind the commit, by any thread.
-  void tell_stream(const device::WatchEvent& news, std::int64_t epoch, store::RowId id);
+  /// A gap that the journal made, behind its commit; by any thread.
+  void tell_gap(const device::EventGap& news, const store::Stored& stored);
 
  private:
   void record(const device::ToolEvent& news);
@@ -86,6 +86,8 @@ class RecordedTool final : public Listener {
   void happen(report::Record record, device::WatchEvent news);
   void note_link(const device::LinkChange& news);
   void note_pending();
+  void tell_stream(const device::WatchEvent& news, const std::string& serial, std::int64_t epoch,
+                   store::RowId id);
   [[nodiscard]] WallTime now() const { return recorder_->context().clock.wall(); }
 
   const catalogue::Profile unknown_ = {};

@@ -32,7 +32,8 @@ std::optional<std::uint64_t> holder(int file) {
   const ssize_t length = ::pread(file, text.data(), text.size(), 0);
   if (length <= 0) return std::nullopt;
   const std::string_view line(text.data(), static_cast<std::size_t>(length));
-  return parse_unsigned(line.substr(0, line.find(' ')), std::numeric_limits<std::uint32_t>::max());
+  return parse_unsigned(line.substr(0, line.find_first_of(" \n")),
+                        std::numeric_limits<std::uint32_t>::max());
 }
 
 void tell_holder(int file) {

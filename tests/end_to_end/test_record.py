@@ -83,8 +83,8 @@ def soon(ask):
     return None
 
 
-def stored(store, number):
-    return number in {n for _, n in soon(store.numbers) or ()}
+def stored(store, number, serial="1021100042"):
+    return number in {n for _, n in soon(lambda: store.numbers(serial)) or ()}
 
 
 class Recorded(unittest.TestCase):
@@ -257,12 +257,14 @@ class Recorded(unittest.TestCase):
                 support.wait_until(lambda: tool.caught_up, "the recorder listens")
                 tool.event()
                 support.wait_until(lambda: len(recorder.records("event")) == 2, "it is told")
-                other = EventServer(first=77, serial=2)
-                tool.tool, tool.number = other.tool, 77
+                with EventServer(first=77, serial=2) as other:
+                    tool.tool, tool.number = other.tool, 77
                 tool.cut()
                 support.wait_until(lambda: tool.caught_up, "the recorder listens again")
                 tool.event()
-                support.wait_until(lambda: stored(self.store, 78), "it is stored")
+                support.wait_until(lambda: stored(self.store, 78, "2"), "it is stored")
+                gaps = [(gap["serial"], gap["missed"]) for gap in recorder.records("gap")]
+                self.assertEqual(gaps, [("1", None)])
                 recorder.end()
         rows = self.store.ask("SELECT serial, number FROM event JOIN tool ON tool.id = event.tool"
                               " ORDER BY event.id")

@@ -195,9 +195,9 @@ shown '0 different'
 
 say "a line at work: an operator drives screws, and every result is kept in a store"
 kill -TERM "$simulator"
-typed simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 9
+typed simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 3
 mkfifo works
-"$program" simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 9 >works 2>simulator.log &
+"$program" simulate doga-bm --rundown-every 200ms --burst 12 --ng-every 3 >works 2>simulator.log &
 simulator=$!
 disown
 exec {works}<works

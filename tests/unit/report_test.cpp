@@ -142,13 +142,13 @@ TEST_CASE("few values, no limits and a coarse resolution are said") {
 TEST_CASE("what was missed and what was taken out is printed everywhere") {
   Printed printed;
   printed.bench.facts.gaps = {{.tool = 1,
-                            .after = 10,
-                            .before = 15,
-                            .missed = 4,
-                            .at_least = true,
-                            .began = bench_second(10),
-                            .ended = bench_second(15),
-                            .reason = "link lost"}};
+                               .after = 10,
+                               .before = 15,
+                               .missed = 4,
+                               .at_least = true,
+                               .began = bench_second(10),
+                               .ended = bench_second(15),
+                               .reason = "link lost"}};
   printed.bench.exclusions = {{.serial = "42", .epoch = 0, .number = 3, .reason = "test <screw>"}};
   printed.add(10);
   printed.add(20, 271, 15);

@@ -5,7 +5,8 @@
 
 namespace spindle::posix {
 
-/// CLOCK_MONOTONIC, CLOCK_REALTIME and the zone of $TZ or of this computer. Sleeping polls the interrupt's descriptor.
+/// CLOCK_MONOTONIC, CLOCK_REALTIME and the zone of $TZ or of this computer. Sleeping polls the
+/// interrupt's descriptor.
 class SteadyClock final : public Clock {
  public:
   explicit SteadyClock(const Interrupt& interrupt) : interrupt_(&interrupt) {}
