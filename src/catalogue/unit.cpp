@@ -256,6 +256,11 @@ std::optional<Typed> split_typed(std::string_view text) {
     constexpr std::string_view never_first = ",./:;_+-*'";
     if (never_first.find(unit.front()) != std::string_view::npos) return std::nullopt;
     if (unit.front() == 'x' || unit.front() == 'X') return std::nullopt;  // 0x1F
+    // Digits that are grouped, by a narrow space, say.
+    const auto behind = std::find_if(unit.begin(), unit.end(), [](char character) {
+      return static_cast<unsigned char>(character) < 0x80;
+    });
+    if (behind != unit.end() && *behind >= '0' && *behind <= '9') return std::nullopt;
     return Typed{*number, text.substr(0, size), unit};
   }
   return std::nullopt;

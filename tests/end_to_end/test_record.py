@@ -95,6 +95,9 @@ class Recorded(unittest.TestCase):
         self.path = self.folder / "events.db"
         self.store = Store(self.path)
 
+    def wait_for(self, number, serial="1021100042"):
+        support.wait_until(lambda: stored(self.store, number, serial), f"{number} is stored")
+
     def test_what_a_tool_tells_is_stored_and_then_told(self):
         with EventServer() as tool, Recording(self.path, tool.url, *PROFILE) as recorder:
             support.wait_until(lambda: tool.caught_up, "the recorder listens")
@@ -121,7 +124,7 @@ class Recorded(unittest.TestCase):
                                                     *PROFILE) as recorder:
             support.wait_until(lambda: tool.caught_up, "the recorder listens")
             tool.event()
-            support.wait_until(lambda: stored(self.store, 1962), "it is stored")
+            self.wait_for(1962)
             recorder.send_signal(signal.SIGINT)
             self.assertEqual(support.wait_for_end(recorder.process), 0)
             self.assertEqual(recorder.process.stdout.read(), b"")
@@ -131,7 +134,7 @@ class Recorded(unittest.TestCase):
             with Recording(self.path, tool.url, *PROFILE) as recorder:
                 support.wait_until(lambda: tool.caught_up, "the recorder listens")
                 tool.event()
-                support.wait_until(lambda: stored(self.store, 1962), "it is stored")
+                self.wait_for(1962)
                 recorder.end()
             tool.miss(3)
             with Recording(self.path, tool.url, *PROFILE) as recorder:
@@ -220,7 +223,7 @@ class Recorded(unittest.TestCase):
             with Recording(self.path, tool.url, *PROFILE) as recorder:
                 support.wait_until(lambda: tool.caught_up, "the recorder listens")
                 tool.event()
-                support.wait_until(lambda: stored(self.store, NUMBERS - 5), "it is stored")
+                self.wait_for(NUMBERS - 5)
                 recorder.end()
             tool.miss(25)
             with Recording(self.path, tool.url, *PROFILE) as recorder:
@@ -238,7 +241,7 @@ class Recorded(unittest.TestCase):
             with Recording(self.path, tool.url, *PROFILE) as recorder:
                 support.wait_until(lambda: tool.caught_up, "the recorder listens")
                 tool.event()
-                support.wait_until(lambda: stored(self.store, 1962), "it is stored")
+                self.wait_for(1962)
                 before = self.store.ask("SELECT max(at) FROM event")[0][0]
                 port = tool.port
                 tool.__exit__(None, None, None)
@@ -262,7 +265,7 @@ class Recorded(unittest.TestCase):
                 tool.cut()
                 support.wait_until(lambda: tool.caught_up, "the recorder listens again")
                 tool.event()
-                support.wait_until(lambda: stored(self.store, 78, "2"), "it is stored")
+                self.wait_for(78, "2")
                 gaps = [(gap["serial"], gap["missed"]) for gap in recorder.records("gap")]
                 self.assertEqual(gaps, [("1", None)])
                 recorder.end()
@@ -282,7 +285,7 @@ class Recorded(unittest.TestCase):
         with EventServer() as tool, Recording(self.path, tool.url, *PROFILE) as recorder:
             support.wait_until(lambda: tool.caught_up, "the recorder listens")
             tool.event()
-            support.wait_until(lambda: stored(self.store, 1962), "it is stored")
+            self.wait_for(1962)
             resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
             for _ in range(20):
                 tool.event()

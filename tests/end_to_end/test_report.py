@@ -10,7 +10,6 @@ import os
 import pathlib
 import re
 import shutil
-import subprocess
 import tempfile
 import unittest
 import xml.etree.ElementTree
@@ -30,7 +29,7 @@ DASH = "\N{EN DASH}"
 
 def make_store(path, *arguments):
     program = pathlib.Path(os.environ["SPINDLE_PEER_PROGRAMS"]) / "spindle_peer_report_store"
-    subprocess.run([program, path, *arguments], check=True, timeout=300)
+    support.completed([program, path, *arguments], check=True)
 
 
 class Browser:
@@ -41,9 +40,9 @@ class Browser:
 
     def _run(self, page, *flags):
         profile = tempfile.mkdtemp(dir=self._folder)
-        done = subprocess.run(
+        done = support.completed(
             [CHROMIUM, *FLAGS, f"--user-data-dir={profile}", *flags, page.as_uri()],
-            capture_output=True, timeout=300, check=False,
+            deadline=5 * support.DEADLINE, capture_output=True,
         )  # fmt: skip
         if done.returncode != 0:
             raise AssertionError(f"chromium ended with {done.returncode}: {done.stderr.decode(errors='replace')}")
