@@ -104,6 +104,8 @@ struct AllOptions {
 /// The grammar while it is being parsed: the innermost command that was named.
 struct ParseState {
   Extent extent = Extent::as_named;
+  /// Only commands whose names stand among these words are known; null: all are.
+  const std::vector<std::string>* named = nullptr;
   AllOptions options = {};
   Invocation invocation = {};  ///< as far as the common options say
   bool help = false;
@@ -190,6 +192,10 @@ std::string path_of(const CLI::App* command) {
 template <typename Options, typename RunCommand, typename BindOptions>
 void add_command(CLI::App& parent, ParseState& draft, const Words& words, Options& options,
                  RunCommand run, BindOptions bind_options) {
+  const bool is_left_out =
+      draft.named != nullptr && parent.get_parent() == nullptr &&
+      std::find(draft.named->begin(), draft.named->end(), words.name) == draft.named->end();
+  if (is_left_out) return;
   CLI::App* command = parent.add_subcommand(std::string(words.name), std::string(words.meaning));
   command->fallthrough();
   command->set_help_flag();
@@ -1296,6 +1302,23 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
   return arguments;
 }
 
+/// Where `named` is there, only commands that it names are known.
+Result<Invocation> parse_with(const std::vector<std::string>* named,
+                              const std::vector<std::string>& arguments) {
+  CLI::App app;
+  ParseState draft;
+  draft.named = named;
+  build(app, draft);
+  try {
+    auto words = with_one_output_option(arguments);
+    std::reverse(words.begin(), words.end());  // as CLI11 wants them
+    app.parse(std::move(words));
+  } catch (const CLI::ParseError& error) {
+    return tl::unexpected(parser_error(arguments, error));
+  }
+  return invocation_of(app, draft);
+}
+
 }  // namespace
 
 Description describe_grammar() {
@@ -1307,17 +1330,9 @@ Description describe_grammar() {
 }
 
 Result<Invocation> parse(const std::vector<std::string>& arguments) {
-  CLI::App app;
-  ParseState draft;
-  build(app, draft);
-  try {
-    auto words = with_one_output_option(arguments);
-    std::reverse(words.begin(), words.end());  // as CLI11 wants them
-    app.parse(std::move(words));
-  } catch (const CLI::ParseError& error) {
-    return tl::unexpected(parser_error(arguments, error));
-  }
-  return invocation_of(app, draft);
+  // The commands that nothing names are a good part of a short run; a fault may have to know them.
+  auto invocation = parse_with(&arguments, arguments);
+  return invocation ? std::move(invocation) : parse_with(nullptr, arguments);
 }
 
 report::Format wanted_format(const std::vector<std::string>& arguments) {
