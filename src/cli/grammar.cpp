@@ -1302,7 +1302,7 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
   return arguments;
 }
 
-/// Where `named` is there, only commands that it names are known.
+/// Where `named` is there, only commands that it names are known; help is of all of them.
 Result<Invocation> parse_with(const std::vector<std::string>* named,
                               const std::vector<std::string>& arguments) {
   CLI::App app;
@@ -1316,6 +1316,7 @@ Result<Invocation> parse_with(const std::vector<std::string>* named,
   } catch (const CLI::ParseError& error) {
     return tl::unexpected(parser_error(arguments, error));
   }
+  if (draft.help && named != nullptr) return tl::unexpected(usage("help needs all commands"));
   return invocation_of(app, draft);
 }
 
