@@ -6,58 +6,14 @@
 #include <set>
 #include <utility>
 
-#include "spindle/base/local_time.hpp"
 #include "spindle/base/text.hpp"
+#include "stored_choice.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using store::Place;
 using store::RowId;
-
-Error bad_option(std::string_view option, std::string message, std::string hint) {
-  Error error{.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
-  error.name = option;
-  return error;
-}
-
-Result<std::optional<WallTime>> time_of(std::string_view option, const std::string& text,
-                                        const Clock& clock) {
-  if (text.empty()) return std::nullopt;
-  auto time = parse_time(text, clock);
-  if (time) return *time;
-  time.error().name = option;
-  return tl::unexpected(std::move(time.error()));
-}
-
-Result<void> add_times(const ReportOptions& options, const Clock& clock, store::Filter& filter) {
-  const auto since = time_of("--since", options.since, clock);
-  if (!since) return tl::unexpected(since.error());
-  const auto until = time_of("--until", options.until, clock);
-  if (!until) return tl::unexpected(until.error());
-  if (*since && *until && **since >= **until) {
-    return tl::unexpected(bad_option("--until", "this is not behind --since", "swap the two"));
-  }
-  filter.since = *since;
-  filter.until = *until;
-  return {};
-}
-
-Error unknown(const std::string& text, const std::set<std::string>& known) {
-  std::vector<std::string> names(known.begin(), known.end());
-  std::string hint = suggestion(text, names);
-  constexpr std::size_t most = 5;
-  if (hint.empty() && !names.empty()) {
-    const bool is_cut = names.size() > most;
-    names.resize(std::min(names.size(), most));
-    std::string list;
-    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-    hint = fmt::format("the store has {}{}", list, is_cut ? ", ..." : "");
-  }
-  return {.code = Errc::unknown_name,
-          .message = fmt::format("the store knows no '{}'", text),
-          .hint = std::move(hint)};
-}
 
 /// The places that were named, by target or group. No row is 0.
 Result<void> add_targets(const ReportOptions& options, const std::vector<Place>& places,
@@ -73,7 +29,7 @@ Result<void> add_targets(const ReportOptions& options, const std::vector<Place>&
     } else if (group != context.tools.groups.end()) {
       names.insert(names.end(), group->second.begin(), group->second.end());
     } else {
-      return tl::unexpected(unknown(text, known));
+      return tl::unexpected(unknown_in_store(text, {known.begin(), known.end()}));
     }
   }
   for (const std::string& name : names) {
@@ -85,7 +41,7 @@ Result<void> add_targets(const ReportOptions& options, const std::vector<Place>&
     const auto& tools = context.tools.tools;
     const bool is_tool = std::any_of(tools.begin(), tools.end(),
                                      [&](const files::Tool& tool) { return tool.name == name; });
-    if (!is_tool) return tl::unexpected(unknown(name, known));
+    if (!is_tool) return tl::unexpected(unknown_in_store(name, {known.begin(), known.end()}));
     context.renderer.note(fmt::format("{}: nothing of it is stored", name));
   }
   if (!options.targets.empty() && filter.places.empty()) filter.places = {0};
@@ -105,7 +61,7 @@ Result<void> add_tools(const ReportOptions& options, const work::StoreFacts& fac
       if (place.name == text || place.url == text) found.insert(place.tool);
       known.insert(place.name);
     }
-    if (found.empty()) return tl::unexpected(unknown(text, known));
+    if (found.empty()) return tl::unexpected(unknown_in_store(text, {known.begin(), known.end()}));
     filter.tools.insert(filter.tools.end(), found.begin(), found.end());
   }
   return {};
@@ -165,7 +121,7 @@ Result<ReportSelection> select_for_report(const ReportOptions& options, store::R
   work::StoreFacts& facts = selection.facts;
   using enum store::Column;
   filter.columns = {preset, target_torque, torque, a3, error, direction};
-  auto read = add_times(options, context.clock, filter)
+  auto read = add_times(options.since, options.until, context.clock, filter)
                   .and_then([&] { return take(reader.tools(), facts.tools); })
                   .and_then([&] { return take(reader.places(), facts.places); })
                   .and_then([&] { return take(reader.epochs(), facts.epochs); })

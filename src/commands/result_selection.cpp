@@ -5,30 +5,15 @@
 #include <algorithm>
 #include <utility>
 
-#include "spindle/base/local_time.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/work/store_place.hpp"
+#include "stored_choice.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using store::Place;
 using store::RowId;
-
-Error bad_option(std::string_view option, std::string message, std::string hint) {
-  Error error{.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
-  error.name = option;
-  return error;
-}
-
-Result<std::optional<WallTime>> time_of(std::string_view option, const std::string& text,
-                                        const Clock& clock) {
-  if (text.empty()) return std::nullopt;
-  auto time = parse_time(text, clock);
-  if (time) return *time;
-  time.error().name = option;
-  return tl::unexpected(std::move(time.error()));
-}
 
 /// What a name can be mistaken for.
 std::vector<std::string> known_names(const StoredRecords& records, const files::Tools& tools) {
@@ -41,28 +26,13 @@ std::vector<std::string> known_names(const StoredRecords& records, const files::
   return names;
 }
 
-Error unknown(const std::string& text, std::vector<std::string> known) {
-  std::string hint = suggestion(text, known);
-  if (hint.empty() && !known.empty()) {
-    constexpr std::size_t most = 5;
-    const bool is_cut = known.size() > most;
-    known.resize(std::min(known.size(), most));
-    std::string list;
-    for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
-    hint = fmt::format("known are {}{}", list, is_cut ? ", ..." : "");
-  }
-  return {.code = Errc::unknown_name,
-          .message = fmt::format("the store knows no '{}'", text),
-          .hint = std::move(hint)};
-}
-
 class Selector {
  public:
   Selector(const ResultFilter& wanted, const StoredRecords& records, const Context& context)
       : wanted_(&wanted), records_(&records), context_(&context) {}
 
   Result<Selection> select() {
-    return add_times()
+    return add_times(wanted_->since, wanted_->until, context_->clock, selection_.filter)
         .and_then([this] { return add_targets(); })
         .and_then([this] { return add_tools(); })
         .and_then([this] { return add_key(); })
@@ -74,19 +44,6 @@ class Selector {
   }
 
  private:
-  Result<void> add_times() {
-    const auto since = time_of("--since", wanted_->since, context_->clock);
-    if (!since) return tl::unexpected(since.error());
-    const auto until = time_of("--until", wanted_->until, context_->clock);
-    if (!until) return tl::unexpected(until.error());
-    if (*since && *until && **since >= **until) {
-      return tl::unexpected(bad_option("--until", "this is not behind --since", "swap the two"));
-    }
-    selection_.filter.since = *since;
-    selection_.filter.until = *until;
-    return {};
-  }
-
   [[nodiscard]] bool is_in_tools_file(const std::string& name) const {
     const auto& tools = context_->tools.tools;
     return std::any_of(tools.begin(), tools.end(), [&](auto& tool) { return tool.name == name; });
@@ -102,7 +59,7 @@ class Selector {
     }
     if (is_known) return {};
     if (!is_in_tools_file(text)) {
-      return tl::unexpected(unknown(text, known_names(*records_, context_->tools)));
+      return tl::unexpected(unknown_in_store(text, known_names(*records_, context_->tools)));
     }
     selection_.names.insert(text);
     context_->renderer.note(fmt::format("{}: nothing of it is stored", text));
@@ -116,7 +73,7 @@ class Selector {
       if (names_group(text)) {
         const auto group = groups.find(text.substr(1));
         if (group == groups.end()) {
-          return tl::unexpected(unknown(text, known_names(*records_, context_->tools)));
+          return tl::unexpected(unknown_in_store(text, known_names(*records_, context_->tools)));
         }
         names = group->second;
       }
@@ -146,7 +103,7 @@ class Selector {
       if (found.empty()) {
         std::vector<std::string> known = known_names(*records_, {});
         for (const store::Tool& tool : records_->tools()) known.push_back(tool.name.serial);
-        return tl::unexpected(unknown(text, std::move(known)));
+        return tl::unexpected(unknown_in_store(text, std::move(known)));
       }
       selection_.filter.tools.insert(selection_.filter.tools.end(), found.begin(), found.end());
     }
@@ -177,7 +134,7 @@ class Selector {
       serials.push_back(tool.name.serial);
     }
     if (selection_.filter.tools.empty()) {
-      return tl::unexpected(unknown(key.substr(0, first), std::move(serials)));
+      return tl::unexpected(unknown_in_store(key.substr(0, first), std::move(serials)));
     }
     return {};
   }
