@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 #include "spindle/base/decimal.hpp"
 #include "text.hpp"
@@ -33,6 +34,8 @@ struct Step {
 };
 
 Step step_of(double least) {
+  // Between two of the smallest numbers that there are lies no step.
+  least = std::max(least, std::numeric_limits<double>::min());
   // One lower than the logarithm says, which may be rounded up.
   int exponent = static_cast<int>(std::floor(std::log10(least))) - 1;
   while (true) {
