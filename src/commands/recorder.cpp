@@ -19,6 +19,7 @@ constexpr Duration settings_every = std::chrono::minutes(1);
 constexpr unsigned most_unanswered = 3;
 /// People are told of one tool's link at most so often.
 constexpr Duration link_told_every = std::chrono::minutes(1);
+
 /// The link is opened again a moment later.
 Error not_settled(std::string message) {
   return {.code = Errc::storage, .message = std::move(message)};
@@ -57,10 +58,10 @@ Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::
     if (other != claims_.end()) holder = other->first;
     // A tool that moved is met once more before its old link is known to be dead.
     const bool is_first = !holder.empty() && !has_own && met_.insert({target, said}).second;
-    if (is_first)
-      return tl::unexpected(
-          not_settled("another tool that is connected says its "
-                      "serial number: it is looked at again"));
+    if (is_first) {
+      return tl::unexpected(not_settled(
+          "another tool that is connected says its serial number: it is looked at again"));
+    }
     claims_.insert_or_assign(target, holder.empty() && !has_own ? said : own);
     is_news = !holder.empty() && told_.insert(own).second;
   }
@@ -187,17 +188,14 @@ void RecordedTool::record(const device::LinkChange& news) {
 }
 
 void RecordedTool::record(const device::PolledValue& news) {
-  const report::Record record = voice_.records->value(news, "change", now());
   // What it points to ends with the watch, and the journal may tell it later.
-  recorder_->journal().add(
-      store::Happening{
-          .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
-      [this, news, serial = serial_, parameter = *news.parameter](const store::Entry&,
-                                                                  const store::Stored& stored) {
-        device::PolledValue kept = news;
-        kept.parameter = &parameter;
-        tell_stream(kept, serial, stored.epoch, stored.id);
-      });
+  add_happening(voice_.records->value(news, "change", now()),
+                [this, news, serial = serial_, parameter = *news.parameter](
+                    const store::Entry&, const store::Stored& stored) {
+                  device::PolledValue kept = news;
+                  kept.parameter = &parameter;
+                  tell_stream(kept, serial, stored.epoch, stored.id);
+                });
 }
 
 void RecordedTool::record(const device::PollLag& news) {
@@ -208,14 +206,18 @@ void RecordedTool::record(const device::MotorTransition& news) {
   happen(voice_.records->motor(news), news);
 }
 
-void RecordedTool::happen(report::Record record, device::WatchEvent news) {
+void RecordedTool::happen(const report::Record& record, device::WatchEvent news) {
+  add_happening(record, [this, news = std::move(news), serial = serial_](
+                            const store::Entry&, const store::Stored& stored) {
+    tell_stream(news, serial, stored.epoch, stored.id);
+  });
+}
+
+void RecordedTool::add_happening(const report::Record& record, work::Journal::Told told) {
   recorder_->journal().add(
       store::Happening{
           .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)},
-      [this, news = std::move(news), serial = serial_](const store::Entry&,
-                                                       const store::Stored& stored) {
-        tell_stream(news, serial, stored.epoch, stored.id);
-      });
+      std::move(told));
 }
 
 /// A gap that no event stands behind.
@@ -264,15 +266,14 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   TRY_LET(const auto name, recorder_->claim(said, target_.shown));
   const auto& identity = device.identity();
   TRY_LET(const auto tool, writer.tool(name, identity ? identity->tool_model : std::string()));
-  const auto place =
-      writer.place({.tool = tool,
-                    .name = target_.shown,
-                    .url = target_.endpoint.text,
-                    .profile = profile_->id.to_string(),
-                    .firmware = identity ? identity->firmware : std::optional<std::uint32_t>(),
-                    .torque_unit = target_.torque_unit,
-                    .since = now()});
-  if (!place) return tl::unexpected(place.error());
+  const std::optional<std::uint32_t> firmware = identity ? identity->firmware : std::nullopt;
+  TRY_LET(const auto place, writer.place({.tool = tool,
+                                          .name = target_.shown,
+                                          .url = target_.endpoint.text,
+                                          .profile = profile_->id.to_string(),
+                                          .firmware = firmware,
+                                          .torque_unit = target_.torque_unit,
+                                          .since = now()}));
   TRY(recorder_->settle(tool, *this));
   TRY_LET(const auto last, writer.last(tool));
   {
@@ -288,7 +289,7 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
     unanswered_ = 0;
   }
   tool_ = tool;
-  place_ = *place;
+  place_ = place;
   flush_link();
   // Where events still wait to be stored, the last one that is stored is none to count from.
   if (identity && recorder_->journal().waiting() == 0) record_total(*identity, last);
@@ -309,8 +310,7 @@ void RecordedTool::record_total(const catalogue::Identity& identity,
                    {"total", number(*identity.total)},
                    {"epoch", last ? number(last->epoch) : report::Cell()},
                    {"number", last ? number(last->number) : report::Cell()}};
-  recorder_->journal().add(store::Happening{
-      .tool = tool_, .at = record.time, .type = record.type, .json = report::to_json(record)});
+  add_happening(record, {});
 }
 
 /// A result is worth more with the settings that it was made by.

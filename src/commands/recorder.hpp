@@ -83,7 +83,8 @@ class RecordedTool final : public Listener {
   void want_settings(std::int64_t preset);
   void flush_gap();
   void flush_link();
-  void happen(report::Record record, device::WatchEvent news);
+  void happen(const report::Record& record, device::WatchEvent news);
+  void add_happening(const report::Record& record, work::Journal::Told told);
   void note_link(const device::LinkChange& news);
   void note_pending();
   void tell_stream(const device::WatchEvent& news, const std::string& serial, std::int64_t epoch,
