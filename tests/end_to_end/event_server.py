@@ -51,8 +51,8 @@ class EventServer(support.Port):
         self._store(0)
 
     def __exit__(self, *_):
-        self.cut()
         super().__exit__()
+        self.cut()
 
     # --- what happens to the tool ---
 
@@ -191,8 +191,9 @@ class EventServer(support.Port):
         with self._lock:
             self.requests.append((time.monotonic(), request))
             function, data = self.tool.answer(request, "asked")
-            if request.function == support.WRITE_SINGLE and request.words[0] == ARM_REGISTER:
+            is_ours = self._client is client  # and no client of before, of whom something was left
+            if is_ours and request.function == support.WRITE_SINGLE and request.words[0] == ARM_REGISTER:
                 self._armed_until = time.monotonic() + self._expires if request.words[1] else 0.0
-            if self._client is client:
+            if is_ours:
                 self._held += hostile_server.frame(request.transaction, function, data)
                 self._flush()

@@ -606,16 +606,22 @@ class Port:
         self.url = f"tcp://127.0.0.1:{self.port}"
         self._connections = []
         self._threads = []
+        self._accepting = threading.Thread(target=self._accept, daemon=True)
 
     def __enter__(self):
-        self._begin(self._accept)
+        self._accepting.start()
         return self
 
     def __exit__(self, *_):
-        for opened in [self._listening, *self._connections]:
+        # First no new ones: a client that connects anew at once would be served for ever.
+        with contextlib.suppress(OSError):
+            self._listening.shutdown(socket.SHUT_RDWR)
+        if self._accepting.is_alive():
+            self._accepting.join(DEADLINE)
+        for opened in list(self._connections):
             with contextlib.suppress(OSError):
                 opened.shutdown(socket.SHUT_RDWR)
-        for thread in self._threads:
+        for thread in list(self._threads):
             thread.join(DEADLINE)
         for opened in [self._listening, *self._connections]:
             opened.close()

@@ -266,9 +266,9 @@ class Recorded(unittest.TestCase):
                 support.wait_until(lambda: tool.caught_up, "the recorder listens again")
                 tool.event()
                 self.wait_for(78, "2")
+                recorder.end()
                 gaps = [(gap["serial"], gap["missed"]) for gap in recorder.records("gap")]
                 self.assertEqual(gaps, [("1", None)])
-                recorder.end()
         rows = self.store.ask("SELECT serial, number FROM event JOIN tool ON tool.id = event.tool"
                               " ORDER BY event.id")
         self.assertEqual([number for serial, number in rows if serial == "1"], [1961, 1962])
