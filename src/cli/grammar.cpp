@@ -494,11 +494,14 @@ void bind_record(Binder& bind, commands::RecordOptions& options) {
 }
 
 void add_record(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"record", "[TARGET...]",
+  constexpr Words words = {"record",
+                           "[TARGET...]",
                            "watch tools and keep every result in a store, until stopped",
                            "spindle record\n"
                            "spindle record station3 --tee --json\n"
-                           "spindle record @line1 --store line1.db"};
+                           "spindle record @line1 --store line1.db",
+                           nullptr,
+                           Invocation::ToolsFile::all_tools};
   add_command(app, draft, words, draft.options.record, commands::record, bind_record);
 }
 
@@ -1241,19 +1244,21 @@ std::optional<std::string> option_without_value(const CLI::App& app) {
 
 /// Whether one of the words that may be a target can only be told from the tools file. A URL says
 /// itself where its tool is, and a stop that has one waits for no file. A command that takes no
-/// words at all is about the file.
-bool names_tools(const CLI::App& command) {
+/// words at all is about the file, and so may be one that was given none.
+bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   constexpr std::array<std::string_view, 5> targets = {"TARGET", "BUS", "A", "B", "PATTERN"};
   bool takes_words = false;
+  bool has_words = false;
   for (const CLI::Option* known : command.get_options()) {
     if (!known->get_positional()) continue;
     takes_words = true;
+    has_words = has_words || !known->results().empty();
     const std::string name = known->get_name(true);
     if (std::find(targets.begin(), targets.end(), name) == targets.end()) continue;
     const auto& words = known->results();
     if (std::any_of(words.begin(), words.end(), files::may_name_tools)) return true;
   }
-  return !takes_words;
+  return !takes_words || (use == Invocation::ToolsFile::all_tools && !has_words);
 }
 
 Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
@@ -1289,7 +1294,7 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   // for it.
   const bool told = !invocation.common.tools_file.empty() &&
                     invocation.tools_use != Invocation::ToolsFile::salvaged;
-  if (!told && !names_tools(*draft.chosen)) {
+  if (!told && !names_tools(*draft.chosen, invocation.tools_use)) {
     invocation.tools_use = Invocation::ToolsFile::only_found;
   }
   return std::move(invocation);

@@ -44,9 +44,9 @@ struct Invocation {
   std::optional<std::string> text = std::nullopt;
   report::Format format = report::Format::table;
   ColorChoice color = ColorChoice::automatic;
-  /// Whether the command wants the tools file without a fault, makes do with what can be read of
-  /// it, or is about its faults.
-  enum class ToolsFile : std::uint8_t { loaded, salvaged, only_found };
+  /// Whether the command wants the tools file without a fault, wants it also where no tool is named
+  /// because that means all, makes do with what can be read of it, or is about its faults.
+  enum class ToolsFile : std::uint8_t { loaded, all_tools, salvaged, only_found };
   ToolsFile tools_use = ToolsFile::loaded;
   work::CommonOptions common = {};
   commands::UserOptions user = {};

@@ -79,6 +79,7 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   if (path.empty()) return files::Tools();
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
+    case Invocation::ToolsFile::all_tools:
       return files::load_tools(path, world.disk);
     case Invocation::ToolsFile::salvaged:
       return files::salvage_tools(path, world.disk);
