@@ -308,3 +308,12 @@ TEST_CASE("what is wrong is named, with a suggestion or where to look") {
     CHECK(bad(row.line) == row.text);
   }
 }
+
+TEST_CASE(
+    "record without a tool is about all of the tools file, and with a URL it waits for none") {
+  CHECK(parse(words("record"))->tools_use == Invocation::ToolsFile::all_tools);
+  CHECK(parse(words("record --store a.db --tee"))->tools_use == Invocation::ToolsFile::all_tools);
+  CHECK(parse(words("record station3"))->tools_use == Invocation::ToolsFile::all_tools);
+  CHECK(parse(words("record tcp://h"))->tools_use == Invocation::ToolsFile::only_found);
+  CHECK(parse(words("results"))->tools_use == Invocation::ToolsFile::only_found);
+}
