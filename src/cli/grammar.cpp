@@ -78,6 +78,8 @@ struct AllOptions {
   ScanArguments scan;
   WatchArguments watch;
   commands::RecordOptions record;
+  commands::ForwardOptions forward;
+  commands::ServeOptions serve;
   commands::ReportOptions report;
   commands::RemoteStartOptions remote_start;
   commands::RemoteStopOptions remote_stop;
@@ -503,6 +505,35 @@ void add_record(CLI::App& app, ParseState& draft) {
                            nullptr,
                            Invocation::ToolsFile::all_tools};
   add_command(app, draft, words, draft.options.record, commands::record, bind_record);
+}
+
+void bind_forward(Binder& bind, commands::ForwardOptions& options) {
+  bind.required("SINK", options.sink, "a URL, or a name under 'sinks' of the tools file");
+  bind.option("--store", "FILE", options.store, "the store (default: that of spindle record)");
+}
+
+void add_forward(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"forward", "SINK",
+                           "hand what was recorded on to a database or a broker, until stopped",
+                           "spindle forward plant\n"
+                           "spindle forward mqtts://broker.example/acme/line1"};
+  add_command(app, draft, words, draft.options.forward, commands::forward, bind_forward);
+}
+
+void bind_serve(Binder& bind, commands::ServeOptions& options) {
+  bind.argument("TARGET", options.targets, "tools to hold for others; none: show the page");
+  bind.option("--listen", "ADDRESS:PORT", options.listen,
+              "of the page, or with TARGET of a Modbus TCP gateway");
+  bind.option("--store", "FILE", options.store,
+              "what the page shows (default: the store of spindle record)");
+}
+
+void add_serve(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"serve", "[TARGET...]",
+                           "a page of what is recorded, or tools that other programs ask",
+                           "spindle serve\n"
+                           "spindle serve station3 --listen 127.0.0.1:1502"};
+  add_command(app, draft, words, draft.options.serve, commands::serve, bind_serve);
 }
 
 std::string report_words() {
@@ -1105,10 +1136,10 @@ void build(CLI::App& app, ParseState& draft) {
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
   for (const auto add :
-       {add_identify, add_list,     add_get,     add_set,   add_do,           add_watch,
-        add_record,   add_results,  add_report,  add_store, add_remote_start, add_remote_stop,
-        add_alarms,   add_backup,   add_dump,    add_diff,  add_restore,      add_ping,
-        add_scan,     add_simulate, add_profile, add_tools}) {
+       {add_identify,     add_list,        add_get,    add_set,      add_do,      add_watch,
+        add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
+        add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
+        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools}) {
     add(app, draft);
   }
 }

@@ -119,20 +119,23 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
   const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.frames);
-  commands::Context context{
-      {.clock = world.clock,
-       .interrupt = world.interrupt,
-       .open = world.open,
-       .uninterruptible = world.uninterruptible,
-       .disk = world.disk,
-       .state_folder = state,
-       .version = version,
-       .profiles = profiles,
-       .tools = tools,
-       .show_frames = show_frames,
-       .common = invocation.common},
-      {.io = world.io, .serve = world.serve, .end_waits = world.end_waits, .user = invocation.user},
-      {.renderer = renderer}};
+  commands::Context context{{.clock = world.clock,
+                             .interrupt = world.interrupt,
+                             .open = world.open,
+                             .uninterruptible = world.uninterruptible,
+                             .disk = world.disk,
+                             .state_folder = state,
+                             .version = version,
+                             .profiles = profiles,
+                             .tools = tools,
+                             .show_frames = show_frames,
+                             .common = invocation.common},
+                            {.io = world.io,
+                             .serve = world.serve,
+                             .end_waits = world.end_waits,
+                             .companions = world.companions,
+                             .user = invocation.user},
+                            {.renderer = renderer}};
   TRY(begin_capture(invocation.common.trace_file, world.disk));
   return invocation.run(context);
 }

@@ -6,7 +6,7 @@
 build_packages=(
   g++ cmake ninja-build pkg-config ccache
   libmodbus-dev libcli11-dev libfmt-dev libyaml-dev libexpected-dev
-  libsqlite3-dev
+  libsqlite3-dev libmosquitto-dev libpq-dev libcpp-httplib-dev
 )
 # shellcheck disable=SC2034
 test_packages=(
@@ -15,6 +15,7 @@ test_packages=(
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
   python3-jsonschema mandoc dpkg-dev lintian sqlite3
   python3-scipy python3-statsmodels chromium
+  mosquitto mosquitto-clients python3-paho-mqtt postgresql python3-psycopg2 curl
 )
 
 # Prints those of the named packages that are not installed, one a line.

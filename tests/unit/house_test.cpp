@@ -46,7 +46,9 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"work", {"device", "files", "sim", "store"}},
     {"commands", {"report", "work", "sim", "statistics", "chart"}},
     {"cli", {"commands"}},
-    {"main", {"cli", "posix", "shipped"}},
+    {"forward", {"commands"}},
+    {"page", {"commands"}},
+    {"main", {"cli", "posix", "shipped", "forward", "page"}},
 };
 
 /// Headers that begin so are included in these areas only.
@@ -59,6 +61,9 @@ const std::vector<HomeOfHeader> homes = {
     {"CLI/", {"cli"}},
     {"yaml.h", {"files"}},
     {"sqlite3.h", {"store"}},
+    {"mosquitto.h", {"forward"}},
+    {"libpq-fe.h", {"forward"}},
+    {"httplib.h", {"page"}},
     {"nlohmann/", {}},
     {"modbus.h", {"posix"}},
     {"modbus/", {"posix"}},
@@ -235,7 +240,8 @@ std::string part_behind(std::string_view path, std::string_view prefix) {
 
 /// The layer that a file belongs to; empty when it is in none.
 std::string layer_of(std::string_view path) {
-  if (path == "src/main.cpp") return "main";
+  // The programs themselves: files in no folder below src.
+  if (path.starts_with("src/") && path.find('/', 4) == std::string_view::npos) return "main";
   const std::string public_layer = part_behind(path, "include/spindle/");
   return public_layer.empty() ? part_behind(path, "src/") : public_layer;
 }

@@ -25,6 +25,7 @@ struct World {
   Disk disk;
   Installation installation;
   files::ShippedProfiles shipped = {};  ///< the profiles of the program
+  commands::Companions companions = {};
 };
 
 /// The whole program: parses the arguments (without the program's name), runs one command, and

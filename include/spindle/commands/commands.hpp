@@ -110,6 +110,21 @@ struct RecordOptions {
 };
 Result<Outcome> record(const RecordOptions& options, Context& context);
 
+/// What `spindle forward` hands on, and to whom.
+struct ForwardOptions {
+  std::string sink;        ///< a URL, or a name under `sinks:` of the tools file
+  std::string store = {};  ///< empty: the user's own
+};
+Result<Outcome> forward(const ForwardOptions& options, Context& context);
+
+/// `spindle serve`: with targets, the tools that are held for other programs; without, the page.
+struct ServeOptions {
+  std::vector<std::string> targets = {};
+  std::string listen = {};  ///< ADDRESS:PORT of the gateway or of the page; empty: as usual
+  std::string store = {};   ///< that the page shows; empty: the user's own
+};
+Result<Outcome> serve(const ServeOptions& options, Context& context);
+
 /// Whether Cm and Cmk of one uninterrupted run are told, too.
 enum class MachineStudy : std::uint8_t { no, yes };
 

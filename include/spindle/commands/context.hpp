@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "spindle/commands/companions.hpp"
 #include "spindle/report/progress.hpp"
 #include "spindle/report/renderer.hpp"
 #include "spindle/report/streams.hpp"
@@ -41,6 +42,7 @@ struct Surroundings {
   report::Streams& io;
   const sim::Serve& serve;
   const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
+  const Companions& companions;
   UserOptions user = {};
 };
 

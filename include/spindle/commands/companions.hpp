@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+
+#include "spindle/base/error.hpp"
+
+namespace spindle::commands {
+
+class Outcome;
+struct Context;
+struct ForwardOptions;
+struct ServeOptions;
+
+/// What programs of their own do, because they alone need the libraries for it: spindle itself
+/// starts fast, and what holds the tools never talks to the plant's network. In spindle each of
+/// these goes on as the other program, with the same arguments; in that program it does the work.
+struct Companions {
+  std::function<Result<Outcome>(const ForwardOptions&, Context&)> forward = {};
+  std::function<Result<Outcome>(const ServeOptions&, Context&)> page = {};
+};
+
+}  // namespace spindle::commands
