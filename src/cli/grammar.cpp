@@ -272,8 +272,6 @@ void add_get(CLI::App& app, ParseState& draft) {
                 bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "show what the profile marks as secret");
                 bind_jobs(bind, options.jobs);
               });
 }

@@ -32,7 +32,7 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
     for (const device::Reading& reading : readings) {
       if (reading.value) {
         outcome.succeed();
-        listing.add(value_record(reading, tool.target, context.clock, *options_));
+        listing.add(value_record(reading, tool.target, context.clock, options_->limits));
       } else {
         outcome.fail(reading.value.error());
         listing.add(reading.value.error());

@@ -1,7 +1,6 @@
 #include "spindle/device/device.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <utility>
@@ -88,9 +87,6 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
   }
   if (catalogue::sends_unasked(profile)) {
     limits.forbidden_shapes.push_back(read_of(shape_of(*profile.events)));
-  }
-  for (const catalogue::UnaskedFrame& frame : profile.link.unasked) {
-    limits.forbidden_shapes.push_back(read_of(shape_of(frame)));
   }
   for (const link::SpontaneousShape& shape : unasked) {
     limits.forbidden_shapes.push_back(read_of(shape));
@@ -185,16 +181,6 @@ std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& o
   return options.shown.empty() || options.shown == endpoint.text ? std::string() : endpoint.text;
 }
 
-/// The text is the whole serial number; what function 17 says is compared with it.
-void take_serial(std::string serial, catalogue::Identity& identity) {
-  if (serial.empty() || serial == identity.serial) return;
-  if (!identity.serial.empty()) {
-    identity.notes.push_back(fmt::format(
-        "serial number is {} in its registers, and {} by function 17", serial, identity.serial));
-  }
-  identity.serial = std::move(serial);
-}
-
 }  // namespace
 
 modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkSpec& facts) {
@@ -212,10 +198,6 @@ modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::Link
 
 link::SpontaneousShape shape_of(const catalogue::EventSpec& events) {
   return {events.function, static_cast<std::uint8_t>(2 * events.count)};
-}
-
-link::SpontaneousShape shape_of(const catalogue::UnaskedFrame& frame) {
-  return {frame.function, static_cast<std::uint8_t>(2 * frame.count)};
 }
 
 Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
@@ -335,62 +317,27 @@ Result<void> Device::require_known_registers() {
   registers_known_ = judgement == catalogue::Judgement::fits;
   identity_text_ =
       fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
-  if (!registers_known_) return tl::unexpected(misfit(judgement, identity));
-  identity_ = std::move(identity);
-  return ask_more();
-}
-
-Error Device::misfit(catalogue::Judgement judgement, const catalogue::Identity& identity) const {
-  const auto& facts = *profile_->identity;
-  Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
-  switch (judgement) {
-    case catalogue::Judgement::other_product:
-      error.code = Errc::mismatch;
-      error.message = fmt::format("this is not what profile {} describes: {}", profile_->id,
-                                  catalogue::misfit(*profile_, identity));
-      error.hint = fmt::format("name its own profile: --profile {}", identity.product_profile);
-      break;
-    case catalogue::Judgement::later:
-      error.message = fmt::format("firmware {} has other registers than profile {} (below {})",
-                                  *identity.firmware, profile_->id, facts.firmware_below);
-      break;
-    case catalogue::Judgement::earlier:
-      error.message = fmt::format("firmware {} has other registers than profile {} (from {})",
-                                  *identity.firmware, profile_->id, facts.firmware_from);
-      break;
-    case catalogue::Judgement::unknown:
-    case catalogue::Judgement::fits:
-      error.message = fmt::format(
-          "the tool does not identify itself as profile {} expects, so its registers "
-          "are not known",
-          profile_->id);
-      break;
-  }
-  return error;
-}
-
-Result<void> Device::ask_more() {
-  if (!identity_ || !profile_->identity || !profile_->identity->has_more()) return {};
-  const auto& facts = *profile_->identity;
-  std::vector<std::string> names = {facts.model_from, facts.serial_from};
-  for (const catalogue::Text& name : facts.version_from) names.push_back(name);
-  std::erase(names, "");
-  TRY_LET(const auto parameters, profile_->select(names));
-  TRY_LET(const auto readings, read_each(parameters, Limits::skip));
-  const auto told = [&](std::string_view name) -> std::string {
-    for (const Reading& reading : readings) {
-      const bool is_meant = !name.empty() && reading.parameter.name == name;
-      if (is_meant && reading.value) return reading.value->to_string();
-    }
+  if (registers_known_) {
+    identity_ = std::move(identity);
     return {};
-  };
-  if (auto model = told(facts.model_from); !model.empty()) identity_->tool_model = model;
-  take_serial(told(facts.serial_from), *identity_);
-  std::vector<std::string> numbers;
-  for (const catalogue::Text& name : facts.version_from) numbers.push_back(told(name));
-  const bool is_whole = std::find(numbers.begin(), numbers.end(), "") == numbers.end();
-  if (is_whole) identity_->version = fmt::format("{}", fmt::join(numbers, "."));
-  return {};
+  }
+  Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
+  if (judgement == catalogue::Judgement::other_product) {
+    error.code = Errc::mismatch;
+    error.message = fmt::format("this is not what profile {} describes: {}", profile_->id,
+                                catalogue::misfit(*profile_, identity));
+    error.hint = fmt::format("name its own profile: --profile {}", identity.product_profile);
+    return tl::unexpected(std::move(error));
+  }
+  error.message =
+      judgement == catalogue::Judgement::later
+          ? fmt::format("firmware {} has other registers than profile {} (below {})",
+                        *identity.firmware, profile_->id, facts.firmware_below)
+          : fmt::format(
+                "the tool does not identify itself as profile {} expects, so its registers "
+                "are not known",
+                profile_->id);
+  return tl::unexpected(std::move(error));
 }
 
 Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& parameters,

@@ -270,12 +270,6 @@ void read_secret(const YamlNode& node, Parameter& parameter, const Asked& asked)
   if (secret) parameter.secrecy = catalogue::Secrecy::secret;
 }
 
-void read_guarded(const YamlNode& node, Parameter& parameter, const Asked& asked) {
-  bool guarded = false;
-  read_value(node, guarded, asked);
-  if (guarded) parameter.guarding = catalogue::Guarding::alone;
-}
-
 constexpr Field<Parameter> parameter_fields[] = {
     custom("name", Need::required, "text", read_name),
     field<&Parameter::title>("title", Need::required),
@@ -331,7 +325,6 @@ constexpr Field<Parameter> parameter_fields[] = {
     field<&Parameter::note>("note").shared(),
     word<clone_words, &Parameter::cloning>("clone", Need::optional, "value of clone").shared(),
     custom("secret", Need::optional, "true | false", read_secret).shared(),
-    custom("guarded", Need::optional, "true | false", read_guarded).shared(),
 };
 
 constexpr Field<Template> template_fields[] = {

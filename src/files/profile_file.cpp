@@ -156,11 +156,6 @@ constexpr Field<SerialSpec> serial_fields[] = {
     field<&SerialSpec::broadcast_pause>("broadcast-pause"),
 };
 
-constexpr Field<catalogue::UnaskedFrame> unasked_fields[] = {
-    field<&catalogue::UnaskedFrame::function>("function", Need::required),
-    field<&catalogue::UnaskedFrame::count>("count", Need::required),
-};
-
 constexpr Field<LinkSpec> link_fields[] = {
     word<framing_words, &LinkSpec::framing>("framing", Need::inherited),
     field<&LinkSpec::port>("port"),
@@ -188,7 +183,6 @@ constexpr Field<LinkSpec> link_fields[] = {
     map_of<serial_fields, &LinkSpec::serial>("serial"),
     field<&LinkSpec::contiguous>("contiguous").with(keys_of<areas_fields>),
     field<&LinkSpec::absent>("absent").with(keys_of<areas_fields>),
-    list_of<unasked_fields, &LinkSpec::unasked>("unasked"),
 };
 
 // ---- identity ----
@@ -204,22 +198,6 @@ constexpr Field<IdentitySpec> total_fields[] = {
     field<&IdentitySpec::total_bytes>("from-bytes", Need::inherited),
     field<&IdentitySpec::total>("at", Need::inherited),
 };
-
-constexpr Field<catalogue::FirmwareCaution> caution_fields[] = {
-    range<&catalogue::FirmwareCaution::from, &catalogue::FirmwareCaution::to>("firmware",
-                                                                              Need::required),
-    field<&catalogue::FirmwareCaution::text>("text", Need::required),
-};
-
-constexpr Field<IdentitySpec> told_fields[] = {
-    field<&IdentitySpec::model_from>("model"),
-    field<&IdentitySpec::serial_from>("serial"),
-    field<&IdentitySpec::version_from>("version"),
-};
-
-void read_told(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
-  read_map(told_fields, node, identity, asked.findings);
-}
 
 void read_long_serial(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
   read_map(long_serial_fields, node, identity, asked.findings, identity.long_serial_bytes != 0);
@@ -239,11 +217,8 @@ constexpr Field<IdentitySpec> identity_fields[] = {
     custom("long-serial", Need::optional, "map", read_long_serial)
         .with(keys_of<long_serial_fields>),
     custom("total", Need::optional, "map", read_total).with(keys_of<total_fields>),
-    field<&IdentitySpec::models>("models"),
-    field<&IdentitySpec::firmware_from>("firmware-from"),
+    field<&IdentitySpec::models>("models", Need::inherited),
     field<&IdentitySpec::firmware_below>("firmware-below"),
-    list_of<caution_fields, &IdentitySpec::cautions>("cautions"),
-    custom("told-by", Need::optional, "map", read_told).with(keys_of<told_fields>),
 };
 
 // ---- events, limits, numbered ----
@@ -406,7 +381,6 @@ constexpr Field<ProfileDraft> common_fields[] = {
 };
 
 constexpr Field<ProfileDraft> list_fields[] = {
-    word<catalogue::writes_words, &ProfileDraft::profile, &Profile::writes>("writes"),
     field<&ProfileDraft::profile, &Profile::exceptions>("exceptions").with(code_list_keys),
     custom("parameters", Need::optional, "list of maps", read_parameters).with(parameter_keys),
     custom("actions", Need::optional, "list of maps", read_actions).with(action_keys),
@@ -463,9 +437,6 @@ constexpr Section sections[] = {
         field<&ProfileDraft::profile, &Profile::alarm_reset>("alarm-reset"),
         &ProfileDraft::alarm_reset),
     map_section<&Profile::unlock, unlock_fields>("unlock", &ProfileDraft::unlock),
-    section<&Profile::torque_unit_from>(
-        field<&ProfileDraft::profile, &Profile::torque_unit_from>("torque-unit"),
-        &ProfileDraft::torque_unit),
 };
 
 /// Reads a section where it is there, and remembers where it stands.

@@ -47,7 +47,6 @@ struct ProfileDraft {
   Origin watched = {};
   Origin alarm_reset = {};
   Origin unlock = {};
-  Origin torque_unit = {};
   // Of the layer that is read now.
   Numbering numbering = Numbering::address;
   std::vector<std::string> dropped = {};

@@ -10,7 +10,6 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
-#include "spindle/catalogue/unit.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/catalogue/write_order.hpp"
 
@@ -369,44 +368,6 @@ void secrets_are_stored(const ProfileDraft& draft, Diagnostics& findings) {
   });
 }
 
-/// What is written alone waits for no other value, and no other waits for it.
-void guarded_stand_alone(const ProfileDraft& draft, Diagnostics& findings) {
-  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
-    if (parameter.guarding == catalogue::Guarding::none) return;
-    if (parameter.access == Access::read_only) {
-      findings.add_once(origin.of("guarded"),
-                        fmt::format("{}: what is read-only is never written, so 'guarded' says "
-                                    "nothing",
-                                    parameter.name));
-    } else if (!parameter.before.empty() || !parameter.after.empty() ||
-               !parameter.scale_by.empty()) {
-      findings.add_once(origin.of("guarded"),
-                        fmt::format("{}: what is guarded is written alone, so it has no 'before', "
-                                    "'after' or 'scale-from'",
-                                    parameter.name));
-    }
-  });
-}
-
-void torque_unit_is_known(const ProfileDraft& draft, Diagnostics& findings) {
-  const std::string name = draft.profile.torque_unit_from;
-  if (name.empty()) return;
-  if (draft.lacks(name)) {
-    findings.add_once(draft.torque_unit.entry->at, no_such_parameter(draft, name));
-  }
-  const Parameter* parameter = parameter_named(draft, name);
-  if (parameter == nullptr) return;
-  if (parameter->labels.empty()) {
-    findings.add_once(draft.torque_unit.entry->at,
-                      fmt::format("{} has no labels that are units", name));
-  }
-  for (const Label& label : parameter->labels) {
-    if (catalogue::is_torque(label.text)) continue;
-    findings.add_once(draft.torque_unit.entry->at,
-                      fmt::format("{}: '{}' is no unit of torque that is known", name, label.text));
-  }
-}
-
 /// The first thing wrong with a list of labels; empty when it is good.
 std::string fault_of(const catalogue::List<Label>& labels, const Parameter& parameter) {
   Parameter earlier = parameter;
@@ -588,62 +549,6 @@ void identity_slices_fit(const ProfileDraft& draft, Diagnostics& findings) {
   check("serial", facts.serial, facts.minimum_bytes);
   check("long-serial", facts.long_serial, facts.long_serial_bytes);
   check("total", facts.total, facts.total_bytes);
-}
-
-/// Without a table of models a tool is known by what its serial number says it is.
-void identity_tells_products(const ProfileDraft& draft, Diagnostics& findings) {
-  if (!draft.profile.identity) return;
-  const catalogue::IdentitySpec& facts = *draft.profile.identity;
-  const bool has_products = !facts.products.empty() && facts.long_serial_bytes != 0;
-  const bool has_firmware = facts.firmware_from != 0 || facts.firmware_below != 0;
-  if (facts.models.empty() && !(has_products && has_firmware)) {
-    findings.add_once(draft.identity.of("models"),
-                      "key 'models' is missing; without it a tool is known by 'products' of its "
-                      "'long-serial' and by 'firmware-from' or 'firmware-below'");
-  }
-  if (facts.firmware_below != 0 && facts.firmware_from >= facts.firmware_below) {
-    findings.add_once(draft.identity.of("firmware-from"),
-                      fmt::format("there is no firmware from {} below {}", facts.firmware_from,
-                                  facts.firmware_below));
-  }
-}
-
-/// What a tool says of itself beside its identity are parameters.
-void identity_is_told_by_parameters(const ProfileDraft& draft, Diagnostics& findings) {
-  if (!draft.profile.identity) return;
-  const catalogue::IdentitySpec& facts = *draft.profile.identity;
-  const auto check = [&](const std::string& name, bool is_text) {
-    if (name.empty()) return;
-    if (draft.lacks(name)) {
-      findings.add_once(draft.identity.of("told-by"), no_such_parameter(draft, name));
-    }
-    const Parameter* parameter = parameter_named(draft, name);
-    if (parameter == nullptr) return;
-    const bool fits = is_text ? parameter->encoding.kind == catalogue::Kind::text
-                              : parameter->encoding.is_integer();
-    if (fits && parameter->reading == catalogue::Reading::harmless) return;
-    findings.add_once(draft.identity.of("told-by"),
-                      fmt::format("{} is no {}", name, is_text ? "text" : "whole number"));
-  };
-  check(facts.model_from, true);
-  check(facts.serial_from, true);
-  for (const catalogue::Text& name : facts.version_from) check(name, false);
-}
-
-void unasked_frames_are_answers(const ProfileDraft& draft, Diagnostics& findings) {
-  for (const catalogue::UnaskedFrame& frame : draft.profile.link.unasked) {
-    constexpr auto holding =
-        static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers);
-    constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
-    if (frame.function != holding && frame.function != input) {
-      findings.add_once(draft.link.of("unasked"),
-                        "frames that come unasked look like answers to function 3 or 4");
-    } else if (frame.count < 2 || frame.count > modbus::max_read_count) {
-      findings.add_once(draft.link.of("unasked"),
-                        fmt::format("a frame that comes unasked holds 2 to {} registers",
-                                    modbus::max_read_count));
-    }
-  }
 }
 
 void event_block_is_legal(const ProfileDraft& draft, Diagnostics& findings) {
@@ -885,7 +790,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Diagnostics& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Diagnostics&);
 
-constexpr std::array<Rule, 42> rules = {
+constexpr std::array<Rule, 37> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -903,8 +808,6 @@ constexpr std::array<Rule, 42> rules = {
     settling_ends,
     read_only_has_no_hazard,
     secrets_are_stored,
-    guarded_stand_alone,
-    torque_unit_is_known,
     defaults_fit,
     labels_are_unique,
     entries_have_a_source,
@@ -914,9 +817,6 @@ constexpr std::array<Rule, 42> rules = {
     effects_are_of_values,
     link_is_usable,
     identity_slices_fit,
-    identity_tells_products,
-    identity_is_told_by_parameters,
-    unasked_frames_are_answers,
     event_block_is_legal,
     event_source_is_complete,
     event_flag_is_consumed,

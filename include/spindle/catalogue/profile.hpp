@@ -50,13 +50,6 @@ struct UnitRange {
   }
 };
 
-/// Frames that may come although nothing asked for them: they look like the answer to a read of so
-/// many registers by this function.
-struct UnaskedFrame {
-  std::uint8_t function = 0;  ///< 3 or 4
-  std::uint16_t count = 0;
-};
-
 /// How to talk to this product. Values come from the profile, each with its evidence there.
 struct LinkSpec {
   modbus::Framing framing = modbus::Framing::tcp;
@@ -91,8 +84,6 @@ struct LinkSpec {
   SerialSpec serial = {};
   List<Area> contiguous = {};  ///< registers may be read along here
   List<Area> absent = {};      ///< registers said not to exist
-  /// Beside those of `events`. Such a read is never sent.
-  List<UnaskedFrame> unasked = {};
 };
 
 /// Whether a value of this encoding can be written. Error `usage`: values of several registers are
@@ -339,14 +330,6 @@ struct SimulationSpec {
   List<Area> absent = {};  ///< registers that answer exception 02
 };
 
-/// Which registers may be written.
-enum class Writes : std::uint8_t {
-  any,     ///< also those that the profile does not know, where the user insists
-  listed,  ///< only those of its writable parameters and of its actions
-};
-inline constexpr auto writes_words =
-    enum_table<Writes>({{"any", Writes::any}, {"listed", Writes::listed}});
-
 /// A register that has to hold a value before others can be written. It is put back afterwards.
 struct UnlockSpec {
   Text parameter = {};
@@ -377,8 +360,6 @@ class Profile {
   Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named
   std::optional<UnlockSpec> unlock = std::nullopt;
-  Writes writes = Writes::any;
-  Text torque_unit_from = {};  ///< parameter whose labels are units of torque; may be empty
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; those
@@ -413,14 +394,6 @@ class Profile {
   /// named or numbered.
   [[nodiscard]] bool writable(modbus::RegisterTable table, modbus::RegisterAddress address) const;
 
-  /// Whether the profile allows a write to these registers at all, whatever the user says. Error
-  /// `read_only` where only listed registers may be written (`writes`), and one of these is none.
-  [[nodiscard]] Result<void> may_write(modbus::RegisterTable table, modbus::RegisterAddress first,
-                                       std::size_t count) const;
-
-  /// Whether it has parameters that are written alone.
-  [[nodiscard]] bool has_guarded() const;
-
   /// Whether a write to this parameter is a command to the motor of `run`.
   [[nodiscard]] bool commands_motion(const Parameter& parameter) const {
     return run && run->is_command(parameter.name);
@@ -435,9 +408,9 @@ class Profile {
   };
   [[nodiscard]] std::optional<LimitRegisters> limit_registers(const Parameter& parameter) const;
 
-  /// This parameter, marked as a secret, and as guarded, where one of its registers is part of one
-  /// that is: by whatever name or number it is asked for.
-  [[nodiscard]] Parameter marked(Parameter parameter) const;
+  /// This parameter, marked as a secret where one of its registers is part of one: a secret is one
+  /// by whatever name or number it is asked for.
+  [[nodiscard]] Parameter with_secrecy(Parameter parameter) const;
 };
 
 /// Whether the product sends frames that nothing asked for.
@@ -447,7 +420,6 @@ bool sends_unasked(const Profile& profile);
 enum class Judgement : std::uint8_t {
   fits,           ///< nothing contradicts the profile
   other_product,  ///< the tool is another product of the same maker and generation
-  earlier,        ///< its firmware has other registers
   later,          ///< its firmware has other registers
   unknown,        ///< it is no product that the profile knows
 };

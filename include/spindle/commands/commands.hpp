@@ -36,7 +36,6 @@ struct GetOptions {
   std::string target;  ///< or a group
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
-  Secrets secrets = Secrets::leave_out;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> get(const GetOptions& options, Context& context);

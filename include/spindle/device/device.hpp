@@ -25,7 +25,6 @@ modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::Link
 
 /// The frames that an armed tool sends.
 link::SpontaneousShape shape_of(const catalogue::EventSpec& events);
-link::SpontaneousShape shape_of(const catalogue::UnaskedFrame& frame);
 
 /// What the user may override of a profile's link facts.
 struct LinkOptions {
@@ -172,14 +171,10 @@ class Device {
   void set_retries(unsigned retries);
 
   /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
-  /// and refuses with `wrong_generation` a tool whose firmware is earlier, later, or unknown (also
-  /// when FC 11h is refused), and with `mismatch` another product: on such a tool only raw
-  /// registers may be read.
+  /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
+  /// 11h is refused), and with `mismatch` another product: on such a tool only raw registers may be
+  /// read.
   Result<void> require_known_registers();
-
-  /// Reads what else the tool says of itself, where the profile says in which registers, into
-  /// identity(). What it refuses stays empty. Requires registers that are known.
-  Result<void> ask_more();
 
   /// What the tool said of itself when its registers were last checked: "serial 1021100042,
   /// firmware 2103"; empty before.
@@ -285,8 +280,6 @@ class Device {
   std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
                                                 const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
-  [[nodiscard]] Error misfit(catalogue::Judgement judgement,
-                             const catalogue::Identity& identity) const;
   Result<void> write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
                                const Registers& registers);
   Result<Registers> registers_for(const catalogue::Parameter& parameter,
