@@ -13,4 +13,10 @@ namespace spindle::posix {
 /// Returns only where that fails: `bad_file`, when the program is not installed or cannot be run.
 Error go_on_as(std::string_view program, const std::vector<std::string>& arguments);
 
+/// The paths under which it may be, the better ones first.
+std::vector<std::string> companion_places(std::string_view program);
+
+/// Why it could not be run; `failure` as errno tells it.
+Error no_companion(std::string_view program, int failure);
+
 }  // namespace spindle::posix
