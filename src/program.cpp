@@ -4,7 +4,10 @@
 #include "spindle/commands/commands.hpp"
 #include "spindle/posix/companion.hpp"
 #include "spindle/posix/disk.hpp"
+#include "spindle/posix/doors.hpp"
+#include "spindle/posix/helper.hpp"
 #include "spindle/posix/serve.hpp"
+#include "spindle/posix/service.hpp"
 #include "spindle/posix/signals.hpp"
 #include "spindle/posix/streams.hpp"
 #include "spindle/posix/world.hpp"
@@ -23,6 +26,9 @@ commands::Companions with_programs(commands::Companions own, const Words& words)
   };
   if (!own.forward) own.forward = go_on_as("spindle-forward");
   if (!own.page) own.page = go_on_as("spindle-serve");
+  own.start_forward = [](const Words& arguments, Clock& clock, const Interrupt& interrupt) {
+    return posix::start_helper("spindle-forward", arguments, clock, interrupt);
+  };
   return own;
 }
 
@@ -45,8 +51,10 @@ int run_program(int count, char** arguments, commands::Companions own) {
                    .environment = environment,
                    .disk = local_disk(environment("SPINDLE_TRUST").value_or("")),
                    .installation = installation(),
+                   .make_doors = door_maker(clock, signals.interrupt()),
                    .shipped = shipped::profiles(),
-                   .companions = with_programs(std::move(own), words)};
+                   .companions = with_programs(std::move(own), words),
+                   .supervision = supervision<commands::Supervision>(signals)};
   return cli::run(words, world);
 }
 

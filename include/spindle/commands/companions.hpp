@@ -1,8 +1,14 @@
 #pragma once
 
 #include <functional>
+#include <memory>
+#include <string>
+#include <vector>
 
+#include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
+#include "spindle/base/interrupt.hpp"
+#include "spindle/base/line_channel.hpp"
 
 namespace spindle::commands {
 
@@ -17,6 +23,10 @@ struct ServeOptions;
 struct Companions {
   std::function<Result<Outcome>(const ForwardOptions&, Context&)> forward = {};
   std::function<Result<Outcome>(const ServeOptions&, Context&)> page = {};
+  /// Starts the program of `forward` beside this one, with these arguments; may be empty.
+  std::function<Result<std::unique_ptr<LineChannel>>(const std::vector<std::string>& arguments,
+                                                     Clock& clock, const Interrupt& interrupt)>
+      start_forward = {};
 };
 
 }  // namespace spindle::commands
