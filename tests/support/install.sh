@@ -13,7 +13,7 @@ test_packages=(
   doctest-dev nlohmann-json3-dev mold
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
-  python3-jsonschema mandoc dpkg-dev lintian sqlite3
+  python3-jsonschema mandoc dpkg-dev lintian sqlite3 systemd
   python3-scipy python3-statsmodels chromium
   mosquitto mosquitto-clients python3-paho-mqtt postgresql python3-psycopg2 curl
 )

@@ -51,6 +51,10 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"main", {"cli", "posix", "shipped", "forward", "page"}},
 };
 
+/// The programs themselves, in no folder.
+const Names programs = {"src/main.cpp", "src/forward_main.cpp", "src/page_main.cpp",
+                        "src/program.cpp", "src/program.hpp"};
+
 /// Headers that begin so are included in these areas only.
 struct HomeOfHeader {
   std::string_view prefix;
@@ -240,8 +244,7 @@ std::string part_behind(std::string_view path, std::string_view prefix) {
 
 /// The layer that a file belongs to; empty when it is in none.
 std::string layer_of(std::string_view path) {
-  // The programs themselves: files in no folder below src.
-  if (path.starts_with("src/") && path.find('/', 4) == std::string_view::npos) return "main";
+  if (programs.contains(path)) return "main";
   const std::string public_layer = part_behind(path, "include/spindle/");
   return public_layer.empty() ? part_behind(path, "src/") : public_layer;
 }
@@ -373,7 +376,7 @@ void check_pragma_once(const Source& source, Diagnostics& findings) {
 }
 
 void check_main(const Source& source, Diagnostics& findings) {
-  if (layer_of(source.path) != "main") return;
+  if (!source.path.ends_with("main.cpp") || layer_of(source.path) != "main") return;
   const std::vector<std::string> lines = lines_of(statements_of(source));
   const auto code_lines = std::count_if(
       lines.begin(), lines.end(), [](const std::string& line) { return !trimmed(line).empty(); });
