@@ -129,6 +129,16 @@ class Recorded(unittest.TestCase):
             self.assertEqual(support.wait_for_end(recorder.process), 0)
             self.assertEqual(recorder.process.stdout.read(), b"")
 
+    def test_without_a_target_all_of_the_tools_file_is_recorded(self):
+        with EventServer(serial=1) as one, EventServer(serial=2) as other:
+            tools = self.folder / "tools.yaml"
+            tools.write_text(f"tools:\n  a: {{url: '{one.url}', profile: doga-bm}}\n"
+                             f"  b: {{url: '{other.url}', profile: doga-bm}}\n")
+            with Recording(self.path, environment={"SPINDLE_TOOLS": str(tools)}) as recorder:
+                for tool in (one, other):
+                    support.wait_until(lambda tool=tool: tool.caught_up, "the recorder listens")
+                recorder.end()
+
     def test_a_restart_says_its_gap_and_fetches_the_last(self):
         with EventServer() as tool:
             with Recording(self.path, tool.url, *PROFILE) as recorder:
