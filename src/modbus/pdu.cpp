@@ -186,7 +186,7 @@ bool answers(const Pdu& request, const Pdu& response) {
     case FunctionCode::report_server_id:
       return answers_report_server_id(response.data);
   }
-  return true;  // its shape is not known here
+  return false;
 }
 
 std::string_view plural(std::size_t count) { return count == 1 ? "" : "s"; }

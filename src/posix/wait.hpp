@@ -6,7 +6,6 @@
 #include <ctime>
 #include <span>
 
-#include "posix/descriptor.hpp"
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/base/interrupt.hpp"
@@ -39,12 +38,10 @@ Woken wait_for(Interest interest, TimePoint deadline, const Clock& clock,
 /// The waits of one line, which interrupts end until it is shielded.
 class LineWait {
  public:
-  LineWait(const Clock& clock, const Interrupt& interrupt);
+  LineWait(const Clock& clock, const Interrupt& interrupt)
+      : clock_(&clock), interrupt_(&interrupt) {}
 
   void set_uninterruptible() { shield_ = Shield::up; }
-  void set_interruptible() { shield_ = Shield::down; }
-  /// Ends the wait for something to read, or the next one, as its deadline would. By any thread.
-  void wake() const;
 
   /// Error: the interrupt that is raised.
   [[nodiscard]] Result<void> check() const;
@@ -56,7 +53,6 @@ class LineWait {
   const Clock* clock_;
   const Interrupt* interrupt_;
   Shield shield_ = Shield::down;
-  Descriptor wake_;  ///< invalid where there is none left: then nothing wakes
 };
 
 }  // namespace spindle::posix
