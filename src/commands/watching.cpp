@@ -44,7 +44,9 @@ std::vector<const catalogue::Profile*> candidates(ProfileShelf& shelf, const Con
 /// Motors have other columns than tools that count their results.
 std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, ProfileShelf& shelf,
                                         const WatchOptions& options, const Context& context) {
-  const bool one = tools.size() == 1 && !names_group(options.targets.front());
+  // All of the tools file, which needs no name, is like a group.
+  const bool is_named = !options.targets.empty() && !names_group(options.targets.front());
+  const bool one = tools.size() == 1 && is_named;
   const Tools shown = one ? Tools::one : Tools::several;
   const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
     return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&

@@ -139,6 +139,15 @@ class Recorded(unittest.TestCase):
                     support.wait_until(lambda tool=tool: tool.caught_up, "the recorder listens")
                 recorder.end()
 
+    def test_a_tools_file_of_one_tool_is_recorded_and_told(self):
+        with EventServer() as tool:
+            tools = self.folder / "tools.yaml"
+            tools.write_text(f"tools:\n  a: {{url: '{tool.url}', profile: doga-bm}}\n")
+            with Recording(self.path, environment={"SPINDLE_TOOLS": str(tools)}) as recorder:
+                support.wait_until(lambda: recorder.records("event"), "the last event is told")
+                status, said = recorder.end()
+                self.assertEqual(status, 0, said)
+
     def test_a_restart_says_its_gap_and_fetches_the_last(self):
         with EventServer() as tool:
             with Recording(self.path, tool.url, *PROFILE) as recorder:
