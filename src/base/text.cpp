@@ -215,6 +215,16 @@ std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t
   return number;
 }
 
+std::string with_article(std::string_view name) {
+  const auto is_lower = [](char c) { return c >= 'a' && c <= 'z'; };
+  // A word is read as one; capitals and digits are spelt, and "F" is spoken "ef".
+  const bool is_word = name.size() > 1 && (is_lower(name[0]) || is_lower(name[1]));
+  const std::string_view vowels = is_word ? "AEIOaeio" : "AEFHILMNORSX8";
+  const bool begins_with_vowel =
+      !name.empty() && vowels.find(name.front()) != std::string_view::npos;
+  return fmt::format("{} {}", begins_with_vowel ? "an" : "a", name);
+}
+
 std::string counted(std::size_t count, std::string_view noun) {
   return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }

@@ -78,6 +78,8 @@ struct AllOptions {
   ScanArguments scan;
   WatchArguments watch;
   commands::RecordOptions record;
+  commands::ForwardOptions forward;
+  commands::ServeOptions serve;
   commands::ReportOptions report;
   commands::RemoteStartOptions remote_start;
   commands::RemoteStopOptions remote_stop;
@@ -94,6 +96,8 @@ struct AllOptions {
   commands::TrimOptions store_trim;
   commands::CopyOptions store_backup;
   commands::CopyOptions store_export;
+  commands::StoreOptions store_sinks;
+  commands::ForgetOptions store_forget;
   commands::ProfileNameOptions profile;
   commands::ProfileNameOptions profile_list;
   commands::ProfileNameOptions profile_show;
@@ -430,6 +434,13 @@ std::string trouble_words() {
   return text;
 }
 
+void bind_gateway(Binder& bind, std::string& listen, link::Rights& rights,
+                  std::string_view meaning) {
+  bind.option("--listen", "[ADDRESS:]PORT", listen, meaning);
+  bind.flag("--allow-write", rights, link::Rights::write,
+            "let what other programs write through --listen pass");
+}
+
 /// The first argument is a target, and so is every one behind it that can be nothing else.
 Result<Outcome> run_watch(const WatchArguments& watch, Context& context) {
   commands::WatchOptions options = watch.options;
@@ -468,6 +479,8 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
               "the last event number that is known: what came since is told, or is a gap");
   bind.option("--store", "FILE", options.store,
               "go on behind the last events of this store (default: that of spindle record)");
+  bind_gateway(bind, options.gateway.listen, options.gateway.rights,
+               "let any program ask this tool in Modbus TCP, too");
 }
 
 void add_watch(CLI::App& app, ParseState& draft) {
@@ -479,18 +492,52 @@ void add_watch(CLI::App& app, ParseState& draft) {
   add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
 }
 
+std::string record_words() {
+  return "With --lease several collectors record the tools of one tools file, each tool by one of "
+         "them\n"
+         "at a time: who holds it is a row of the table spindle_lease, by the clock of the "
+         "database\n"
+         "('spindle forward SINK --print-schema' makes it; the role needs spindle_collector). Each "
+         "has a\n"
+         "store of its own, and a 'spindle forward' to that database. What a collector that died "
+         "held,\n"
+         "the others take within the time of a lease and two seconds, and go on behind the last "
+         "event\n"
+         "that the database has. A collector that begins takes only what is free. Where the "
+         "database\n"
+         "cannot be asked, what is held ends with its lease, and nothing is taken: no tool is "
+         "recorded\n"
+         "until it is back. Every collector needs a name of its own ('collector' of the sink, "
+         "else its\n"
+         "host name).\n";
+}
+
 void bind_record(Binder& bind, commands::RecordOptions& options) {
   bind.argument("TARGET", options.watch.targets, "tools (default: all of the tools file)");
   bind.option("--store", "FILE", options.store,
               "where results are kept (default: events.db in the user's folder of state)");
   bind.flag("--tee", options.tee, true, "show each record once it is stored");
+  bind.option("--metrics", "FILE", options.metrics,
+              "keep counters in this file, for Prometheus (such as spindle.prom)");
   bind.option("--commit", "DURATION", options.gather, to_duration,
               "how long results wait to be stored together (default 20ms)");
+  bind.option("--lease", "SINK", options.lease,
+              "share the tools with other collectors, by leases in this PostgreSQL database");
+  bind.option("--lease-ttl", "DURATION", options.lease_ttl, to_duration,
+              "how long a lease lasts that is not renewed (default 5s)");
+  bind.check([&options]() -> std::optional<Error> {
+    if (options.lease_ttl >= std::chrono::seconds(1)) return std::nullopt;
+    return Error{.code = Errc::out_of_range,
+                 .message = "a lease lasts one second or more",
+                 .name = "--lease-ttl"};
+  });
   bind.option("--interval", "DURATION", options.watch.interval, to_duration,
               "time between two polls (default 200ms)");
   bind.option("--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
               "end after so many events and changes are stored");
   bind.option("--duration", "DURATION", options.watch.duration, to_duration, "end after this time");
+  bind_gateway(bind, options.watch.gateway.listen, options.watch.gateway.rights,
+               "let any program ask this tool in Modbus TCP, too");
 }
 
 void add_record(CLI::App& app, ParseState& draft) {
@@ -499,10 +546,93 @@ void add_record(CLI::App& app, ParseState& draft) {
                            "watch tools and keep every result in a store, until stopped",
                            "spindle record\n"
                            "spindle record station3 --tee --json\n"
-                           "spindle record @line1 --store line1.db",
-                           nullptr,
+                           "spindle record @line1 --store line1.db\n"
+                           "spindle record --lease plant",
+                           record_words,
                            Invocation::ToolsFile::all_tools};
   add_command(app, draft, words, draft.options.record, commands::record, bind_record);
+}
+
+std::string forward_words() {
+  return "SINK is mqtts://HOST[:PORT][/TOPIC], mqtt://HOST, postgresql://HOST/DATABASE, or a name "
+         "under\n"
+         "'sinks' of the tools file, where user, password file, certificates and other servers\n"
+         "stand; see spindle-tools(5). A sink that is new gets everything in the store. Everything "
+         "is\n"
+         "sent until the sink acknowledged it, so that it may come twice, under the same key, and\n"
+         "nothing is lost; the store remembers where the sink is. What a sink refuses stays, and "
+         "is\n"
+         "tried again. --from sets the sink back for good: to the event of this id, or to what "
+         "was\n"
+         "stored since a time. To leave out what the sink has not got has to be said with --yes.\n"
+         "\n"
+         "MQTT 5 only, at least once (QoS 1). Topics below TOPIC (spindle/v1):\n"
+         "  TOOL/result, TOOL/gap          not retained; with 'events: all' also TOOL/event\n"
+         "  TOOL/state                     retained: link, last result, alarm\n"
+         "  _collector/NAME/status         retained: online or not (last will)\n"
+         "Characters of a tool's name that no level of a topic may have stand as %XX.\n";
+}
+
+void bind_forward(Binder& bind, commands::ForwardOptions& options) {
+  bind.required("SINK", options.sink, "a URL, or a name under 'sinks' of the tools file");
+  bind.option("--from", "ID|TIME", options.from, "set the sink back, or ahead, to here first");
+  bind.flag("--once", options.delivery, commands::Delivery::once,
+            "end when the sink has all that is in the store now");
+  bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+            "show what would be sent; send nothing");
+  bind.option("--window", "N", options.window, NumberFrom{1, 10'000},
+              "send at most so many that are not acknowledged (default 100; MQTT)");
+  bind.option("--metrics", "FILE", options.metrics, "keep counters there, for Prometheus");
+  bind.flag("--print-schema", options.print_schema, true,
+            "show the tables that a database has to have, for psql; nothing else is done");
+  bind.flag("--leases", options.keep_leases, true,
+            "keep leases for spindle record --lease, which starts this by itself");
+  bind.option("--store", "FILE", options.store, "the store (default: that of spindle record)");
+}
+
+void add_forward(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"forward", "SINK",
+                           "hand what was recorded on to a database or a broker, until stopped",
+                           "spindle forward plant\n"
+                           "spindle forward plant --once --from yesterday\n"
+                           "spindle forward plant --dry-run --json\n"
+                           "spindle forward mqtts://broker.example/acme/line1",
+                           forward_words};
+  add_command(app, draft, words, draft.options.forward, commands::forward, bind_forward);
+}
+
+void bind_serve(Binder& bind, commands::ServeOptions& options) {
+  bind.argument("TARGET", options.targets, "tools to hold for others; none: show the page");
+  bind_gateway(bind, options.listen, options.rights,
+               "of the page, or with TARGET of a Modbus TCP gateway");
+  bind.option("--store", "FILE", options.store,
+              "what the page shows (default: the store of spindle record)");
+  bind.option("--shift", "TIMES", options.shifts,
+              "when shifts begin, such as 06:00,14:00,22:00 (default: 00:00)");
+  bind.option("--token-file", "FILE", options.token_file,
+              "show the page only to those who have the token in it; needed for other computers");
+  bind.check([&options]() -> std::optional<Error> {
+    if (options.targets.empty()) {
+      if (options.rights == link::Rights::read) return std::nullopt;
+      return usage("serve: --allow-write is for a gateway, and without TARGET there is a page",
+                   "name the tools that are served");
+    }
+    if (options.store.empty() && options.shifts.empty() && options.token_file.empty()) {
+      return std::nullopt;
+    }
+    return usage("serve: --store, --shift and --token-file are for the page, which has no TARGET",
+                 "leave them out, or leave the tools out");
+  });
+}
+
+void add_serve(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"serve", "[TARGET...]",
+                           "a page of what is recorded, or tools that other programs ask",
+                           "spindle serve\n"
+                           "spindle serve --shift 06:00,14:00,22:00\n"
+                           "spindle serve --listen 192.0.2.5:8470 --token-file /etc/spindle/token\n"
+                           "spindle serve station3 --listen 127.0.0.1:1502"};
+  add_command(app, draft, words, draft.options.serve, commands::serve, bind_serve);
 }
 
 std::string report_words() {
@@ -1073,6 +1203,18 @@ void add_store_commands(CLI::App& store, ParseState& draft) {
                 bind_store(bind, options);
               });
   add_command(store, draft,
+              {"sinks", "", "who is served from the store, and how much still waits for each",
+               "spindle store sinks\nspindle store sinks --json", nullptr, no_tools},
+              draft.options.store_sinks, commands::list_sinks, bind_store);
+  add_command(store, draft,
+              {"forget", "SINK", "give a sink up, so that it holds back no trim; asks",
+               "spindle store forget old-broker", nullptr, no_tools},
+              draft.options.store_forget, commands::forget_sink,
+              [bind_store](Binder& bind, commands::ForgetOptions& options) {
+                bind.required("SINK", options.sink, "its name, as store sinks shows it");
+                bind_store(bind, options);
+              });
+  add_command(store, draft,
               {"export", "[FILE]", "everything in the store as JSON Lines",
                "spindle store export events.jsonl\nspindle store export - --store monday.db",
                nullptr, no_tools},
@@ -1086,14 +1228,14 @@ void add_store_commands(CLI::App& store, ParseState& draft) {
 
 void add_store(CLI::App& app, ParseState& draft) {
   using Options = commands::StoreOptions;
-  constexpr Words words = {"store", "check|trim|backup|export [FILE]",
+  constexpr Words words = {"store", "check|trim|backup|export|sinks|forget [FILE|SINK]",
                            "the completeness and the care of what was recorded",
                            "spindle store check\n"
                            "spindle store trim --before 90d\n"
                            "spindle store backup monday.db\n"
                            "spindle store export events.jsonl"};
   const auto none = [](const Options&, Context&) -> Result<Outcome> {
-    return tl::unexpected(Binder::missing("store", "check, trim, backup or export"));
+    return tl::unexpected(Binder::missing("store", "check, trim, backup, export, sinks or forget"));
   };
   add_command(app, draft, words, draft.options.store, none,
               [&draft](Binder& bind, Options&) { add_store_commands(bind.command(), draft); });
@@ -1105,10 +1247,10 @@ void build(CLI::App& app, ParseState& draft) {
   app.require_subcommand(0, 1);
   add_common_options(app, draft);
   for (const auto add :
-       {add_identify, add_list,     add_get,     add_set,   add_do,           add_watch,
-        add_record,   add_results,  add_report,  add_store, add_remote_start, add_remote_stop,
-        add_alarms,   add_backup,   add_dump,    add_diff,  add_restore,      add_ping,
-        add_scan,     add_simulate, add_profile, add_tools}) {
+       {add_identify,     add_list,        add_get,    add_set,      add_do,      add_watch,
+        add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
+        add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
+        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools}) {
     add(app, draft);
   }
 }
@@ -1246,7 +1388,8 @@ std::optional<std::string> option_without_value(const CLI::App& app) {
 /// itself where its tool is, and a stop that has one waits for no file. A command that takes no
 /// words at all is about the file, and so may be one that was given none.
 bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
-  constexpr std::array<std::string_view, 5> targets = {"TARGET", "BUS", "A", "B", "PATTERN"};
+  constexpr std::array<std::string_view, 6> targets = {"TARGET", "BUS",     "A",
+                                                       "B",      "PATTERN", "SINK"};
   bool takes_words = false;
   bool has_words = false;
   for (const CLI::Option* known : command.get_options()) {

@@ -119,20 +119,26 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
   const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
   const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.frames);
-  commands::Context context{
-      {.clock = world.clock,
-       .interrupt = world.interrupt,
-       .open = world.open,
-       .uninterruptible = world.uninterruptible,
-       .disk = world.disk,
-       .state_folder = state,
-       .version = version,
-       .profiles = profiles,
-       .tools = tools,
-       .show_frames = show_frames,
-       .common = invocation.common},
-      {.io = world.io, .serve = world.serve, .end_waits = world.end_waits, .user = invocation.user},
-      {.renderer = renderer}};
+  commands::Context context{{.clock = world.clock,
+                             .interrupt = world.interrupt,
+                             .open = world.open,
+                             .uninterruptible = world.uninterruptible,
+                             .disk = world.disk,
+                             .state_folder = state,
+                             .version = version,
+                             .profiles = profiles,
+                             .tools = tools,
+                             .show_frames = show_frames,
+                             .common = invocation.common,
+                             .make_doors = world.make_doors},
+                            {.io = world.io,
+                             .serve = world.serve,
+                             .end_waits = world.end_waits,
+                             .companions = world.companions,
+                             .user = invocation.user,
+                             .supervision = world.supervision},
+                            {.renderer = renderer}};
+  context.supervision.load_tools = [&] { return find_tools(world, invocation); };
   TRY(begin_capture(invocation.common.trace_file, world.disk));
   return invocation.run(context);
 }
@@ -207,8 +213,9 @@ int run(const std::vector<std::string>& arguments, World& world) {
     return run_guarded(arguments, world);
   } catch (const std::exception& exception) {
     // Every library is fenced where it is called; what arrives here is a bug of ours.
-    world.io.err(std::string("spindle: internal error: ") + exception.what() +
-                 "; please report it with the command line\n");
+    report::say_line(world.io, report::Severity::error,
+                     std::string("spindle: internal error: ") + exception.what() +
+                         "; please report it with the command line");
     return exit_status(ExitStatus::internal);
   }
 }

@@ -8,6 +8,7 @@
 #include "motor_records.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
+#include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/work/identification.hpp"
 #include "spindle/work/shared_lines.hpp"
@@ -100,7 +101,7 @@ Result<Identified> meet(OpenTool& tool, const Clock& clock) {
   found.identity.notes.push_back(fmt::format(
       "{}, but {} cannot prove what it is: profile {} is what the user named",
       tool.profile->link.loopback ? "answers a loop-back" : "answers",
-      tool.profile->series.empty() ? "it" : "a " + tool.profile->series, tool.profile->id));
+      tool.profile->series.empty() ? "it" : with_article(tool.profile->series), tool.profile->id));
   if (auto words = motor_state_words(tool); !words.empty()) {
     found.identity.notes.push_back(std::move(words));
   }

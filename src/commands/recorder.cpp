@@ -27,25 +27,41 @@ Error not_settled(std::string message) {
 
 }  // namespace
 
-Recorder::Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
-                   Context& context)
+Recorder::Recorder(store::Writer& writer, WatchStream& stream, ServiceNews& news,
+                   work::JournalOptions options, Context& context)
     : writer_(&writer),
       stream_(&stream),
+      news_(&news),
       context_(&context),
+      timed_(writer, counters_, context.clock),
       journal_(
-          writer, options,
+          timed_, std::move(options),
           [this](const store::Entry& entry, const store::Stored& stored) {
             if (const auto* gap = std::get_if<store::NewGap>(&entry)) tell_gap(*gap, stored);
           },
-          [this](const std::optional<Error>& error) {
-            if (error) {
-              stream_->fault(*error);
-            } else {
-              stream_->note("the store can be written again; what waited is stored");
-            }
-          }) {}
+          [this](const std::optional<Error>& error) { tell_trouble(error); }) {}
 
-Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::string& target) {
+void Recorder::tell_trouble(const std::optional<Error>& error) {
+  const bool waits =
+      error && (error->status() == ExitStatus::storage || error->status() == ExitStatus::bad_file);
+  news_->trouble(waits);
+  if (error) {
+    stream_->fault(*error);
+  } else {
+    stream_->note("the store can be written again; what waited is stored");
+  }
+}
+
+RecordedTool& Recorder::recorded(const Target& target) {
+  const std::lock_guard lock(mutex_);
+  const auto known = std::find_if(recorded_.begin(), recorded_.end(),
+                                  [&](const auto& one) { return one->entry() == target; });
+  if (known != recorded_.end()) return **known;
+  return *recorded_.emplace_back(std::make_unique<RecordedTool>(target, *this));
+}
+
+Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::string& target,
+                                        const RecordedTool& listener) {
   const store::ToolName own = {said.maker, fmt::format("{}@{}", said.serial, target)};
   TRY_LET(const bool has_own, writer_->has_tool(own));
   std::string holder;
@@ -53,16 +69,19 @@ Result<store::ToolName> Recorder::claim(const store::ToolName& said, const std::
   {
     const std::lock_guard lock(mutex_);
     const auto other = std::find_if(claims_.begin(), claims_.end(), [&](const auto& claim) {
-      return claim.second == said && claim.first != target;
+      return claim.second.name == said && claim.first != target;
     });
     if (other != claims_.end()) holder = other->first;
+    if (!holder.empty() && other->second.listener->is_leaving()) {
+      return tl::unexpected(not_settled("it was known by another name, which is being left"));
+    }
     // A tool that moved is met once more before its old link is known to be dead.
     const bool is_first = !holder.empty() && !has_own && met_.insert({target, said}).second;
     if (is_first) {
       return tl::unexpected(not_settled(
           "another tool that is connected says its serial number: it is looked at again"));
     }
-    claims_.insert_or_assign(target, holder.empty() && !has_own ? said : own);
+    claims_.insert_or_assign(target, Claim{holder.empty() && !has_own ? said : own, &listener});
     is_news = !holder.empty() && told_.insert(own).second;
   }
   if (is_news) {
@@ -81,8 +100,8 @@ Result<void> Recorder::settle(store::RowId tool, RecordedTool& listener) {
   const std::lock_guard lock(mutex_);
   const auto found = listeners_.find(tool);
   const bool is_new = found == listeners_.end() || found->second != &listener;
-  const bool was_here = found != listeners_.end();
-  if (was_here && (is_new || !listener.is_of(tool)) && journal_.waiting() > 0) {
+  const bool has_to_know = is_new || !listener.is_of(tool) || !listener.is_informed();
+  if (has_to_know && journal_.waits_for(tool)) {
     return tl::unexpected(not_settled("what the tool told before is still being stored"));
   }
   listeners_.insert_or_assign(tool, &listener);
@@ -97,7 +116,9 @@ void Recorder::tell_gap(const store::NewGap& entry, const store::Stored& stored)
     const auto found = listeners_.find(entry.gap.tool);
     if (found != listeners_.end()) listener = found->second;
   }
-  if (listener != nullptr) listener->tell_gap(work::news_of(entry.gap), stored);
+  if (listener == nullptr) return;
+  counters_.note_stored(listener->entry().shown, entry.gap);
+  listener->tell_gap(work::news_of(entry.gap), stored);
 }
 
 void Recorder::release(const std::string& target) {
@@ -106,8 +127,21 @@ void Recorder::release(const std::string& target) {
 }
 
 RecordedTool::RecordedTool(const Target& target, Recorder& recorder)
-    : target_(target), recorder_(&recorder) {
+    : entry_(target), target_(target), recorder_(&recorder) {
   voice_.records.emplace(target_, unknown_, catalogue::CodeTables());
+}
+
+void RecordedTool::begin(Assignment& assignment) {
+  assignment_ = &assignment;
+  recorder_->counters().begin(entry_.shown);
+  is_informed_ = false;
+  is_up_ = false;
+  link_text_.reset();
+  noted_at_.reset();
+}
+
+TimePoint RecordedTool::until() {
+  return is_leaving() ? TimePoint::min() : recorder_->stream().until();
 }
 
 void RecordedTool::opened(const WatchedTool& tool) {
@@ -130,12 +164,20 @@ void RecordedTool::left(const Result<void>& watched, const std::optional<Error>&
   flush_link();
   // Of a tool that is not connected it is not known what it did until now.
   if (tool_ && is_up_) recorder_->journal().add_lazily(store::Seen{*tool_, now()});
+  if (is_up_ && is_leaving()) {
+    const device::LinkChange news = {device::LinkState::lost, 0,
+                                     "it is not recorded here any more"};
+    happen(voice_.records->link(news, now()), news);
+  }
   recorder_->release(target_.shown);
+  recorder_->counters().note_link(entry_.shown, false);
+  if (is_leaving()) recorder_->counters().leave(entry_.shown);
+  assignment_->note_tried();
   const std::lock_guard lock(voice_mutex_);
   // A signal is how a recorder is usually ended.
-  const bool signalled = recorder_->context().interrupt.signalled();
-  recorder_->stream().leave(signalled ? Result<void>() : watched,
-                            signalled ? std::nullopt : unreached, voice_);
+  const bool as_asked = is_leaving() || recorder_->context().interrupt.signalled();
+  recorder_->stream().leave(as_asked ? Result<void>() : watched,
+                            as_asked ? std::nullopt : unreached, voice_);
 }
 
 device::RecordHooks RecordedTool::hooks() {
@@ -166,7 +208,11 @@ void RecordedTool::record(const device::ToolEvent& news) {
                                                        const store::Stored& stored) {
         const auto& event = std::get<store::NewEvent>(stored_entry);
         if (stored.as == store::Stored::As::known) return;
-        if (event.gap) tell_stream(work::news_of(*event.gap), serial, stored.epoch, stored.gap);
+        recorder_->counters().note_stored(entry_.shown, event.event);
+        if (event.gap) {
+          recorder_->counters().note_stored(entry_.shown, *event.gap);
+          tell_stream(work::news_of(*event.gap), serial, stored.epoch, stored.gap);
+        }
         tell_stream(news, serial, stored.epoch, stored.id);
       });
 }
@@ -181,6 +227,7 @@ void RecordedTool::record(const device::LinkChange& news) {
   flush_gap();
   flush_link();
   note_link(news);
+  assignment_->note_tried();
   if (news.state == device::LinkState::lost) recorder_->release(target_.shown);
   link_ = news;
   // What the tool is is known right behind a connection.
@@ -229,8 +276,9 @@ void RecordedTool::flush_gap() {
   seen_ = row.ended + std::chrono::milliseconds(1);  // two gaps without numbers are never one
   recorder_->journal().add(
       store::NewGap{std::move(row)},
-      [this, news, serial = serial_](const store::Entry&, const store::Stored& stored) {
+      [this, news, serial = serial_](const store::Entry& entry, const store::Stored& stored) {
         if (stored.as == store::Stored::As::known) return;
+        recorder_->counters().note_stored(entry_.shown, std::get<store::NewGap>(entry).gap);
         tell_stream(news, serial, stored.epoch, stored.id);
       });
 }
@@ -263,19 +311,21 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   flush_gap();
   store::Writer& writer = recorder_->writer();
   const store::ToolName said = work::name_of(device, target_.shown);
-  TRY_LET(const auto name, recorder_->claim(said, target_.shown));
+  TRY_LET(const auto name, recorder_->claim(said, target_.shown, *this));
   const auto& identity = device.identity();
   TRY_LET(const auto tool, writer.tool(name, identity ? identity->tool_model : std::string()));
   const std::optional<std::uint32_t> firmware = identity ? identity->firmware : std::nullopt;
+  TRY_LET(const auto number_of_lease, fence());
   TRY_LET(const auto place, writer.place({.tool = tool,
                                           .name = target_.shown,
                                           .url = target_.endpoint.text,
                                           .profile = profile_->id.to_string(),
                                           .firmware = firmware,
                                           .torque_unit = target_.torque_unit,
-                                          .since = now()}));
+                                          .since = now(),
+                                          .fence = number_of_lease}));
   TRY(recorder_->settle(tool, *this));
-  TRY_LET(const auto last, writer.last(tool));
+  TRY_LET(const auto last, known_last(tool, name));
   {
     const std::lock_guard lock(voice_mutex_);
     serial_ = name.serial;
@@ -290,6 +340,7 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   }
   tool_ = tool;
   place_ = place;
+  is_informed_ = true;
   flush_link();
   // Where events still wait to be stored, the last one that is stored is none to count from.
   if (identity && recorder_->journal().waiting() == 0) record_total(*identity, last);
@@ -299,6 +350,36 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   device::RecordedPast past = {.wants_first = true};
   if (last) past.last = work::last_event_of(*last, now());
   return past;
+}
+
+/// Empty: the tools are not shared.
+Result<std::optional<std::int64_t>> RecordedTool::fence() const {
+  if (recorder_->leases() == nullptr) return std::optional<std::int64_t>();
+  const auto number = recorder_->leases()->fence(entry_.shown);
+  if (!number) return tl::unexpected(not_settled("the lease of the tool has ended"));
+  return number;
+}
+
+/// The last that the tool told this collector or another one.
+Result<std::optional<store::Last>> RecordedTool::known_last(store::RowId tool,
+                                                            const store::ToolName& name) {
+  TRY_LET(auto own, recorder_->writer().last(tool));
+  if (recorder_->leases() == nullptr) return own;
+  TRY_LET(auto other, recorder_->leases()->last(name));
+  if (!other) return own;
+  const auto place = [](const store::Last& last) { return std::pair(last.epoch, last.number); };
+  if (own && place(*own) > place(*other)) return own;
+  const bool is_behind = !own || place(*own) < place(*other);
+  if (own) other->seen = std::max(other->seen, own->seen);
+  if (is_behind) {
+    TRY(recorder_->writer().adopt(tool, *other));
+    epochs_ = {};
+    counted_ = other->number;
+    seen_ = other->seen;
+  } else if (own->block) {
+    return own;
+  }
+  return other;
 }
 
 /// The tool's own count of its fastenings, by which it can be checked whether results are missing.
@@ -373,9 +454,11 @@ std::optional<device::Errand> RecordedTool::next_errand() {
 void RecordedTool::note_link(const device::LinkChange& news) {
   const bool is_up = news.state == device::LinkState::connected;
   const bool is_first = !noted_at_ && !link_text_;
-  if (is_up == is_up_ && !is_first) return;
-  is_up_ = is_up;
-  link_text_ = is_up ? news.message : "no link: " + news.message;
+  if (is_up != is_up_ || is_first) {
+    is_up_ = is_up;
+    recorder_->counters().note_link(entry_.shown, is_up);
+    link_text_ = is_up ? news.message : "no link: " + news.message;
+  }
   note_pending();
 }
 

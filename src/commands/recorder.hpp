@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -8,6 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "leases.hpp"
+#include "record_counters.hpp"
+#include "roster.hpp"
+#include "service_news.hpp"
 #include "spindle/work/event_rows.hpp"
 #include "spindle/work/journal.hpp"
 #include "watch_stream.hpp"
@@ -21,35 +26,57 @@ class RecordedTool;
 class Recorder {
  public:
   /// All must outlive it.
-  Recorder(store::Writer& writer, WatchStream& stream, work::JournalOptions options,
-           Context& context);
+  Recorder(store::Writer& writer, WatchStream& stream, ServiceNews& news,
+           work::JournalOptions options, Context& context);
 
   [[nodiscard]] store::Writer& writer() { return *writer_; }
   [[nodiscard]] work::Journal& journal() { return journal_; }
   [[nodiscard]] WatchStream& stream() { return *stream_; }
+  [[nodiscard]] RecordCounters& counters() { return counters_; }
   [[nodiscard]] Context& context() { return *context_; }
+  /// From now on the tools are shared with other collectors; it must outlive the recorder.
+  void share(Leases& leases) { leases_ = &leases; }
+  /// Null: they are not shared.
+  [[nodiscard]] Leases* leases() const { return leases_; }
+
+  /// What records this target, of which at most one watch may be under way; stays as long as the
+  /// recorder. One that comes again is the one of before.
+  RecordedTool& recorded(const Target& target);
 
   /// The name of a target's tool in the store. Where another tool that is connected says the same
   /// serial number, it gets a name of its own for ever, and an error says so: no tool may hide the
   /// results of another.
-  Result<store::ToolName> claim(const store::ToolName& said, const std::string& target);
+  Result<store::ToolName> claim(const store::ToolName& said, const std::string& target,
+                                const RecordedTool& listener);
   /// The target's tool is not connected any more.
   void release(const std::string& target);
-  /// What this tool is told by from now on. Error `storage` while what it told another listener, or
-  /// this one of another tool meanwhile, waits to be stored: its last event is not known then.
+  /// What this tool is told by from now on. Error `storage` while what it told before waits to be
+  /// stored and the listener has to know its last event.
   Result<void> settle(store::RowId tool, RecordedTool& listener);
 
  private:
+  struct Claim {
+    store::ToolName name;
+    const RecordedTool* listener;
+  };
+
   void tell_gap(const store::NewGap& entry, const store::Stored& stored);
+  void tell_trouble(const std::optional<Error>& error);
 
   store::Writer* writer_;
   WatchStream* stream_;
+  ServiceNews* news_;
   Context* context_;
+  Leases* leases_ = nullptr;
   std::mutex mutex_ = {};
-  std::map<std::string, store::ToolName> claims_ = {};          ///< by target
+  std::map<std::string, Claim> claims_ = {};                    ///< by target
   std::set<std::pair<std::string, store::ToolName>> met_ = {};  ///< once already, by target
   std::set<store::ToolName> told_ = {};                         ///< names of which an error spoke
   std::map<store::RowId, RecordedTool*> listeners_ = {};
+  /// What waits in the journal refers to them, also of tools that have left.
+  std::vector<std::unique_ptr<RecordedTool>> recorded_ = {};
+  RecordCounters counters_ = {};
+  TimedWriter timed_;
   work::Journal journal_;
 };
 
@@ -58,13 +85,20 @@ class RecordedTool final : public Listener {
  public:
   RecordedTool(const Target& target, Recorder& recorder);
 
-  TimePoint until() override { return recorder_->stream().until(); }
+  /// Its next watch begins, as it is assigned, for as long as the watch lasts.
+  void begin(Assignment& assignment);
+  [[nodiscard]] const Target& entry() const { return entry_; }
+  [[nodiscard]] bool is_leaving() const { return assignment_->is_leaving(); }
+
+  TimePoint until() override;
   void opened(const WatchedTool& tool) override;
   device::WatchControl tell(const device::WatchEvent& news) override;
   void left(const Result<void>& watched, const std::optional<Error>& unreached) override;
   device::RecordHooks hooks() override;
 
   [[nodiscard]] bool is_of(store::RowId tool) const { return tool_ == tool; }
+  /// Whether this watch knows what the tool told last.
+  [[nodiscard]] bool is_informed() const { return is_informed_; }
   /// A gap that the journal made, behind its commit; by any thread.
   void tell_gap(const device::EventGap& news, const store::Stored& stored);
 
@@ -77,6 +111,8 @@ class RecordedTool final : public Listener {
   void record(const device::MotorTransition& news);
 
   Result<device::RecordedPast> register_tool(device::Device& device);
+  Result<std::optional<std::int64_t>> fence() const;
+  Result<std::optional<store::Last>> known_last(store::RowId tool, const store::ToolName& name);
   void record_total(const catalogue::Identity& identity, const std::optional<store::Last>& last);
   std::optional<device::Errand> next_errand();
   void want_settings(const device::ToolEvent& news);
@@ -92,8 +128,11 @@ class RecordedTool final : public Listener {
   [[nodiscard]] WallTime now() const { return recorder_->context().clock.wall(); }
 
   const catalogue::Profile unknown_ = {};
+  const Target entry_;
   Target target_;
   Recorder* recorder_;
+  Assignment* assignment_ = nullptr;
+  bool is_informed_ = false;     ///< this watch was told what the tool told last
   std::mutex voice_mutex_ = {};  ///< the journal's thread tells the stream, too
   Voice voice_ = {};
   const catalogue::Profile* profile_ = nullptr;

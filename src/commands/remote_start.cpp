@@ -5,6 +5,7 @@
 #include "run.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/owned_lines.hpp"
 
 namespace spindle::commands {
 
@@ -19,11 +20,17 @@ Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context
       return require_answer(plan->in_words(*target), context).map([&] { return std::move(plan); });
     });
   };
-  TRY_LET(auto opened, open_prepared(*target, Need::named_registers, context, plan_for));
+  OwnedLines lines({*target}, context,
+                   [&](const std::string& sentence) { context.renderer.note(sentence); });
+  const device::OpenTransport open_transport = lines.opener();
+  const Context own = with_lines(context, open_transport);
+  TRY_LET(auto opened, open_prepared(*target, Need::named_registers, own, plan_for));
   auto& [tool, plan] = opened;
   TRY(plan->on(tool, context)->ask());
   const auto mode = options.stop.value_or(catalogue::StopMode::decelerate);
-  return run_and_tell(*plan->on(tool, context), mode, tool, context);
+  // Behind the guardian, which is started while there is one thread.
+  const auto on_prepared = [&] { lines.open_doors(); };
+  return run_and_tell(*plan->on(tool, context), mode, tool, context, on_prepared);
 }
 
 }  // namespace spindle::commands

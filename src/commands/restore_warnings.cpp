@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 
 namespace spindle::commands {
@@ -45,8 +46,9 @@ const catalogue::PlannedWrite* find_other_unit(const RestoreTask& task) {
 void warn_of_origin(const Snapshot& backup, const Snapshot& present,
                     std::vector<std::string>& warnings) {
   if (!is_same_model(backup, present)) {
-    warnings.push_back(fmt::format("the backup is of a {}, and this tool is a {}",
-                                   shown_model(backup), shown_model(present)));
+    warnings.push_back(fmt::format("the backup is of {}, and this tool is {}",
+                                   with_article(shown_model(backup)),
+                                   with_article(shown_model(present))));
   }
   if (backup.identity && present.identity && backup.identity->serial != present.identity->serial) {
     warnings.push_back(fmt::format("the backup is of serial {}, and this tool is serial {}",
@@ -120,12 +122,12 @@ void warn_of_plan(const RestoreTask& task, const Profile& profile,
 
 Result<void> check_model(const RestoreTask& task) {
   if (is_same_model(task.backup, task.present)) return {};
-  return tl::unexpected(
-      Error{.code = Errc::wrong_model,
-            .message = fmt::format("the backup is of a {}, and this tool is a {}",
-                                   shown_model(task.backup), shown_model(task.present)),
-            .hint = "--force restores it all the same",
-            .name = task.file});
+  return tl::unexpected(Error{.code = Errc::wrong_model,
+                              .message = fmt::format("the backup is of {}, and this tool is {}",
+                                                     with_article(shown_model(task.backup)),
+                                                     with_article(shown_model(task.present))),
+                              .hint = "--force restores it all the same",
+                              .name = task.file});
 }
 
 std::vector<std::string> warnings_for(const RestoreTask& task, const Profile& profile) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -61,7 +62,8 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options,
                                           const catalogue::Profile& profile, const Target& target);
 
 /// Sets, starts, follows and always stops; sets back, logs and tells. `mode` is how it is stopped.
+/// Calls `on_prepared` before the start.
 Result<Outcome> run_and_tell(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
-                             Context& context);
+                             Context& context, const std::function<void()>& on_prepared);
 
 }  // namespace spindle::commands

@@ -72,8 +72,9 @@ Result<void> RunOutput::tell_errors() {
 /// A tool that is not as it was found is no talk that --quiet leaves out.
 void RunOutput::tell_left(const std::vector<Left>& left) const {
   if (left.empty()) return;
-  context_->io.err(
-      fmt::format("spindle: {}: not set back: {}\n", tool_->target.shown, words_of(left)));
+  report::say_line(
+      context_->io, report::Severity::error,
+      fmt::format("spindle: {}: not set back: {}", tool_->target.shown, words_of(left)));
 }
 
 Result<void> RunOutput::summarise(const work::RunReport& report) {
@@ -108,7 +109,8 @@ Result<void> RunOutput::drain() {
   if (!out_) return {};
   TRY_LET(const auto left, out_->drain());
   if (left > 0) {
-    context_->io.err(fmt::format("spindle: {}: the reader of standard output did not take {}\n",
+    report::say_line(context_->io, report::Severity::error,
+                     fmt::format("spindle: {}: the reader of standard output did not take {}",
                                  tool_->target.shown, counted(left, "record")));
   }
   return {};

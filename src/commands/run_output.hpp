@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -18,10 +19,18 @@ namespace spindle::commands {
 class RunOutput final : public work::RunObserver {
  public:
   /// All must outlive it.
-  RunOutput(std::span<const report::Column> columns, const OpenTool& tool, Context& context)
-      : columns_(columns), tool_(&tool), context_(&context), progress_(context) {}
+  RunOutput(std::span<const report::Column> columns, const OpenTool& tool, Context& context,
+            const std::function<void()>& when_prepared)
+      : columns_(columns),
+        tool_(&tool),
+        context_(&context),
+        when_prepared_(&when_prepared),
+        progress_(context) {}
 
-  void on_prepared() override { listing_.emplace(*context_, columns_); }
+  void on_prepared() override {
+    listing_.emplace(*context_, columns_);
+    (*when_prepared_)();
+  }
   void on_start() override { out_.emplace(context_->io, context_->interrupt); }
   void on_lost_link() override { progress_.show("the link is lost; trying to stop the tool"); }
   /// Not before the stop: a terminal may keep its writer waiting.
@@ -61,6 +70,7 @@ class RunOutput final : public work::RunObserver {
   std::span<const report::Column> columns_;
   const OpenTool* tool_;
   Context* context_;
+  const std::function<void()>* when_prepared_;
   ProgressLine progress_;
   std::optional<Listing> listing_ = std::nullopt;
   /// From the start on: a motor must not run on because its reader is slow.

@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "motor_records.hpp"
+#include "owning.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/device/run_model.hpp"
 #include "spindle/store/reader.hpp"
 #include "spindle/work/event_rows.hpp"
-#include "spindle/work/shared_lines.hpp"
 #include "spindle/work/store_place.hpp"
 #include "watch_plan.hpp"
 #include "watch_stream.hpp"
@@ -116,7 +116,8 @@ class WatchListener final : public Listener {
 
 Result<Outcome> watch(const WatchOptions& options, Context& context) {
   ProfileShelf shelf(context.profiles);
-  TRY_LET(auto tools, prepare_tools(options.targets, options.names, shelf, context));
+  TRY_LET(const auto resolved, resolve_targets(options.targets, context));
+  TRY_LET(auto tools, prepare_tools(resolved, options.names, shelf, context));
   for (const WatchedTool& tool : tools) {
     if (auto checked = check_watch(options, tool, shelf, context); !checked) {
       checked.error().asked_of = tool.target().shown;
@@ -132,9 +133,11 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   TRY_LET(auto memory, Memory::open(options, context));
   std::vector<Target> targets;
   for (const WatchedTool& tool : tools) targets.push_back(tool.target());
-  SharedLines lines(targets, context);
-  const device::OpenTransport open_transport = lines.opener();
   WatchStream stream(options, tools.size(), columns_for(tools, shelf, options, context), context);
+  const auto note = [&](const std::string& sentence) { stream.note(sentence); };
+  OwnedLines lines(targets, context, note);
+  TRY(let_others_ask(lines, options.gateway, note));
+  const device::OpenTransport open_transport = lines.opener();
   const auto plan = [&](const catalogue::Profile& profile) { return plan_watch(options, profile); };
   for_each_side_by_side(tools, [&](WatchedTool& tool) {
     WatchListener listener(tool.target(), options, *memory, stream, context);

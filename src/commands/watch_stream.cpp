@@ -75,6 +75,12 @@ void WatchStream::leave(const Result<void>& watched, const std::optional<Error>&
   if (!asked_to_end) listing_.add(watched.error());
 }
 
+void WatchStream::expect(std::size_t tools) {
+  const std::lock_guard lock(mutex_);
+  tools_ = tools;
+  show_status();
+}
+
 void WatchStream::fault(const Error& error) {
   const std::lock_guard lock(mutex_);
   status_.clear();

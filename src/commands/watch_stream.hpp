@@ -47,6 +47,9 @@ class WatchStream {
   /// How the watch of one tool ended. `unreached` says why there never was a link to it.
   void leave(const Result<void>& watched, const std::optional<Error>& unreached, Voice& voice);
 
+  /// So many tools are watched from now on.
+  void expect(std::size_t tools);
+
   /// Something went wrong that ends no watch.
   void fault(const Error& error);
   /// Something failed as a whole.

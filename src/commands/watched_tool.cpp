@@ -85,20 +85,19 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
   return device::Watcher::Link{std::move(*device), std::move(identity)};
 }
 
-Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+Result<std::vector<WatchedTool>> prepare_tools(const std::vector<Target>& targets,
                                                const std::vector<std::string>& names,
                                                ProfileShelf& shelf, const Context& context) {
-  TRY_LET(auto resolved, resolve_targets(targets, context));
   std::vector<WatchedTool> tools;
   std::vector<catalogue::LinkSpec> facts;
-  tools.reserve(resolved.size());
-  for (const Target& target : resolved) {
+  tools.reserve(targets.size());
+  for (const Target& target : targets) {
     TRY_LET(auto tool, WatchedTool::make(target, names, shelf, context));
     const KnownProfile* known = tool.known();
     facts.push_back(known == nullptr ? catalogue::LinkSpec() : known->profile.link);
     tools.push_back(std::move(tool));
   }
-  return check_same_settings(resolved, facts).map([&] { return std::move(tools); });
+  return check_same_settings(targets, facts).map([&] { return std::move(tools); });
 }
 
 }  // namespace spindle::commands

@@ -72,9 +72,9 @@ class WatchedTool {
   link::SessionOptions::LateAnswers late_answers_ = link::SessionOptions::LateAnswers::none;
 };
 
-/// Resolves targets, asking none of them. Those of one line have the same settings. All but
-/// `targets` must outlive the tools.
-Result<std::vector<WatchedTool>> prepare_tools(const std::vector<std::string>& targets,
+/// The tools of these targets, none of which is asked. Those of one line have the same settings.
+/// All but `targets` must outlive the tools.
+Result<std::vector<WatchedTool>> prepare_tools(const std::vector<Target>& targets,
                                                const std::vector<std::string>& names,
                                                ProfileShelf& shelf, const Context& context);
 

@@ -264,7 +264,8 @@ Result<void> PushSource::run_due(const Ask& ask) {
 }
 
 void PushSource::disarm() {
-  if (arming_) {
+  // The owner of the line may want the events that are sent there.
+  if (arming_ && !device().session().asks_owner()) {
     begin_farewell(device().session());
     const auto ignored = device().switch_events(EventOutput::off);
     static_cast<void>(ignored);

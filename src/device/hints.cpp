@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "spindle/base/text.hpp"
 #include "spindle/catalogue/document_number.hpp"
 
 namespace spindle::device {
@@ -24,8 +25,9 @@ std::string url_as(link::Endpoint endpoint, Medium medium, std::uint16_t port) {
 std::string unit_hint(const Asked& asked) {
   const auto& units = asked.profile.link.units;
   if (units && !units->contains(asked.unit)) {
-    return fmt::format("unit {} was asked, and a {} can only be {} to {}: give ?unit=N",
-                       asked.unit.value, asked.profile.series, units->first, units->last);
+    return fmt::format("unit {} was asked, and {} can only be {} to {}: give ?unit=N",
+                       asked.unit.value, with_article(asked.profile.series), units->first,
+                       units->last);
   }
   return fmt::format("unit {} was asked: is that its address? ?unit=N asks another one",
                      asked.unit.value);
@@ -47,7 +49,7 @@ std::string hint_on_network(const Asked& asked) {
 std::string hint_behind_server(const Asked& asked) {
   const std::string tcp = url_as(asked.endpoint, Medium::tcp, asked.profile.link.port);
   if (!asked.profile.id.empty() && asked.profile.link.framing == modbus::Framing::tcp) {
-    return fmt::format("a {} speaks Modbus TCP: write {}", asked.profile.series, tcp);
+    return fmt::format("{} speaks Modbus TCP: write {}", with_article(asked.profile.series), tcp);
   }
   return fmt::format("{}; {}; if the device speaks Modbus TCP, write {}", unit_hint(asked),
                      line_hint, tcp);

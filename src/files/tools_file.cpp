@@ -180,18 +180,98 @@ void read_group_map(const YamlNode& node, Tools& tools, const Asked& asked) {
   for (const YamlEntry& entry : node.entries) read_group(entry, tools, asked.findings);
 }
 
+void read_urls(const YamlNode& node, Sink& sink, const Asked& asked) {
+  sink.url_at = node.at;
+  std::optional<SinkKind> kind;
+  const auto read_url = [&](const YamlNode& item) {
+    const auto text = to_text(item, asked.findings);
+    if (!text) return;
+    const auto url = parse_sink_url(*text);
+    if (!url) {
+      asked.findings.add(item.at, describe(url.error()));
+    } else if (kind && *kind != url->kind) {
+      asked.findings.add(item.at, "all URLs of a sink are of one kind");
+    } else {
+      kind = url->kind;
+    }
+    sink.urls.push_back(*text);
+  };
+  if (node.kind != YamlNode::Kind::sequence) return read_url(node);
+  for (const YamlNode& item : node.items) read_url(item);
+  if (node.items.empty()) asked.findings.add(node.at, "a sink needs a URL");
+}
+
+template <std::optional<std::size_t> Sink::*member, std::uint64_t most>
+void read_amount(const YamlNode& node, Sink& sink, const Asked& asked) {
+  const auto amount = to_unsigned(node, most, asked.findings);
+  if (!amount) return;
+  if (*amount == 0) asked.findings.add(node.at, "it is 1 at least");
+  sink.*member = static_cast<std::size_t>(*amount);
+}
+
+constexpr Field<Sink> sink_fields[] = {
+    custom("url", Need::required, "text, or list of text", read_urls),
+    field<&Sink::user>("user"),
+    field<&Sink::password_file>("password-file"),
+    field<&Sink::ca_file>("ca-file"),
+    field<&Sink::cert_file>("cert-file"),
+    field<&Sink::key_file>("key-file"),
+    field<&Sink::collector>("collector"),
+    word<sink_events_words, &Sink::events>("events"),
+    field<&Sink::client_id>("client-id"),
+    custom("window", Need::optional, "number 1..10000", read_amount<&Sink::window, 10'000>),
+    custom("batch", Need::optional, "number 1..10000", read_amount<&Sink::batch, 10'000>),
+};
+
+/// Keys that mean nothing to a sink of this kind.
+void check_keys(const YamlEntry& entry, const Sink& sink, Diagnostics& findings) {
+  const auto url = sink.urls.empty() ? Result<SinkUrl>(SinkUrl()) : parse_sink_url(sink.urls[0]);
+  if (sink.urls.empty() || !url) return;
+  const auto refuse = [&](std::string_view key, SinkKind of) {
+    const YamlNode* value = entry.value.find(key);
+    if (value == nullptr || url->kind == of) return;
+    findings.add(value->at,
+                 fmt::format("'{}' is about sinks of kind {}", key, sink_kind_words.text(of)));
+  };
+  refuse("window", SinkKind::mqtt);
+  refuse("client-id", SinkKind::mqtt);
+  refuse("batch", SinkKind::postgresql);
+  for (const auto& [one, other] : {std::pair("cert-file", "key-file"), {"key-file", "cert-file"}}) {
+    const YamlNode* value = entry.value.find(one);
+    if (value == nullptr || entry.value.find(other) != nullptr) continue;
+    findings.add(value->at, fmt::format("'{}' makes no sense without '{}'", one, other));
+  }
+}
+
+void read_sink_map(const YamlNode& node, Tools& tools, const Asked& asked) {
+  expect(node, YamlNode::Kind::map, asked.findings);
+  for (const YamlEntry& entry : node.entries) {
+    check_name(entry, asked.findings);
+    Sink& sink = tools.sinks.emplace_back();
+    sink.name = entry.key;
+    read_map(sink_fields, entry.value, sink, asked.findings);
+    check_keys(entry, sink, asked.findings);
+  }
+}
+
 constexpr Field<Tools> document_fields[] = {
     custom("tools", Need::required, "maps by name", read_tool_map).with(keys_of<tool_fields>),
     custom("groups", Need::optional, "lists of names by name", read_group_map),
+    custom("sinks", Need::optional, "maps by name", read_sink_map).with(keys_of<sink_fields>),
 };
 
-/// A profile's file where the tools file means it; ids and absolute paths as they are.
-std::string beside(const std::string& tools_file, std::string profile) {
+/// A file where the tools file means it; absolute paths as they are.
+std::string beside(const std::string& tools_file, std::string path) {
   const std::filesystem::path folder = std::filesystem::path(tools_file).parent_path();
-  const std::filesystem::path file(profile);
+  const std::filesystem::path file(path);
   const bool here = folder.empty() || folder == ".";
-  if (here || file.is_absolute() || !names_profile_file(profile)) return profile;
+  if (here || path.empty() || file.is_absolute()) return path;
   return (folder / file).lexically_normal().string();
+}
+
+/// A profile's file likewise; ids as they are.
+std::string profile_beside(const std::string& tools_file, std::string profile) {
+  return names_profile_file(profile) ? beside(tools_file, std::move(profile)) : profile;
 }
 
 /// Everything that can be read, with what is wrong.
@@ -202,7 +282,12 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
   Tools tools;
   tools.path = path;
   if (!documents.empty()) read_map(document_fields, documents.front(), tools, findings);
-  for (Tool& tool : tools.tools) tool.profile = beside(path, std::move(tool.profile));
+  for (Tool& tool : tools.tools) tool.profile = profile_beside(path, std::move(tool.profile));
+  for (Sink& sink : tools.sinks) {
+    for (auto part : {&Sink::password_file, &Sink::ca_file, &Sink::cert_file, &Sink::key_file}) {
+      sink.*part = beside(path, std::move(sink.*part));
+    }
+  }
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
   return tools;

@@ -23,6 +23,14 @@ bool LineDoubt::find(Evidence evidence, TimePoint now) {
   return is_worse;
 }
 
+void LineDoubt::learn(const LineDoubt& other) {
+  until_ = std::max(until_, other.until_);
+  lasting_ = lasting_ || other.lasting_;
+  worst_ = std::max(worst_, other.worst_);
+  accepted_ = other.accepted_;
+  shapes_.insert(other.shapes_.begin(), other.shapes_.end());
+}
+
 void LineDoubt::remember(const modbus::Pdu& request, const modbus::Pdu& answer, TimePoint now) {
   while (!accepted_.empty() &&
          (now - accepted_.front().at > longest_copy || accepted_.size() >= most_remembered)) {

@@ -80,6 +80,16 @@ void ReopeningTransport::set_uninterruptible() {
   if (transport_) transport_->set_uninterruptible();
 }
 
+void ReopeningTransport::set_interruptible() {
+  shielded_ = false;
+  if (transport_) transport_->set_interruptible();
+}
+
+void ReopeningTransport::introduce(const SessionOptions& options) {
+  introduced_ = options;
+  if (transport_) transport_->introduce(options);
+}
+
 Result<std::size_t> ReopeningTransport::take(TimePoint deadline) {
   if (!transport_) return tl::unexpected(Error{.code = Errc::closed});
   std::array<std::uint8_t, chunk_size> chunk = {};
@@ -96,6 +106,7 @@ Result<void> ReopeningTransport::reopen(Error why) {
   if (trace_.decision) {
     trace_.decision(Decision::retry, "the tool closed the connection, which is opened once more");
   }
+  const bool asked_owner = asks_owner();
   transport_.reset();  // a server may have room for one connection only
   auto opened = open_();
   if (!opened) {
@@ -103,7 +114,13 @@ Result<void> ReopeningTransport::reopen(Error why) {
         opened.error().code == Errc::interrupted || opened.error().code == Errc::terminated;
     return tl::unexpected(ended ? std::move(opened.error()) : std::move(why));
   }
+  // Behind an owner there were ids, and the session relies on them.
+  const bool has_ids_always = !introduced_ || has_ids(introduced_->rules);
+  if (asked_owner && !(*opened)->asks_owner() && !has_ids_always) {
+    return tl::unexpected(std::move(why));
+  }
   transport_ = std::move(*opened);
+  if (introduced_) transport_->introduce(*introduced_);
   if (shielded_) transport_->set_uninterruptible();
   brought_nothing_ = true;
   held_.resize(whole());  // the rest of a frame in part went with its connection

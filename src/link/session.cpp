@@ -46,6 +46,9 @@ constexpr Duration least_gateway_doubt = std::chrono::seconds(30);
 // More late answers than these hardly come at once.
 constexpr std::size_t most_unanswered = 8;
 
+// With ids, so many answers that were given up can still be told from what comes unasked.
+constexpr std::size_t most_given_up = 64;
+
 // Another master that polls all the time leaves few quiet moments.
 constexpr int most_proofs = 4;
 
@@ -124,6 +127,17 @@ std::size_t whole_answer_size(const modbus::Pdu& request, ByteView begun) {
   return two_words;
 }
 
+/// Where another program has the line, all that is special about it is that program's affair.
+SessionOptions asking(const SessionOptions& own) {
+  return {.rules = {.framing = modbus::Framing::tcp,
+                    .spontaneous = own.rules.spontaneous,
+                    .units = own.rules.units,
+                    .transactions = modbus::TransactionIds::echoed},
+          .unit = own.unit,
+          .answer_timeout = own.answer_timeout,
+          .first_transaction = own.first_transaction};
+}
+
 using modbus::Framing;
 
 /// When what came is whole frames of the other framing: the target names the wrong one.
@@ -168,13 +182,15 @@ Session::Session(std::unique_ptr<Transport> transport, Clock& clock, SessionOpti
                  Trace trace)
     : transport_(std::move(transport)),
       clock_(&clock),
-      options_(std::move(options)),
+      asked_as_(transport_->asks_owner() ? std::optional(options) : std::nullopt),
+      options_(asked_as_ ? asking(options) : std::move(options)),
       trace_(std::move(trace)),
       first_transaction_(std::max(options_.first_transaction, smallest_transaction)),
       next_transaction_(first_transaction_),
       created_(clock.now()),
       last_activity_(options_.in_use_until),
       echo_(options_.echo) {
+  transport_->introduce(asked_as_.value_or(options_));
   if (options_.late_answers == SessionOptions::LateAnswers::shared) require_verification(created_);
   if (options_.late_answers == SessionOptions::LateAnswers::possible) {
     require_verification(created_);
@@ -216,7 +232,12 @@ class Session::Lease {
     Transport::BusLease left = session_->transport_->acquire_bus();
     session_->last_activity_ = std::max(session_->last_activity_, left.used_until);
     session_->others_late_until_ = std::max(session_->past_until_, left.late_until);
+    session_->hear_what_others_heard(std::move(left.heard));
     if (left.stream) session_->go_on_with(std::move(*left.stream));
+    dialogues_ = std::move(left.dialogues);
+    const auto dialogue = dialogues_.find(session_->options_.unit);
+    if (dialogue != dialogues_.end()) session_->go_on_with(dialogue->second);
+    session_->has_turn_ = session_->had_turn_ = session_->transport_->is_shared();
   }
   Lease(const Lease&) = delete;
   Lease& operator=(const Lease&) = delete;
@@ -224,12 +245,98 @@ class Session::Lease {
     Transport::BusLease left{.used_until = session_->last_activity_,
                              .late_until = session_->doubtful_until_};
     if (!session_->is_rtu()) left.stream = session_->stream();
+    if (session_->has_turn_) {
+      // Bytes of a stream are the line's, where more may come before the next turn.
+      if (left.stream) session_->buffer_.clear();
+      if (session_->is_rtu()) {
+        dialogues_.insert_or_assign(session_->options_.unit, session_->dialogue());
+      }
+      left.dialogues = std::move(dialogues_);
+      session_->has_turn_ = false;
+    }
     session_->transport_->release_bus(left);
   }
 
  private:
   Session* session_;
+  std::map<modbus::UnitId, Transport::Dialogue> dialogues_ = {};
 };
+
+void Session::set_unit(modbus::UnitId unit) {
+  options_.unit = unit;
+  if (!asked_as_) return;
+  asked_as_->unit = unit;
+  transport_->introduce(*asked_as_);
+}
+
+void Session::set_rules(DemuxRules rules) {
+  if (asked_as_) {
+    asked_as_->rules = std::move(rules);
+    options_.rules = asking(*asked_as_).rules;
+  } else {
+    options_.rules = std::move(rules);
+  }
+  transport_->introduce(asked_as_.value_or(options_));
+}
+
+Transport::Dialogue Session::dialogue() const {
+  return {.quarantined_until = quarantined_until_,
+          .doubtful_until = doubtful_until_,
+          .past_until = past_until_,
+          .abandoned = abandoned_,
+          .unanswered = unanswered_,
+          .doubt = doubt_};
+}
+
+/// Another session may have asked the same unit since. What this one knew before its first turn
+/// still counts.
+void Session::go_on_with(const Transport::Dialogue& dialogue) {
+  if (had_turn_) {
+    quarantined_until_ = dialogue.quarantined_until;
+    doubtful_until_ = dialogue.doubtful_until;
+    past_until_ = dialogue.past_until;
+    doubt_ = dialogue.doubt;
+  } else {
+    quarantined_until_ = std::max(quarantined_until_, dialogue.quarantined_until);
+    doubtful_until_ = std::max(doubtful_until_, dialogue.doubtful_until);
+    past_until_ = std::max(past_until_, dialogue.past_until);
+    doubt_.learn(dialogue.doubt);
+  }
+  abandoned_ = dialogue.abandoned;
+  unanswered_ = dialogue.unanswered;
+}
+
+/// Frames that came in the turn of another session come before all that comes in this one.
+void Session::hear_what_others_heard(Bytes frames) {
+  if (frames.empty()) return;
+  if (trace_.bytes) trace_.bytes(Direction::received, frames);
+  buffer_ = std::move(frames);
+  torn_ = 0;
+  static_cast<void>(sort_buffered(nullptr));  // what is no frame shows when the line is used
+}
+
+/// What was not asked for on this connection may be an event for another session. It may have the
+/// id of any request, so those that look like an event are passed on whatever their id.
+void Session::pass_on(const modbus::Adu& received) const {
+  if (has_turn_ && has_ids(options_.rules)) {
+    transport_->pass_on(modbus::frame(Framing::tcp, received));
+  }
+}
+
+/// The answer to a request that was given up, told by its id and its shape: no event, although it
+/// may look like one.
+bool Session::take_late_with_id(const modbus::Adu& received) {
+  if (!has_ids(options_.rules) || unanswered_.empty()) return false;
+  const auto late = std::find_if(unanswered_.begin(), unanswered_.end(), [&](const auto& each) {
+    return each.request.transaction == received.transaction &&
+           would_answer(each.request, received, options_.rules);
+  });
+  if (late == unanswered_.end()) return false;
+  unanswered_.erase(late);
+  decide(Decision::late, received);
+  ++counters_.strays;
+  return true;
+}
 
 Transport::Stream Session::stream() const {
   return {.rest = buffer_,
@@ -592,7 +699,13 @@ Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
     outstanding.deadline = std::max(outstanding.sent, last_activity_) + options_.answer_timeout;
     return await(outstanding);
   });
-  if (has_ids(options_.rules)) return answer;
+  if (has_ids(options_.rules)) {
+    if (!answer && has_turn_) {
+      if (unanswered_.size() == most_given_up) unanswered_.erase(unanswered_.begin());
+      unanswered_.push_back({outstanding.request, TimePoint::max()});
+    }
+    return answer;
+  }
   if (!answer) {
     quarantined_until_ = std::max(clock_->now(), outstanding.deadline) + options_.answer_timeout;
     require_verification(*quarantined_until_);
@@ -805,6 +918,7 @@ Result<void> Session::sort_buffered(Outstanding* outstanding) {
 }
 
 void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
+  if (take_late_with_id(received)) return;
   const modbus::Adu* request = outstanding == nullptr ? nullptr : &outstanding->request;
   switch (judge(request, received, options_.rules)) {
     case Verdict::answer:
@@ -817,6 +931,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
     case Verdict::spontaneous:
       decide(Decision::spontaneous, received);
       if (outstanding != nullptr) ++outstanding->events;
+      pass_on(received);
       keep(received.pdu);
       return;
     case Verdict::broken:
@@ -832,6 +947,7 @@ void Session::sort(const modbus::Adu& received, Outstanding* outstanding) {
     case Verdict::stray:
       decide(is_late(received) ? Decision::late : Decision::stray, received);
       ++counters_.strays;
+      if (!was_given(received.transaction)) pass_on(received);
       if (outstanding != nullptr) {
         ++outstanding->strangers;
         outstanding->stranger = describe_frame(received);

@@ -286,7 +286,8 @@ Disk disk_with(const Trust& trust) {
       .make_folders = make_folders,
       .user = user_name,
       .process = [] { return static_cast<std::uint64_t>(::getpid()); },
-      .read_trusted = [trust](const std::string& path) { return read_trusted_file(path, trust); }};
+      .read_trusted = [trust](const std::string& path) { return read_trusted_file(path, trust); },
+      .read_secret = read_secret_file};
 }
 
 }  // namespace

@@ -8,37 +8,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <optional>
 
 #include "posix/port_holder.hpp"
+#include "posix/runtime_folder.hpp"
 
 namespace spindle::posix {
 namespace {
-
-/// A folder that no other user can put a link or a file into.
-bool is_own(const std::string& folder) {
-  struct stat status = {};
-  if (::lstat(folder.c_str(), &status) != 0) return false;
-  constexpr mode_t others_may_write = S_IWGRP | S_IWOTH;
-  return S_ISDIR(status.st_mode) && status.st_uid == ::geteuid() &&
-         (status.st_mode & others_may_write) == 0;
-}
-
-/// The same for every program of the user, whatever its environment.
-std::optional<std::string> lock_folder() {
-  std::string folder = fmt::format("/tmp/spindle-{}", ::geteuid());
-  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
-  for (const std::string& place :
-       {std::string(runtime == nullptr ? "" : runtime), fmt::format("/run/user/{}", ::geteuid())}) {
-    if (!place.starts_with('/') || !is_own(place)) continue;
-    folder = place + "/spindle";
-    break;
-  }
-  ::mkdir(folder.c_str(), S_IRWXU);
-  if (!is_own(folder)) return std::nullopt;
-  return folder;
-}
 
 /// What a file of late answers holds; it is read on the machine that wrote it.
 struct Note {
@@ -58,7 +34,7 @@ std::string file_name(const std::string& line, std::string_view ending) {
 }  // namespace
 
 LineLock lock_line(const std::string& name) {
-  const auto folder = lock_folder();
+  const auto folder = own_runtime_folder();
   if (!folder) return {};
   const std::string path = fmt::format("{}/{}", *folder, file_name(name, ".lock"));
   Descriptor lock(
@@ -71,7 +47,7 @@ LineLock lock_line(const std::string& name) {
 }
 
 TimePoint late_answers_until(const LineName& line, TimePoint now) {
-  const auto folder = lock_folder();
+  const auto folder = own_runtime_folder();
   if (!folder) return {};
   const std::string path = fmt::format("{}/{}", *folder, file_name(line.text, ".late"));
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
@@ -86,7 +62,7 @@ TimePoint late_answers_until(const LineName& line, TimePoint now) {
 }
 
 void leave_late_answers(const LineName& line, TimePoint until) {
-  const auto folder = lock_folder();
+  const auto folder = own_runtime_folder();
   if (!folder) return;
   const std::string path = fmt::format("{}/{}", *folder, file_name(line.text, ".late"));
   const Descriptor file(

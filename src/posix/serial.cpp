@@ -239,6 +239,9 @@ class SerialTransport final : public link::Transport {
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void set_uninterruptible() override { wait_.set_uninterruptible(); }
+  void set_interruptible() override { wait_.set_interruptible(); }
+  void wake() override { wait_.wake(); }
+  [[nodiscard]] std::string line_name() const override { return "rtu-" + name_.text; }
   [[nodiscard]] std::string company() const override { return company_; }
   [[nodiscard]] TimePoint late_until() const override { return late_until_; }
   void leave_late(TimePoint until) override { leave_late_answers(name_, until); }
@@ -314,6 +317,8 @@ Result<std::size_t> SerialTransport::receive(std::span<std::uint8_t> into, TimeP
 }
 
 }  // namespace
+
+std::string serial_line_name(const std::string& path) { return "rtu-" + name_of(path).text; }
 
 Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
                                                      const modbus::SerialSettings& settings,

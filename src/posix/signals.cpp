@@ -20,12 +20,13 @@ namespace {
 constexpr int signal_status_base = 128;
 
 // Those that wait for their request: the program ends, and leaves a tool safe.
-constexpr std::array requests = {SIGINT,  SIGTERM,   SIGHUP,  SIGQUIT, SIGUSR1, SIGUSR2,  SIGALRM,
-                                 SIGXCPU, SIGVTALRM, SIGPROF, SIGIO,   SIGPWR,  SIGSTKFLT};
+constexpr std::array requests = {SIGINT,    SIGTERM, SIGHUP, SIGQUIT, SIGALRM,  SIGXCPU,
+                                 SIGVTALRM, SIGPROF, SIGIO,  SIGPWR,  SIGSTKFLT};
 // Raised by a fault of the process, after which nothing can be done in it, or sent by another one.
 constexpr std::array faults = {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGSYS};
-// A reader that has gone and a file that may not grow are told by the write itself.
-constexpr std::array told_otherwise = {SIGPIPE, SIGXFSZ};
+// A reader that has gone and a file that may not grow are told by the write itself. What only other
+// programs understand must not end a run.
+constexpr std::array disregarded = {SIGPIPE, SIGXFSZ, SIGUSR1, SIGUSR2};
 // Left as they are until a tool runs.
 constexpr std::array suspending = {SIGTSTP, SIGTTIN, SIGTTOU};
 
@@ -37,7 +38,7 @@ bool is_in(const std::array<int, count>& numbers, int number) {
 bool is_real_time(int number) { return number >= SIGRTMIN && number <= SIGRTMAX; }
 
 bool is_watched(int number) {
-  return is_in(requests, number) || is_in(faults, number) || is_in(told_otherwise, number) ||
+  return is_in(requests, number) || is_in(faults, number) || is_in(disregarded, number) ||
          is_in(suspending, number) || is_real_time(number);
 }
 
@@ -52,6 +53,7 @@ std::atomic<Interrupt*> watched{nullptr};
 std::atomic<std::int64_t> first_signal_ns{0};   // its companion, for the same reason
 std::array<char, 512> last_words = {};          // likewise
 std::atomic<std::size_t> last_words_length{0};  // likewise
+std::atomic<bool> reload_wanted{false};         // likewise
 static_assert(std::atomic<Interrupt*>::is_always_lock_free, "read by a signal handler");
 static_assert(std::atomic<std::size_t>::is_always_lock_free, "read by a signal handler");
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "read by a signal handler");
@@ -89,6 +91,8 @@ extern "C" void on_signal(int number) {
   errno = interrupted_errno;
 }
 
+extern "C" void on_hangup(int /*number*/) { reload_wanted.store(true); }
+
 extern "C" void on_fault(int number, siginfo_t* info, void* /*context*/) {
   const bool is_sent = info->si_code == SI_USER || info->si_code == SI_QUEUE;
   if (is_sent && info->si_pid != ::getpid()) {
@@ -112,8 +116,8 @@ sigset_t held_back() {
 struct sigaction action_for(int number, const sigset_t& held) {
   struct sigaction action = {};
   // No SA_RESTART: a question at the terminal must end too, and that is a plain read().
-  const bool is_told = is_in(told_otherwise, number) || number == SIGTTIN || number == SIGTTOU;
-  action.sa_handler = is_told ? SIG_IGN : on_signal;
+  const bool is_nothing = is_in(disregarded, number) || number == SIGTTIN || number == SIGTTOU;
+  action.sa_handler = is_nothing ? SIG_IGN : on_signal;
   if (is_in(faults, number)) {
     action.sa_sigaction = on_fault;
     action.sa_flags = SA_SIGINFO;
@@ -163,6 +167,7 @@ SignalWatch::~SignalWatch() {
   for (const auto& [number, action] : previous_->actions) ::sigaction(number, &action, nullptr);
   watched.store(nullptr);
   last_words_length.store(0);
+  reload_wanted.store(false);
   ::close(interrupt_.descriptor());
 }
 
@@ -173,6 +178,14 @@ void SignalWatch::refuse_suspend() {
     ::sigaction(number, &action, nullptr);
   }
 }
+
+void SignalWatch::heed_reload() {
+  struct sigaction action = action_for(SIGHUP, held_back());
+  action.sa_handler = on_hangup;
+  ::sigaction(SIGHUP, &action, nullptr);
+}
+
+bool SignalWatch::take_reload() { return reload_wanted.exchange(false); }
 
 void SignalWatch::set_last_words(std::string_view words) {
   last_words_length.store(0);

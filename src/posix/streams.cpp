@@ -8,6 +8,8 @@
 
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
+#include <string>
 #include <system_error>
 
 #include "posix/wait.hpp"
@@ -108,6 +110,13 @@ bool out_ends_within_line() { return ends_within_line(STDOUT_FILENO); }
 bool err_is_ready() {
   pollfd room = {STDERR_FILENO, POLLOUT, 0};
   return ::poll(&room, 1, 0) != 0;
+}
+
+bool err_is_journal() {
+  const char* const value = std::getenv("JOURNAL_STREAM");
+  struct stat about = {};
+  if (value == nullptr || ::fstat(STDERR_FILENO, &about) != 0) return false;
+  return std::to_string(about.st_dev) + ":" + std::to_string(about.st_ino) == value;
 }
 
 std::size_t err_columns() {

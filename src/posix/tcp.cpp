@@ -42,8 +42,9 @@ void set_options(const Descriptor& socket) {
   set_option(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, user_timeout_ms);
 }
 
-/// The serial line behind a device server. Of a tool on the network there is none.
+/// The line behind a port. Only that of a device server is locked.
 struct Line {
+  std::string known_as = {};  ///< what other programs call it
   std::string name = {};
   LineLock lock = {};
   TimePoint late_until = {};
@@ -57,6 +58,9 @@ class TcpTransport final : public link::Transport {
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void set_uninterruptible() override { wait_.set_uninterruptible(); }
+  void set_interruptible() override { wait_.set_interruptible(); }
+  void wake() override { wait_.wake(); }
+  [[nodiscard]] std::string line_name() const override { return line_.known_as; }
   [[nodiscard]] std::string company() const override { return line_.lock.holder; }
   [[nodiscard]] TimePoint late_until() const override { return line_.late_until; }
   void leave_late(TimePoint until) override {
@@ -151,6 +155,11 @@ struct Connection {
   Line line = {};
 };
 
+std::string known_as(const Address& address, Behind behind) {
+  return fmt::format("{}-{}-{}", behind == Behind::tool ? "tcp" : "rtu+tcp", to_text(address),
+                     port_of(address));
+}
+
 Error busy_error(const Address& address, const LineLock& lock) {
   return {.code = Errc::port_busy,
           .message = fmt::format("the serial line behind {} port {} is in use by {}",
@@ -161,7 +170,7 @@ Error busy_error(const Address& address, const LineLock& lock) {
 /// Locked before it is connected: some device servers drop the older of two connections.
 Result<Connection> connect_line(const Address& address, const Attempt& attempt, TimePoint deadline,
                                 const Clock& clock, const Interrupt& interrupt) {
-  Line line;
+  Line line{.known_as = known_as(address, attempt.behind)};
   if (attempt.behind != Behind::tool) {
     line.name = fmt::format("{}-{}", to_text(address), port_of(address));
     line.lock = lock_line(line.name);
@@ -202,11 +211,16 @@ Result<Connection> connect_to_any(const Resolved& resolved, const Attempt& attem
 
 Result<std::unique_ptr<link::Transport>> open_tcp(const std::string& host, std::uint16_t port,
                                                   Duration connect_timeout, Clock& clock,
-                                                  const Interrupt& interrupt, Behind behind) {
+                                                  const Interrupt& interrupt, Behind behind,
+                                                  const AskOwner& ask) {
   const Attempt attempt = {
       .deadline = clock.now() + connect_timeout, .allowed = connect_timeout, .behind = behind};
   const Result<Resolved> resolved = resolve(host, port, attempt.deadline, clock, interrupt);
   if (!resolved) return tl::unexpected(resolved.error());
+  for (const Address& address : resolved->addresses) {
+    if (!ask) break;
+    if (auto asked = ask(known_as(address, behind))) return std::move(*asked);
+  }
   Result<Connection> connection = connect_to_any(*resolved, attempt, clock, interrupt);
   if (!connection) return tl::unexpected(std::move(connection.error()));
   set_options(connection->socket);

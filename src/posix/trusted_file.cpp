@@ -9,7 +9,9 @@
 
 #include <array>
 #include <cerrno>
+#include <functional>
 #include <system_error>
+#include <utility>
 
 #include "posix/descriptor.hpp"
 #include "posix/reading.hpp"
@@ -74,17 +76,23 @@ Result<void> check_link(const std::string& path, const Trust& trust) {
   return check_trust(path, ownership_of(about, trust), trust);
 }
 
-}  // namespace
+Result<void> check_secret(const std::string& path, const struct stat& about) {
+  if ((about.st_mode & (S_IROTH | S_IWOTH)) == 0) return {};
+  Error error = unreadable(path, "is a secret that all users of this computer can read or change");
+  error.hint = fmt::format("'chmod o= {}' keeps them out", path);
+  return tl::unexpected(std::move(error));
+}
 
-Result<std::string> read_trusted_file(const std::string& path, const Trust& trust) {
-  TRY(check_link(path, trust));
+/// What is checked is what is read.
+Result<std::string> read_checked(const std::string& path,
+                                 const std::function<Result<void>(const struct stat&)>& check) {
   // To open a pipe that nothing writes into must not wait; to read from one that is slow may.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file.valid()) return tl::unexpected(not_opened(path, errno));
   struct stat about = {};
   if (::fstat(file.number(), &about) != 0) return tl::unexpected(not_opened(path, errno));
   if (S_ISDIR(about.st_mode)) return tl::unexpected(unreadable(path, "is a folder, not a file"));
-  TRY(check_trust(path, ownership_of(about, trust), trust));
+  TRY(check(about));
   if (S_ISFIFO(about.st_mode)) static_cast<void>(::fcntl(file.number(), F_SETFL, O_RDONLY));
   std::string text;
   switch (read_whole(file.number(), text)) {
@@ -98,6 +106,19 @@ Result<std::string> read_trusted_file(const std::string& path, const Trust& trus
     default:
       return tl::unexpected(unreadable(path, "the file cannot be read"));
   }
+}
+
+}  // namespace
+
+Result<std::string> read_trusted_file(const std::string& path, const Trust& trust) {
+  TRY(check_link(path, trust));
+  return read_checked(path, [&](const struct stat& about) {
+    return check_trust(path, ownership_of(about, trust), trust);
+  });
+}
+
+Result<std::string> read_secret_file(const std::string& path) {
+  return read_checked(path, [&](const struct stat& about) { return check_secret(path, about); });
 }
 
 }  // namespace spindle::posix

@@ -11,4 +11,8 @@ namespace spindle::posix {
 /// to another file meanwhile.
 Result<std::string> read_trusted_file(const std::string& path, const Trust& trust);
 
+/// A whole text that is a secret. Error `bad_file` where all other users can read or write it. What
+/// a group may read is its owner's choice.
+Result<std::string> read_secret_file(const std::string& path);
+
 }  // namespace spindle::posix

@@ -1,6 +1,10 @@
 #include "posix/wait.hpp"
 
+#include <sys/eventfd.h>
+#include <unistd.h>
+
 #include <array>
+#include <cstdint>
 
 namespace spindle::posix {
 
@@ -39,10 +43,36 @@ Result<void> LineWait::check() const {
   return tl::unexpected(interrupt_->error());
 }
 
+LineWait::LineWait(const Clock& clock, const Interrupt& interrupt)
+    : clock_(&clock), interrupt_(&interrupt), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+
+void LineWait::wake() const {
+  const std::uint64_t one = 1;
+  // Fails only when the counter is full; then it is readable already.
+  [[maybe_unused]] const ssize_t written = ::write(wake_.number(), &one, sizeof one);
+}
+
 Result<bool> LineWait::until_ready(Interest interest, TimePoint deadline) const {
-  const Woken woken = wait_for(interest, deadline, *clock_, *interrupt_, shield_);
-  if (woken == Woken::interrupted) return tl::unexpected(interrupt_->error());
-  return woken == Woken::ready;
+  const int interrupted = shield_ == Shield::down ? interrupt_->descriptor() : -1;
+  const int woken = interest.events == POLLIN ? wake_.number() : -1;
+  std::array<pollfd, 3> descriptors = {pollfd{interest.descriptor, interest.events, 0},
+                                       pollfd{interrupted, POLLIN, 0}, pollfd{woken, POLLIN, 0}};
+  for (;;) {
+    TRY(check());
+    const int ready = poll_until(descriptors, deadline, *clock_);
+    if (ready == 0) return false;
+    if (ready < 0) {
+      if (clock_->now() >= deadline) return false;
+      continue;
+    }
+    if (descriptors[2].revents != 0) {
+      std::uint64_t times = 0;
+      [[maybe_unused]] const ssize_t taken = ::read(woken, &times, sizeof times);
+    }
+    // A raised interrupt is told first, at the top.
+    if (descriptors[1].revents != 0) continue;
+    return descriptors[0].revents != 0;
+  }
 }
 
 }  // namespace spindle::posix

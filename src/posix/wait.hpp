@@ -6,6 +6,7 @@
 #include <ctime>
 #include <span>
 
+#include "posix/descriptor.hpp"
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/base/interrupt.hpp"
@@ -38,10 +39,12 @@ Woken wait_for(Interest interest, TimePoint deadline, const Clock& clock,
 /// The waits of one line, which interrupts end until it is shielded.
 class LineWait {
  public:
-  LineWait(const Clock& clock, const Interrupt& interrupt)
-      : clock_(&clock), interrupt_(&interrupt) {}
+  LineWait(const Clock& clock, const Interrupt& interrupt);
 
   void set_uninterruptible() { shield_ = Shield::up; }
+  void set_interruptible() { shield_ = Shield::down; }
+  /// Ends the wait for something to read, or the next one, as its deadline would. By any thread.
+  void wake() const;
 
   /// Error: the interrupt that is raised.
   [[nodiscard]] Result<void> check() const;
@@ -53,6 +56,7 @@ class LineWait {
   const Clock* clock_;
   const Interrupt* interrupt_;
   Shield shield_ = Shield::down;
+  Descriptor wake_;  ///< invalid where there is none left: then nothing wakes
 };
 
 }  // namespace spindle::posix

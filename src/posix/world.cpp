@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "posix/owner_transport.hpp"
 #include "spindle/posix/serial.hpp"
 #include "spindle/posix/tcp.hpp"
 
@@ -25,12 +26,16 @@ line_opener(Clock& clock, const Interrupt& interrupt) {
   return
       [&clock, &interrupt](const link::Endpoint& endpoint, const catalogue::LinkSpec& facts,
                            Duration connect_timeout) -> Result<std::unique_ptr<link::Transport>> {
+        const auto ask = [&](const std::string& name) {
+          return ask_owner(name, endpoint.claim, clock, interrupt);
+        };
         if (endpoint.medium == link::Medium::serial) {
+          if (auto asked = ask(serial_line_name(endpoint.device))) return std::move(*asked);
           return open_serial(endpoint.device, link::serial_settings(endpoint, facts.serial.line),
                              endpoint.switching, clock, interrupt);
         }
         return open_tcp(endpoint.host, endpoint.port.value_or(facts.port), connect_timeout, clock,
-                        interrupt, behind(endpoint));
+                        interrupt, behind(endpoint), ask);
       };
 }
 

@@ -23,7 +23,9 @@ class JsonRenderer final : public Renderer {
     return this->record(record);
   }
 
-  void note(std::string_view sentence) override { say_sentence(streams_, verbosity_, sentence); }
+  void note(std::string_view sentence) override {
+    say_sentence(streams_, verbosity_, Severity::notice, sentence);
+  }
 
   Result<void> summary(const Record& counts, std::string_view /*sentence*/) override {
     return record(counts);

@@ -46,18 +46,26 @@ Result<void> LineWriter::write(std::string_view line) {
   return written;
 }
 
+void say_line(const Streams& streams, Severity severity, std::string_view text) {
+  std::string line;
+  if (streams.err_is_journal)
+    line = {'<', static_cast<char>('0' + static_cast<int>(severity)), '>'};
+  streams.err(line + printable(text, LineBreaks::fold) + "\n");
+}
+
 void say_error(const Streams& streams, const Error& error) {
-  streams.err("spindle: " + printable(describe(error), LineBreaks::fold) + "\n");
+  say_line(streams, Severity::error, "spindle: " + describe(error));
 }
 
 void say_warning(const Streams& streams, std::string_view sentence) {
   if (streams.err_is_ready && !streams.err_is_ready()) return;
-  streams.err(printable(sentence, LineBreaks::fold) + "\n");
+  say_line(streams, Severity::warning, sentence);
 }
 
-void say_sentence(const Streams& streams, Verbosity verbosity, std::string_view sentence) {
+void say_sentence(const Streams& streams, Verbosity verbosity, Severity severity,
+                  std::string_view sentence) {
   if (verbosity == Verbosity::quiet || sentence.empty()) return;
-  streams.err(printable(sentence, LineBreaks::fold) + "\n");
+  say_line(streams, severity, sentence);
 }
 
 Result<void> PlainRenderer::line(const Record& /*record*/, std::string_view plain) {
@@ -65,11 +73,11 @@ Result<void> PlainRenderer::line(const Record& /*record*/, std::string_view plai
 }
 
 void PlainRenderer::note(std::string_view sentence) {
-  say_sentence(streams_, verbosity_, sentence);
+  say_sentence(streams_, verbosity_, Severity::notice, sentence);
 }
 
 Result<void> PlainRenderer::summary(const Record& /*record*/, std::string_view sentence) {
-  say_sentence(streams_, verbosity_, sentence);
+  say_sentence(streams_, verbosity_, Severity::informational, sentence);
   return {};
 }
 

@@ -50,6 +50,7 @@ class PlainRenderer : public Renderer {
 void say_error(const Streams& streams, const Error& error);
 
 /// The sentence on stderr, unless it is empty or not wanted.
-void say_sentence(const Streams& streams, Verbosity verbosity, std::string_view sentence);
+void say_sentence(const Streams& streams, Verbosity verbosity, Severity severity,
+                  std::string_view sentence);
 
 }  // namespace spindle::report

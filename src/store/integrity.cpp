@@ -28,7 +28,7 @@ constexpr auto rules = std::to_array<Rule>({
      "SELECT id FROM gap WHERE after NOT BETWEEN 0 AND 65535 OR before NOT BETWEEN 0 AND 65535"},
     {"gap {}: it misses nothing", "SELECT id FROM gap WHERE missed <= 0"},
     {"gap {}: the event that ends it is missing",
-     "SELECT id FROM gap WHERE before IS NOT NULL "
+     "SELECT id FROM gap WHERE before IS NOT NULL AND reason <> 'recorded by another collector' "
      "AND EXISTS (SELECT 1 FROM event WHERE tool = gap.tool AND epoch = gap.epoch "
      "AND number < gap.before) "
      "AND EXISTS (SELECT 1 FROM event WHERE tool = gap.tool AND epoch = gap.epoch "

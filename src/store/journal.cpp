@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <limits>
 
 #include "store/columns.hpp"
 
@@ -52,7 +53,8 @@ std::optional<std::string_view> known(const std::string& text) {
 
 bool is_same(const Rows& row, const Place& place) {
   return row.text(1) == place.name && row.text(2) == place.url && row.text(3) == place.profile &&
-         row.maybe(4) == place.firmware && row.text(5) == place.torque_unit;
+         row.maybe(4) == place.firmware && row.text(5) == place.torque_unit &&
+         row.maybe(6) == place.fence;
 }
 
 Gap conflict_gap(const NewEvent& entry, WallTime other) {
@@ -75,11 +77,11 @@ Journal::Journal(Connection& connection)
       find_tool_(connection, "SELECT id FROM tool WHERE maker = ?1 AND serial = ?2"),
       insert_tool_(connection, "INSERT INTO tool (maker, serial, model) VALUES (?1, ?2, ?3)"),
       newest_place_(connection,
-                    "SELECT id, name, url, profile, firmware, torque_unit FROM place "
+                    "SELECT id, name, url, profile, firmware, torque_unit, fence FROM place "
                     "WHERE tool = ?1 ORDER BY id DESC LIMIT 1"),
       insert_place_(connection,
-                    "INSERT INTO place (tool, name, url, profile, firmware, torque_unit, since) "
-                    "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)"),
+                    "INSERT INTO place (tool, name, url, profile, firmware, torque_unit, since, "
+                    "fence) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)"),
       set_seen_(
           connection,
           "UPDATE place SET seen = ?2 WHERE id = (SELECT max(id) FROM place WHERE tool = ?1)"),
@@ -123,8 +125,31 @@ RowId Journal::place(const Place& place) {
     if (rows.next() && is_same(rows, place)) return rows.integer(0);
   }
   insert_place_.run(place.tool, place.name, place.url, place.profile, place.firmware,
-                    known(place.torque_unit), place.since);
+                    known(place.torque_unit), place.since, place.fence);
   return new_row();
+}
+
+void Journal::adopt(RowId tool, const Last& other) {
+  const auto epoch = last_.newest_epoch(tool);
+  const auto last = last_.find(tool);
+  const bool is_ahead = epoch && (*epoch > other.epoch ||
+                                  (*epoch == other.epoch && last && last->number >= other.number));
+  if (is_ahead) return;
+  // Why the other collector began each of them is in its own store.
+  for (std::int64_t next = epoch ? *epoch + 1 : 0; next <= other.epoch; ++next) {
+    begin_epoch(tool, next, other.seen, next == 0 ? EpochReason::first : EpochReason::restart);
+  }
+  // Behind the highest number there is none that a gap could end before.
+  if (other.number == std::numeric_limits<std::uint16_t>::max()) return;
+  Gap gap{.before = static_cast<std::uint16_t>(other.number + 1),
+          .began = last ? last->seen : other.seen,
+          .ended = other.seen,
+          .reason = std::string(recorded_elsewhere)};
+  if (last && last->epoch == other.epoch) {
+    gap.after = last->number;
+    gap.missed = static_cast<std::uint32_t>(other.number - last->number);
+  }
+  store(gap, tool, other.epoch);
 }
 
 void Journal::begin_epoch(RowId tool, std::int64_t ordinal, WallTime at, EpochReason reason) {

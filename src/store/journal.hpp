@@ -21,6 +21,8 @@ class Journal {
   RowId place(const Place& place);
   std::optional<Last> last(RowId tool) { return last_.find(tool); }
 
+  void adopt(RowId tool, const Last& other);
+
   Stored store(const NewEvent& entry);
   Stored store(const NewGap& entry);
   Stored store(const PresetSettings& settings);

@@ -49,28 +49,65 @@ Error failure(const std::string& path, int number) {
           .name = path};
 }
 
+std::string words_for(std::optional<std::uint64_t> process) {
+  return process ? fmt::format("process {}", *process) : std::string("another process");
+}
+
 Error held(const std::string& store, std::optional<std::uint64_t> process) {
   return {.code = Errc::storage,
-          .message = process ? fmt::format("process {} writes it", *process)
-                             : std::string("another process writes it"),
+          .message = words_for(process) + " writes it",
           .hint = "one program writes a store: end the other one, or give another path",
           .name = store};
 }
 
+Error served(const std::string& store, const std::string& sink,
+             std::optional<std::uint64_t> process) {
+  return {.code = Errc::storage,
+          .message = fmt::format("{} forwards to sink '{}'", words_for(process), sink),
+          .hint = "one program serves a sink: end the other one first",
+          .name = store};
+}
+
+std::string file_name(const std::string& sink) {
+  std::string name;
+  for (const char c : sink) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                          (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
+    name += is_plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
+  }
+  return name;
+}
+
 }  // namespace
 
-Result<WriterLock> WriterLock::take(const std::string& store) {
-  const std::string path = store + ".lock";
+Result<std::optional<WriterLock>> WriterLock::try_to_take(const std::string& path,
+                                                          std::optional<std::uint64_t>& process) {
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, S_IRUSR | S_IWUSR);
   if (file < 0) return tl::unexpected(failure(path, errno));
   WriterLock lock(file);
   if (::flock(file, LOCK_EX | LOCK_NB) != 0) {
     const int number = errno;
-    return tl::unexpected(number == EWOULDBLOCK ? held(store, holder(file))
-                                                : failure(path, number));
+    if (number != EWOULDBLOCK) return tl::unexpected(failure(path, number));
+    process = holder(file);
+    return std::nullopt;
   }
   tell_holder(file);
   return lock;
+}
+
+Result<WriterLock> WriterLock::take(const std::string& store) {
+  std::optional<std::uint64_t> process;
+  TRY_LET(auto lock, try_to_take(store + ".lock", process));
+  if (!lock) return tl::unexpected(held(store, process));
+  return std::move(*lock);
+}
+
+Result<WriterLock> WriterLock::take_sink(const std::string& store, const std::string& sink) {
+  std::optional<std::uint64_t> process;
+  TRY_LET(auto lock, try_to_take(fmt::format("{}.sink-{}.lock", store, file_name(sink)), process));
+  if (!lock) return tl::unexpected(served(store, sink, process));
+  return std::move(*lock);
 }
 
 WriterLock::WriterLock(WriterLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}

@@ -41,15 +41,15 @@ class Selection {
     require(fmt::format("{} IN ({})", column, values));
   }
 
-  Statement statement(Connection& connection, const std::optional<std::size_t>& newest) const {
+  Statement statement(Connection& connection, const Filter& filter) const {
     std::string sql = fmt::format("SELECT {} FROM {}", columns_, table_);
     std::string_view separator = " WHERE ";
     for (const std::string& condition : conditions_) {
       sql += fmt::format("{}({})", std::exchange(separator, " AND "), condition);
     }
-    sql = newest ? fmt::format("SELECT * FROM ({} ORDER BY id DESC LIMIT {}) ORDER BY id", sql,
-                               *newest)
-                 : sql + " ORDER BY id";
+    sql = filter.newest ? fmt::format("SELECT * FROM ({} ORDER BY id DESC LIMIT {}) ORDER BY id",
+                                      sql, *filter.newest)
+                        : sql + " ORDER BY id";
     Statement statement(connection, sql);
     int place = 0;
     for (const std::string* text : texts_) statement.bind(++place, *text);
@@ -96,7 +96,7 @@ Statement event_query(Connection& connection, const Filter& filter) {
   if (filter.epoch) selection.require(fmt::format("epoch = {}", *filter.epoch));
   if (filter.number) selection.require(fmt::format("number = {}", *filter.number));
   if (filter.after != 0) selection.require(fmt::format("id > {}", filter.after));
-  return selection.statement(connection, filter.newest);
+  return selection.statement(connection, filter);
 }
 
 void read_event(const Rows& rows, const std::vector<Column>& columns, EventView& event) {
@@ -124,7 +124,7 @@ Statement gap_query(Connection& connection, const Filter& filter) {
   if (filter.until) selection.require(fmt::format("began < {}", milliseconds(*filter.until)));
   if (filter.epoch) selection.require(fmt::format("epoch = {}", *filter.epoch));
   if (filter.after != 0) selection.require(fmt::format("id > {}", filter.after));
-  return selection.statement(connection, filter.newest);
+  return selection.statement(connection, filter);
 }
 
 template <typename Number>
@@ -154,7 +154,7 @@ Statement happening_query(Connection& connection, const Filter& filter) {
   if (filter.until) selection.require(fmt::format("at < {}", milliseconds(*filter.until)));
   selection.require_one_of("type", filter.kinds);
   if (filter.after != 0) selection.require(fmt::format("id > {}", filter.after));
-  return selection.statement(connection, filter.newest);
+  return selection.statement(connection, filter);
 }
 
 Place read_place(const Rows& rows) {
@@ -166,7 +166,8 @@ Place read_place(const Rows& rows) {
           .firmware = maybe_number<std::uint32_t>(rows, 5),
           .torque_unit = std::string(rows.text(6)),
           .since = rows.time(7),
-          .seen = rows.maybe_time(8)};
+          .seen = rows.maybe_time(8),
+          .fence = rows.maybe(9)};
 }
 
 template <typename Read>
@@ -204,13 +205,7 @@ class FileReader : public Reader {
                   });
   }
 
-  Result<std::vector<Place>> places() override {
-    return all_of(
-        *connection_,
-        "SELECT id, tool, name, url, profile, firmware, torque_unit, since, seen FROM place "
-        "ORDER BY id",
-        read_place);
-  }
+  Result<std::vector<Place>> places() override;
 
   Result<std::vector<Epoch>> epochs() override {
     return all_of(*connection_,
@@ -293,15 +288,27 @@ class FileReader : public Reader {
     return found;
   }
 
-  Result<RowId> newest() override {
-    Statement statement(*connection_, "SELECT max(id) FROM event");
-    RowId id = 0;
+  Result<RowId> newest() override { return number("SELECT max(id) FROM event"); }
+
+  Result<std::int64_t> state() override { return number("PRAGMA data_version"); }
+
+  Result<Backlog> behind(const Positions& positions) override;
+  Result<Positions> ends() override;
+  Result<Positions> before(WallTime time) override;
+  Result<std::optional<Counted>> counted_before(RowId tool, const Counted& event,
+                                                const std::vector<std::string>& kinds) override;
+  Result<std::vector<SinkRow>> sinks() override;
+
+  Result<std::uint64_t> bytes() override {
+    Statement statement(*connection_,
+                        "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size");
+    std::uint64_t bytes = 0;
     {
-      Rows rows = statement.query();
-      if (rows.next()) id = rows.integer(0);
+      Rows rows = statement.rows();
+      if (rows.next()) bytes = static_cast<std::uint64_t>(rows.integer(0));
     }
     TRY(connection_->outcome());
-    return id;
+    return bytes;
   }
 
   Result<std::vector<Coverage>> coverage() override {
@@ -324,8 +331,118 @@ class FileReader : public Reader {
   Result<void> backup(const std::string& path) override;
 
  private:
+  Result<Positions> positions_of(Statement& statement) {
+    Positions positions;
+    {
+      Rows rows = statement.rows();
+      if (rows.next()) positions = {rows.integer(0), rows.integer(1), rows.integer(2)};
+    }
+    TRY(connection_->outcome());
+    return positions;
+  }
+
+  Result<std::int64_t> number(std::string_view sql) {
+    Statement statement(*connection_, sql);
+    std::int64_t found = 0;
+    {
+      Rows rows = statement.query();
+      if (rows.next()) found = rows.integer(0);
+    }
+    TRY(connection_->outcome());
+    return found;
+  }
+
   std::unique_ptr<Connection> connection_;
 };
+
+Result<Backlog> FileReader::behind(const Positions& positions) {
+  Statement statement(*connection_, R"(
+    SELECT (SELECT count(*) FROM event WHERE id > ?1), (SELECT count(*) FROM gap WHERE id > ?2),
+      (SELECT count(*) FROM happening WHERE id > ?3),
+      (SELECT min(at) FROM (SELECT (SELECT at FROM event WHERE id > ?1 ORDER BY id LIMIT 1) AS at
+         UNION ALL SELECT (SELECT ended FROM gap WHERE id > ?2 ORDER BY id LIMIT 1))))");
+  Backlog backlog;
+  {
+    Rows rows = statement.query(positions.event, positions.gap, positions.happening);
+    if (rows.next()) {
+      backlog = {.events = static_cast<std::size_t>(rows.integer(0)),
+                 .gaps = static_cast<std::size_t>(rows.integer(1)),
+                 .happenings = static_cast<std::size_t>(rows.integer(2)),
+                 .oldest = rows.maybe_time(3)};
+    }
+  }
+  TRY(connection_->outcome());
+  return backlog;
+}
+
+Result<Positions> FileReader::ends() {
+  Statement statement(*connection_, R"(
+    SELECT (SELECT max(id) FROM event), (SELECT max(id) FROM gap), (SELECT max(id) FROM happening))");
+  return positions_of(statement);
+}
+
+/// Where nothing is so new, behind everything.
+Result<Positions> FileReader::before(WallTime time) {
+  Statement statement(*connection_, R"(
+    SELECT coalesce((SELECT min(id) - 1 FROM event WHERE at >= ?1), (SELECT max(id) FROM event), 0),
+      coalesce((SELECT min(id) - 1 FROM gap WHERE ended >= ?1), (SELECT max(id) FROM gap), 0),
+      coalesce((SELECT min(id) - 1 FROM happening WHERE at >= ?1),
+               (SELECT max(id) FROM happening), 0))");
+  statement.bind(1, time);
+  return positions_of(statement);
+}
+
+Result<std::optional<Counted>> FileReader::counted_before(RowId tool, const Counted& event,
+                                                          const std::vector<std::string>& kinds) {
+  std::string places;
+  for (std::size_t at = 0; at < kinds.size(); ++at) {
+    places += fmt::format("{}?{}", at == 0 ? "" : ", ", at + 4);
+  }
+  Statement statement(*connection_, fmt::format(R"(
+    SELECT epoch, number FROM event
+    WHERE tool = ?1 AND (epoch, number) < (?2, ?3) AND kind IN ({})
+    ORDER BY epoch DESC, number DESC LIMIT 1)",
+                                                places));
+  statement.bind(1, tool);
+  statement.bind(2, event.epoch);
+  statement.bind(3, event.number);
+  int place = 4;
+  for (const std::string& kind : kinds) statement.bind(place++, kind);
+  std::optional<Counted> found;
+  {
+    Rows rows = statement.rows();
+    if (rows.next()) {
+      found =
+          Counted{.epoch = rows.integer(0), .number = static_cast<std::uint16_t>(rows.integer(1))};
+    }
+  }
+  TRY(connection_->outcome());
+  return found;
+}
+
+Result<std::vector<Place>> FileReader::places() {
+  constexpr std::int64_t first_with_fence = 3;
+  TRY_LET(const auto version, number("PRAGMA user_version"));
+  return all_of(*connection_,
+                fmt::format("SELECT id, tool, name, url, profile, firmware, torque_unit, since, "
+                            "seen, {} FROM place ORDER BY id",
+                            version < first_with_fence ? "NULL" : "fence"),
+                read_place);
+}
+
+Result<std::vector<SinkRow>> FileReader::sinks() {
+  constexpr std::int64_t first_with_all = 2;
+  TRY_LET(const auto version, number("PRAGMA user_version"));
+  const std::string_view others = version < first_with_all ? "0, 0" : "gap, happening";
+  return all_of(*connection_,
+                fmt::format("SELECT name, url, cursor, {}, moved FROM sink ORDER BY name", others),
+                [](const Rows& rows) {
+                  return SinkRow{.name = std::string(rows.text(0)),
+                                 .url = std::string(rows.text(1)),
+                                 .positions = {rows.integer(2), rows.integer(3), rows.integer(4)},
+                                 .moved = rows.time(5)};
+                });
+}
 
 /// Copies all pages while no other writer comes between; both ends judge what went wrong.
 Result<void> copy_pages(Connection& from, Connection& to) {

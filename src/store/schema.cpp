@@ -12,7 +12,7 @@ namespace spindle::store {
 namespace {
 
 /// Each one makes the next version of the one before; what was released stays as it is.
-constexpr std::array<std::string_view, 1> migrations = {R"(
+constexpr std::array<std::string_view, 3> migrations = {R"(
 CREATE TABLE tool (
   id INTEGER PRIMARY KEY,
   maker TEXT NOT NULL,
@@ -128,8 +128,17 @@ CREATE TABLE sink (
   url TEXT NOT NULL,
   moved INTEGER NOT NULL
 ) STRICT, WITHOUT ROWID;
+)",
+                                                        R"(
+-- The last gap and the last happening that the sink has got.
+ALTER TABLE sink ADD COLUMN gap INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE sink ADD COLUMN happening INTEGER NOT NULL DEFAULT 0;
+)",
+                                                        R"(
+-- The number of the lease under which the tool was listened to there.
+ALTER TABLE place ADD COLUMN fence INTEGER;
 )"};
-constexpr auto known_version = static_cast<std::int64_t>(migrations.size());
+constexpr auto newest_version = static_cast<std::int64_t>(migrations.size());
 
 std::int64_t number_of(Connection& connection, std::string_view sql) {
   Statement statement(connection, sql);
@@ -195,24 +204,33 @@ Result<Found> check_open(Connection& connection) {
   if (!found) return tl::unexpected(not_ours(connection.path()));
   const std::int64_t version = number_of(connection, "PRAGMA user_version");
   TRY(connection.outcome());
-  if (version <= known_version) return *found;
+  if (version <= newest_version) return *found;
   return tl::unexpected(
       Error{.code = Errc::bad_file,
             .message = fmt::format("is a store of version {}, this program knows versions up to {}",
-                                   version, known_version),
+                                   version, newest_version),
             .hint = "use the newer spindle that made it",
             .name = connection.path()});
 }
 
+Result<std::int64_t> version_of(Connection& connection) {
+  TRY_LET(const auto found, check_open(connection));
+  const std::int64_t version = number_of(connection, "PRAGMA user_version");
+  TRY(connection.outcome());
+  return found == Found::nothing ? 0 : version;
+}
+
+std::int64_t known_version() { return newest_version; }
+
 Result<void> migrate(Connection& connection) {
   connection.run("BEGIN IMMEDIATE");
   const std::int64_t version = number_of(connection, "PRAGMA user_version");
-  for (std::int64_t next = version; next < known_version; ++next) {
+  for (std::int64_t next = version; next < newest_version; ++next) {
     connection.run(std::string(migrations.at(static_cast<std::size_t>(next))));
   }
-  if (version < known_version) {
+  if (version < newest_version) {
     connection.run(fmt::format("PRAGMA application_id = {}", application_id));
-    connection.run(fmt::format("PRAGMA user_version = {}", known_version));
+    connection.run(fmt::format("PRAGMA user_version = {}", newest_version));
   }
   return connection.end_transaction();
 }

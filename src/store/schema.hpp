@@ -32,6 +32,13 @@ Result<Found> examine(const std::string& path);
 /// of a version that this program does not know.
 Result<Found> check_open(Connection& connection);
 
+/// Which version is open. Error `bad_file`: it is no store, or of a version that this program does
+/// not know.
+Result<std::int64_t> version_of(Connection& connection);
+
+/// The version that migrate() makes.
+std::int64_t known_version();
+
 /// Makes the tables of a store, or brings older ones to what this program knows.
 Result<void> migrate(Connection& connection);
 

@@ -51,15 +51,26 @@ RowId newest_of(Connection& connection, const std::vector<Cut>& cuts) {
   return found;
 }
 
-Result<void> check_sinks(Connection& connection, RowId newest) {
-  Statement sinks(connection, "SELECT name FROM sink WHERE cursor < ?1 ORDER BY cursor LIMIT 1");
-  Rows rows = sinks.query(newest);
+/// What goes is at most these.
+struct Newest {
+  RowId event = 0;
+  RowId gap = 0;
+  RowId happening = 0;
+};
+
+Result<void> check_sinks(Connection& connection, const Newest& newest) {
+  Statement sinks(connection,
+                  "SELECT name FROM sink WHERE cursor < ?1 OR gap < ?2 OR happening < ?3 "
+                  "ORDER BY cursor LIMIT 1");
+  Rows rows = sinks.query(newest.event, newest.gap, newest.happening);
   if (!rows.next()) return {};
-  return tl::unexpected(
-      Error{.code = Errc::usage,
-            .message = fmt::format("sink '{}' has not got all that is older", rows.text(0)),
-            .hint = fmt::format("let 'spindle forward {}' deliver it, or keep more", rows.text(0)),
-            .name = connection.path()});
+  return tl::unexpected(Error{
+      .code = Errc::usage,
+      .message = fmt::format("sink '{}' has not got all that is older", rows.text(0)),
+      .hint = fmt::format("let 'spindle forward {0}' deliver it, keep more, or give that sink "
+                          "up for ever: 'spindle store forget {0}'",
+                          rows.text(0)),
+      .name = connection.path()});
 }
 
 std::size_t changes(Connection& connection) {
@@ -78,19 +89,21 @@ std::size_t delete_events(Connection& connection, const std::vector<Cut>& cuts) 
 
 /// A gap stays where an event stays that was numbered before its end, and where it is all that is
 /// known of a tool.
-std::size_t delete_gaps(Connection& connection, WallTime before) {
-  Statement gaps(connection, R"(
-    DELETE FROM gap WHERE ended < ?1
+constexpr std::string_view gaps_that_go = R"(FROM gap WHERE ended < ?1
       AND EXISTS (SELECT 1 FROM event WHERE tool = gap.tool AND epoch >= gap.epoch)
       AND NOT EXISTS (SELECT 1 FROM event
-                      WHERE tool = gap.tool AND epoch = gap.epoch AND number < gap.before))");
-  gaps.run(before);
-  return changes(connection);
+                      WHERE tool = gap.tool AND epoch = gap.epoch AND number < gap.before))";
+constexpr std::string_view happenings_that_go = "FROM happening WHERE at < ?1 AND type <> 'trim'";
+
+RowId newest_of(Connection& connection, std::string_view rows_that_go, WallTime before) {
+  Statement newest(connection, fmt::format("SELECT max(id) {}", rows_that_go));
+  Rows rows = newest.query(before);
+  return rows.next() ? rows.integer(0) : 0;
 }
 
-std::size_t delete_happenings(Connection& connection, WallTime before) {
-  Statement happenings(connection, "DELETE FROM happening WHERE at < ?1 AND type <> 'trim'");
-  happenings.run(before);
+std::size_t delete_rows(Connection& connection, std::string_view rows_that_go, WallTime before) {
+  Statement rows(connection, fmt::format("DELETE {}", rows_that_go));
+  rows.run(before);
   return changes(connection);
 }
 
@@ -107,11 +120,14 @@ void tell(Connection& connection, const Trimmed& trimmed, WallTime before, WallT
 
 Result<Trimmed> trim(Connection& connection, WallTime before, WallTime now) {
   const std::vector<Cut> what = cuts(connection, before, now);
-  TRY(check_sinks(connection, newest_of(connection, what)));
+  Newest newest = {.event = newest_of(connection, what)};
   Trimmed trimmed;
   trimmed.events = delete_events(connection, what);
-  trimmed.gaps = delete_gaps(connection, before);
-  trimmed.happenings = delete_happenings(connection, before);
+  newest.gap = newest_of(connection, gaps_that_go, before);
+  newest.happening = newest_of(connection, happenings_that_go, before);
+  TRY(check_sinks(connection, newest));
+  trimmed.gaps = delete_rows(connection, gaps_that_go, before);
+  trimmed.happenings = delete_rows(connection, happenings_that_go, before);
   tell(connection, trimmed, before, now);
   return trimmed;
 }

@@ -39,6 +39,14 @@ class FileWriter : public Writer {
     return reading([&] { return journal_.last(tool); });
   }
 
+  Result<void> adopt(RowId tool, const Last& last) override {
+    TRY(transaction([&] {
+      journal_.adopt(tool, last);
+      return true;
+    }));
+    return {};
+  }
+
   Result<std::vector<Stored>> commit(std::span<const Entry> entries) override {
     return transaction([&] {
       std::vector<Stored> stored;

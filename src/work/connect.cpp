@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "spindle/base/text.hpp"
 #include "spindle/work/identification.hpp"
 #include "spindle/work/simulated_tool.hpp"
 #include "spindle/work/trace.hpp"
@@ -76,9 +77,10 @@ Result<void> check_transactions(const Target& target, const catalogue::Profile& 
   if (!ignored || !(sends_unasked || profile.link.any_unit)) return {};
   return tl::unexpected(with_target(
       Error{.code = Errc::usage,
-            .message = fmt::format("transaction=ignored is not for a {}: {}", profile.series,
-                                   sends_unasked ? "only the id tells an answer from its events"
-                                                 : "it answers with any unit identifier"),
+            .message =
+                fmt::format("transaction=ignored is not for {}: {}", with_article(profile.series),
+                            sends_unasked ? "only the id tells an answer from its events"
+                                          : "it answers with any unit identifier"),
             .hint = "leave it out"},
       target));
 }

@@ -118,6 +118,17 @@ std::size_t Journal::waiting() const {
   return waiting_.size();
 }
 
+bool Journal::waits_for(store::RowId tool) const {
+  const std::lock_guard lock(mutex_);
+  return lost_.contains(tool) ||
+         std::any_of(waiting_.begin(), waiting_.end(), [&](const Item& item) {
+           const auto* event = std::get_if<store::NewEvent>(&item.entry);
+           const auto* gap = std::get_if<store::NewGap>(&item.entry);
+           return (event != nullptr && event->event.tool == tool) ||
+                  (gap != nullptr && gap->gap.tool == tool);
+         });
+}
+
 std::size_t Journal::close(Duration patience) {
   std::unique_lock lock(mutex_);
   closing_ = true;
@@ -135,18 +146,28 @@ void Journal::run() {
   const auto has_work = [&] { return !waiting_.empty() || closing_; };
   const auto has_enough = [&] { return waiting_.size() >= options_.most || closing_; };
   while (!given_up_) {
-    changed_.wait_for(lock, lazy_every, has_work);
+    changed_.wait_for(lock, std::min(lazy_every, options_.alive_every), has_work);
     if (waiting_.empty() && closing_) flush_lost();
     if (waiting_.empty() && lazy_.empty() && closing_) break;
-    changed_.wait_for(lock, options_.gather, has_enough);
+    changed_.wait_for(lock, std::min(options_.gather, options_.alive_every), has_enough);
     std::move(lazy_.begin(), lazy_.end(), std::back_inserter(waiting_));
     lazy_.clear();
-    if (waiting_.empty() || given_up_) continue;
-    if (commit(lock)) continue;
+    const bool works = waiting_.empty() || given_up_ || commit(lock);
+    if (works) {
+      tell_alive(lock);
+      continue;
+    }
     changed_.wait_for(lock, retry_, [&] { return given_up_; });
   }
   is_done_ = true;
   ended_.notify_all();
+}
+
+void Journal::tell_alive(std::unique_lock<std::mutex>& lock) {
+  if (!options_.alive || failure_) return;
+  lock.unlock();
+  options_.alive();
+  lock.lock();
 }
 
 /// Stores the first of what waits. It stays in its place until it is durable.

@@ -136,6 +136,16 @@ Error with_target(Error error, const Target& target) {
   return error;
 }
 
+std::vector<Target> naming_gateways(std::vector<Target> targets, const Environment& environment) {
+  for (Target& target : targets) {
+    const link::Endpoint& endpoint = target.endpoint;
+    const bool is_known = endpoint.medium == link::Medium::tcp && !target.profile.empty();
+    if (!is_known || !endpoint.unit) continue;
+    if (auto gateway = gateway_of(target, environment)) target.endpoint.gateway = *gateway;
+  }
+  return targets;
+}
+
 Target reopening(Target target) {
   target.reopening = link::Reopening::once;
   return target;

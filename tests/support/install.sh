@@ -6,15 +6,16 @@
 build_packages=(
   g++ cmake ninja-build pkg-config ccache
   libmodbus-dev libcli11-dev libfmt-dev libyaml-dev libexpected-dev
-  libsqlite3-dev
+  libsqlite3-dev libmosquitto-dev libpq-dev libcpp-httplib-dev
 )
 # shellcheck disable=SC2034
 test_packages=(
   doctest-dev nlohmann-json3-dev mold
   clang-format-14 clang-14 clang-tidy-14 libclang-rt-14-dev
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
-  python3-jsonschema mandoc dpkg-dev lintian sqlite3
+  python3-jsonschema mandoc dpkg-dev lintian sqlite3 systemd
   python3-scipy python3-statsmodels chromium
+  mosquitto mosquitto-clients python3-paho-mqtt postgresql python3-psycopg2 curl
 )
 
 # Prints those of the named packages that are not installed, one a line.

@@ -46,8 +46,14 @@ const std::map<std::string, Names, std::less<>> arrows = {
     {"work", {"device", "files", "sim", "store"}},
     {"commands", {"report", "work", "sim", "statistics", "chart"}},
     {"cli", {"commands"}},
-    {"main", {"cli", "posix", "shipped"}},
+    {"forward", {"commands"}},
+    {"page", {"commands"}},
+    {"main", {"cli", "posix", "shipped", "forward", "page"}},
 };
+
+/// The programs themselves, in no folder.
+const Names programs = {"src/main.cpp", "src/forward_main.cpp", "src/page_main.cpp",
+                        "src/program.cpp", "src/program.hpp"};
 
 /// Headers that begin so are included in these areas only.
 struct HomeOfHeader {
@@ -59,6 +65,9 @@ const std::vector<HomeOfHeader> homes = {
     {"CLI/", {"cli"}},
     {"yaml.h", {"files"}},
     {"sqlite3.h", {"store"}},
+    {"mosquitto.h", {"forward"}},
+    {"libpq-fe.h", {"forward"}},
+    {"httplib.h", {"page"}},
     {"nlohmann/", {}},
     {"modbus.h", {"posix"}},
     {"modbus/", {"posix"}},
@@ -235,7 +244,7 @@ std::string part_behind(std::string_view path, std::string_view prefix) {
 
 /// The layer that a file belongs to; empty when it is in none.
 std::string layer_of(std::string_view path) {
-  if (path == "src/main.cpp") return "main";
+  if (programs.contains(path)) return "main";
   const std::string public_layer = part_behind(path, "include/spindle/");
   return public_layer.empty() ? part_behind(path, "src/") : public_layer;
 }
@@ -367,7 +376,7 @@ void check_pragma_once(const Source& source, Diagnostics& findings) {
 }
 
 void check_main(const Source& source, Diagnostics& findings) {
-  if (layer_of(source.path) != "main") return;
+  if (!source.path.ends_with("main.cpp") || layer_of(source.path) != "main") return;
   const std::vector<std::string> lines = lines_of(statements_of(source));
   const auto code_lines = std::count_if(
       lines.begin(), lines.end(), [](const std::string& line) { return !trimmed(line).empty(); });

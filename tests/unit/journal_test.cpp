@@ -5,6 +5,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 using namespace spindle;
@@ -25,6 +26,7 @@ class FakeWriter final : public store::Writer {
   Result<bool> has_tool(const store::ToolName&) override { return true; }
   Result<store::RowId> place(const store::Place&) override { return 1; }
   Result<std::optional<store::Last>> last(store::RowId) override { return std::nullopt; }
+  Result<void> adopt(store::RowId, const store::Last&) override { return {}; }
   Result<store::Trimmed> trim(WallTime, WallTime) override { return store::Trimmed(); }
 
   Result<std::vector<Stored>> commit(std::span<const Entry> entries) override {
@@ -160,6 +162,49 @@ TEST_CASE("journal: what waits is stored in one transaction, but for so many ent
   bench.writer.open(true);
   bench.writer.rows(26);
   CHECK(bench.writer.sizes() == std::vector<std::size_t>{1, 10, 10, 5});
+}
+
+TEST_CASE("journal: it says of which tool something waits") {
+  Bench bench;
+  bench.writer.open(false);
+  bench.add(1);
+  bench.writer.wait_for_attempts(1);
+  CHECK(bench.journal.waits_for(1));
+  CHECK_FALSE(bench.journal.waits_for(2));
+  bench.writer.open(true);
+  bench.wait_until_told(1);
+  CHECK_FALSE(bench.journal.waits_for(1));
+}
+
+TEST_CASE("journal: it gives signs of life while storing works, and while there is nothing to do") {
+  std::atomic<int> signs = 0;
+  work::JournalOptions options = {.gather = 1ms, .first_retry = 1ms};
+  options.alive = [&signs] { ++signs; };
+  options.alive_every = 1ms;
+  Bench bench(options);
+  const auto wait_for_sign = [&] {
+    const int before = signs;
+    while (signs == before) std::this_thread::yield();
+  };
+  wait_for_sign();
+  bench.add(1);
+  bench.wait_until_told(1);
+  wait_for_sign();
+  SUBCASE("none while it hangs") { bench.writer.open(false); }
+  SUBCASE("none while it fails") { bench.writer.fail(disk_full()); }
+  bench.add(2);
+  bench.writer.wait_for_attempts(2);
+  const int before = signs;
+  for (int tick = 0; tick < 20; ++tick) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable().wait_for(lock, 1ms);
+  }
+  CHECK(signs == before);
+  bench.writer.fail(std::nullopt);
+  bench.writer.open(true);
+  bench.wait_until_told(2);
+  wait_for_sign();
 }
 
 TEST_CASE("journal: nothing is told of what is not stored, and nothing is lost while it fails") {

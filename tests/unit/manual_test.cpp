@@ -29,8 +29,8 @@ namespace {
 
 const fs::path root = SPINDLE_SOURCE_DIR;
 const fs::path manual = root / "man";
-const std::vector<std::string> pages = {"spindle.1", "spindle-profile.5", "spindle-tools.5",
-                                        "spindle-backup.5", "spindle-json.7"};
+const std::vector<std::string> pages = {"spindle.1",        "spindle-profile.5", "spindle-tools.5",
+                                        "spindle-backup.5", "spindle-json.7",    "spindle-plant.7"};
 
 std::string read(const fs::path& path) {
   std::ifstream file(path);
@@ -55,6 +55,7 @@ std::vector<test::Placeholder> all_placeholders() {
   for (test::Placeholder& placeholder : test::key_placeholders())
     placeholders.push_back(std::move(placeholder));
   placeholders.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
+  placeholders.push_back(example("EXAMPLE_PLANT", "plant.yaml"));
   placeholders.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
   placeholders.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
   placeholders.push_back(example("EXAMPLE_ENCODINGS", "any-device.yaml"));

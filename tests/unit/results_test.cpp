@@ -45,7 +45,11 @@ struct Stage {
                  .profiles = profiles(),
                  .tools = tools,
                  .show_frames = show_frames},
-                {.io = io, .serve = serve, .end_waits = end_waits, .user = {.format = format}},
+                {.io = io,
+                 .serve = serve,
+                 .end_waits = end_waits,
+                 .companions = companions,
+                 .user = {.format = format}},
                 {.renderer = renderer}} {}
 
   /// The JSON of the records that were told, but for the summary.
@@ -73,6 +77,7 @@ struct Stage {
   report::Streams io;
   sim::Serve serve = {};
   std::function<void()> end_waits = [] {};
+  commands::Companions companions = {};
   commands::RecordingRenderer renderer = {};
   commands::Context context;
 };

@@ -128,6 +128,7 @@ TEST_CASE(
 TEST_CASE("shared line: outside of a turn nothing is received, and a wait can be interrupted") {
   World world;
   const auto idle = world.join();
+  auto second = world.join();
   world.script.arrive(world.clock.now() + 1ms, Bytes{1, 2, 3});
   std::array<std::uint8_t, 8> bytes{};
   const TimePoint deadline = world.clock.now() + 1s;
@@ -138,6 +139,15 @@ TEST_CASE("shared line: outside of a turn nothing is received, and a wait can be
   idle->release_bus({.used_until = deadline});
   world.interrupt.raise(SIGINT);
   CHECK(idle->receive(bytes, deadline + 1s).error().code == Errc::interrupted);
+}
+
+TEST_CASE("shared line: the only share hears all that comes, as if the line was its own") {
+  World world;
+  const auto only = world.join();
+  world.script.arrive(world.clock.now() + 1ms, Bytes{1, 2, 3});
+  std::array<std::uint8_t, 8> bytes{};
+  CHECK(only->receive(bytes, world.clock.now() + 1s).value() == 3);
+  CHECK(world.clock.now() == FakeClock::start + 1ms);
 }
 
 TEST_CASE("shared line: when it breaks it does so for all, and the next opens it anew") {
@@ -324,6 +334,21 @@ TEST_CASE("gateway: the connection stays open behind an answer, and not where no
   Gateway lasting(Stays::while_it_lives);
   { CHECK_FALSE(lasting.unit(1).transact(request)); }
   CHECK(lasting.open == 1);
+}
+
+TEST_CASE("gateway: what stayed open is closed when no unit has it any more") {
+  Gateway world;
+  {
+    const auto one = world.connection.join(world.opener());
+    Session two = world.unit(2);
+    world.script.on_request(tcp_answer(5ms, value));
+    CHECK(two.transact(request));
+    world.connection.close_unused({.code = Errc::closed});
+    CHECK(world.open == 1);
+  }
+  CHECK(world.open == 1);
+  world.connection.close_unused({.code = Errc::closed});
+  CHECK(world.open == 0);
 }
 
 TEST_CASE("gateway: half a frame in one turn is a whole one in the next") {

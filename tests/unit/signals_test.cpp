@@ -71,8 +71,7 @@ TEST_CASE("signals: the first one raises the interrupt and makes its descriptor 
 }
 
 TEST_CASE("signals: every one that would end the process raises the interrupt instead") {
-  std::vector<int> numbers = {SIGUSR1, SIGUSR2, SIGALRM, SIGXCPU,  SIGVTALRM,
-                              SIGPROF, SIGIO,   SIGPWR,  SIGSTKFLT};
+  std::vector<int> numbers = {SIGALRM, SIGXCPU, SIGVTALRM, SIGPROF, SIGIO, SIGPWR, SIGSTKFLT};
   for (int number = SIGRTMIN; number <= SIGRTMAX; ++number) numbers.push_back(number);
   for (const int number : numbers) {
     CAPTURE(number);
@@ -84,6 +83,40 @@ TEST_CASE("signals: every one that would end the process raises the interrupt in
     });
     CHECK(status == 0);
   }
+}
+
+TEST_CASE("signals: what only other programs understand changes nothing") {
+  for (const int number : {SIGUSR1, SIGUSR2}) {
+    CAPTURE(number);
+    const int status = status_of_child([number] {
+      const posix::SignalWatch watch;
+      posix::SteadyClock clock(watch.interrupt());
+      ::raise(number);
+      if (watch.interrupt().raised()) ::_exit(1);
+      if (!clock.sleep_until(clock.now() + 1ms)) ::_exit(2);
+      ::raise(SIGTERM);
+      if (!watch.interrupt().raised()) ::_exit(3);
+    });
+    CHECK(status == 0);
+  }
+}
+
+TEST_CASE("signals: SIGHUP asks for a reload where that is heeded, and never for the end") {
+  const int status = status_of_child([] {
+    ::signal(SIGHUP, SIG_IGN);
+    posix::SignalWatch watch;
+    watch.heed_reload();
+    if (watch.take_reload()) ::_exit(1);
+    ::raise(SIGHUP);
+    ::raise(SIGHUP);
+    if (watch.interrupt().raised()) ::_exit(2);
+    if (!watch.take_reload()) ::_exit(3);
+    if (watch.take_reload()) ::_exit(4);
+    ::raise(SIGTERM);
+    ::raise(SIGHUP);
+    if (watch.interrupt().error().status() != ExitStatus::terminated) ::_exit(5);
+  });
+  CHECK(status == 0);
 }
 
 TEST_CASE("signals: one that tells of a fault and comes from another process is a request") {

@@ -287,6 +287,22 @@ TEST_CASE("the port of a profile counts, and what pushes its events has its own 
         Names{"tcp://g:502", "tcp://g:502", "", "", ""});
 }
 
+TEST_CASE("a unit whose connection others may come to share names its gateway, also alone") {
+  Bench bench;
+  const auto gateway = [&](const std::string& url, const std::string& profile) {
+    bench.tools.tools = {{.name = "one", .url = url, .profile = profile}};
+    const auto targets = resolve_targets({"one"}, bench.context());
+    REQUIRE(targets.has_value());
+    CHECK(targets->front().endpoint.gateway.empty());
+    return naming_gateways(*targets, bench.context()).front().endpoint.gateway;
+  };
+  CHECK(gateway("tcp://g?unit=1", "kolver-kducer") == "tcp://g:502");
+  CHECK(gateway("tcp://g", "kolver-kducer").empty());
+  CHECK(gateway("tcp://g:5000?unit=3", "doga-bm").empty());
+  CHECK(gateway("tcp://g?unit=1", "").empty());
+  CHECK(gateway("rtu+tcp://g:1?unit=1", "orientalmotor-blv").empty());
+}
+
 TEST_CASE("where ids are ignored a tool must be told by its unit, and send nothing unasked") {
   Bench bench;
   bench.tools.tools.push_back({.name = "deaf",

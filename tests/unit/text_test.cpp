@@ -4,6 +4,19 @@
 
 using namespace spindle;
 
+TEST_CASE("the article is the one that is spoken") {
+  CHECK(with_article("BLV") == "a BLV");
+  CHECK(with_article("BM") == "a BM");
+  CHECK(with_article("K-Ducer") == "a K-Ducer");
+  CHECK(with_article("code 30") == "a code 30");
+  CHECK(with_article("profile doga-bm") == "a profile doga-bm");
+  CHECK(with_article("FC01") == "an FC01");
+  CHECK(with_article("SDM72D-M") == "an SDM72D-M");
+  CHECK(with_article("Altivar") == "an Altivar");
+  CHECK(with_article("Sinamics") == "a Sinamics");
+  CHECK(with_article("X") == "an X");
+}
+
 TEST_CASE("a pattern matches the whole name") {
   struct Case {
     std::string_view pattern;

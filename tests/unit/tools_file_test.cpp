@@ -130,6 +130,20 @@ TEST_CASE("faults are told with their place") {
       {"tools:\n  a: {url: x, transaction: ignore}\n",
        "2:28: unknown transaction 'ignore'; did you mean 'ignored'?"},
       {"tools: {a: {url: x}\n", "not valid YAML here: a '}' is missing"},
+      {"tools: {a: {url: x}}\nsinks: {p: {}}\n", "2:12: key 'url' is missing"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: \"http://h\"}}\n", "2:18: it is no URL of a sink"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: [\"mqtt://h\", \"postgres://h/d\"]}}\n",
+       "2:31: all URLs of a sink are of one kind"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: []}}\n", "2:18: a sink needs a URL"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: \"mqtt://u:w@h\"}}\n",
+       "2:18: a password may not stand in a URL"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: \"mqtt://h\", window: 0}}\n", "it is 1 at least"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: \"mqtt://h\", batch: 5}}\n",
+       "'batch' is about sinks of kind postgresql"},
+      {"tools: {a: {url: x}}\nsinks: {p: {url: \"mqtt://h\", cert-file: c}}\n",
+       "'cert-file' makes no sense without 'key-file'"},
+      {"tools: {a: {url: x}}\nsinks: {p/q: {url: \"mqtt://h\"}}\n",
+       "name 'p/q' is not made of the letters"},
       {"tools: {a: {url: x}}\n---\nmore: 1\n", "3:1: a second document has no meaning here"},
   };
   for (const Row& row : rows) {
@@ -138,6 +152,66 @@ TEST_CASE("faults are told with their place") {
     CAPTURE(found);
     CHECK(found.find(row.fault) != std::string::npos);
   }
+}
+
+TEST_CASE("sinks, with their files in the folder of the tools file") {
+  const ToolsFile file(
+      "tools: {a: {url: x}}\n"
+      "sinks:\n"
+      "  plant: {url: [\"mqtts://a/acme/line1\", \"mqtts://b\"], user: me, password-file: secret,\n"
+      "          ca-file: /etc/ca.pem, events: all, window: 20}\n"
+      "  base: {url: \"postgresql://host/db\", batch: 1000}\n");
+  const auto tools = load_tools(file.path(), posix::source_disk());
+  REQUIRE_MESSAGE(tools.has_value(), describe(tools.error()));
+  REQUIRE(tools->sinks.size() == 2);
+  const files::Sink& plant = tools->sinks[0];
+  CHECK(plant.name == "plant");
+  CHECK(plant.urls == std::vector<std::string>{"mqtts://a/acme/line1", "mqtts://b"});
+  CHECK(plant.password_file ==
+        (std::filesystem::path(file.path()).parent_path() / "secret").string());
+  CHECK(plant.ca_file == "/etc/ca.pem");
+  CHECK(plant.events == files::SinkEvents::all);
+  CHECK(plant.window == 20U);
+  CHECK(tools->sinks[1].batch == 1000U);
+}
+
+TEST_CASE("URLs of sinks") {
+  struct Row {
+    const char* url;
+    const char* meant;  ///< "tls host port base", or the fault
+  };
+  const Row rows[] = {
+      {"mqtt://h", "plain h 1883 spindle/v1"},
+      {"mqtts://h/", "tls h 8883 spindle/v1"},
+      {"mqtts://h:1234/acme/site 1/", "tls h 1234 acme/site 1"},
+      {"mqtt://[::1]:1884/a%20b", "plain ::1 1884 a b"},
+      {"mqtt://", "the host is missing"},
+      {"mqtt://:1883/a", "the host is missing"},
+      {"mqtt://h:0", "the port is none of 1 to 65535"},
+      {"mqtt://h:65536", "the port is none of 1 to 65535"},
+      {"mqtt://[::1", "a ']' is missing behind the address"},
+      {"mqtt://h/$SYS/a", "the topic begins with '$'"},
+      {"mqtt://h/a%2Bb", "the topic has a '+' or '#'"},
+      {"mqtt://h/a%0Ab", "the topic has control characters, or is no UTF-8"},
+      {"mqtt://h/a%2", "a '%' in the topic is not followed by two hexadecimal digits"},
+      {"mqtt://h/a?b", "a URL of MQTT has no '?' and no '#'"},
+      {"mqtt://me@h/a", "a user does not stand in the URL of a broker"},
+      {"mqtt://me:pass@h/a", "a password may not stand in a URL"},
+      {"postgresql://me:pass@h/a", "a password may not stand in a URL"},
+      {"postgresql://h/a?pass%77ord=x", "a password may not stand in a URL"},
+      {"ftp://h", "it is no URL of a sink"},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(row.url);
+    const auto url = files::parse_sink_url(row.url);
+    const std::string meant = url ? std::string(url->is_encrypted ? "tls " : "plain ") + url->host +
+                                        " " + std::to_string(url->port) + " " + url->base
+                                  : message_of(url.error());
+    CHECK(meant == row.meant);
+  }
+  const auto database = files::parse_sink_url("postgresql://me@h/a?sslmode=verify-full");
+  REQUIRE(database);
+  CHECK(database->kind == files::SinkKind::postgresql);
 }
 
 TEST_CASE("a file that is not there") {

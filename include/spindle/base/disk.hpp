@@ -52,6 +52,9 @@ struct Disk {
   /// A whole text that decides what is written to tools: refuses, beside what read() refuses, a
   /// file of another user and one that other users can write (see check_trust()).
   std::function<Result<std::string>(const std::string& path)> read_trusted;
+  /// A whole text that is a secret: refuses, beside what read() refuses, a file that all other
+  /// users can read or write.
+  std::function<Result<std::string>(const std::string& path)> read_secret = {};
 };
 
 }  // namespace spindle

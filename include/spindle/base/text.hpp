@@ -41,6 +41,9 @@ std::string shown_command(const std::string& command);
 /// there or the number is above `maximum`. A leading zero ("010") is decimal ten, never octal.
 std::optional<std::uint64_t> parse_unsigned(std::string_view text, std::uint64_t maximum);
 
+/// The name of a product with the article that is spoken: "a BLV", "an FC01", "an SDM72D-M".
+std::string with_article(std::string_view name);
+
 /// "1 event", "2 events", "0 events".
 std::string counted(std::size_t count, std::string_view noun);
 

@@ -24,7 +24,10 @@ struct World {
   std::function<std::optional<std::string>(std::string_view name)> environment;
   Disk disk;
   Installation installation;
+  link::MakeDoors make_doors = {};      ///< lets other programs ask; may be empty
   files::ShippedProfiles shipped = {};  ///< the profiles of the program
+  commands::Companions companions = {};
+  commands::Supervision supervision = {};
 };
 
 /// The whole program: parses the arguments (without the program's name), runs one command, and

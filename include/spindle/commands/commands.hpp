@@ -87,6 +87,12 @@ Result<Outcome> scan(const ScanOptions& options, Context& context);
 /// Which registers of a tool can be read. Requires `registers`.
 Result<Outcome> scan_registers(const ScanOptions& options, Context& context);
 
+/// Whether other programs than spindle can ask, too.
+struct GatewayOptions {
+  std::string listen = {};  ///< "PORT" or "ADDRESS:PORT", as typed; empty: they cannot
+  link::Rights rights = link::Rights::read;
+};
+
 struct WatchOptions {
   std::vector<std::string> targets;
   std::vector<std::string> names;  ///< values to poll; none: events only
@@ -99,6 +105,7 @@ struct WatchOptions {
   std::optional<Duration> idle_timeout = std::nullopt;
   std::string store = {};  ///< that knows the last events; empty: the user's own, where it is there
   std::optional<std::uint16_t> since_event = std::nullopt;  ///< the last number that was seen
+  GatewayOptions gateway = {};
 };
 Result<Outcome> watch(const WatchOptions& options, Context& context);
 
@@ -107,8 +114,42 @@ struct RecordOptions {
   std::string store = {};                         ///< empty: the user's own
   std::optional<Duration> gather = std::nullopt;  ///< how long results wait for others
   bool tee = false;                               ///< show each record once it is stored
+  std::string metrics = {};                       ///< a file for a monitoring system; empty: none
+  std::string lease = {};  ///< sink whose database divides the tools; empty: they are not shared
+  Duration lease_ttl = std::chrono::seconds(5);  ///< one second or more
 };
 Result<Outcome> record(const RecordOptions& options, Context& context);
+
+/// When `spindle forward` ends.
+enum class Delivery : std::uint8_t {
+  service,  ///< never by itself
+  once,     ///< when the sink has all that was there at the start
+};
+
+/// What `spindle forward` hands on, and to whom.
+struct ForwardOptions {
+  std::string sink;        ///< a URL, or a name under `sinks:` of the tools file
+  std::string store = {};  ///< empty: the user's own
+  std::string from = {};   ///< an event's id, or a time as typed; empty: where the sink is
+  Delivery delivery = Delivery::service;
+  Execution execution = Execution::real;             ///< dry run: shows what would be sent
+  std::optional<std::size_t> window = std::nullopt;  ///< at most so many without acknowledgement
+  std::string metrics = {};                          ///< file for Prometheus; empty: none
+  bool print_schema = false;  ///< show the tables of a database, and do nothing else
+  bool keep_leases = false;   ///< answer a recorder's questions on standard input instead
+};
+Result<Outcome> forward(const ForwardOptions& options, Context& context);
+
+/// `spindle serve`: with targets, the tools that are held for other programs; without, the page.
+struct ServeOptions {
+  std::vector<std::string> targets = {};
+  std::string listen = {};  ///< ADDRESS:PORT of the gateway or of the page; empty: as usual
+  link::Rights rights = link::Rights::read;  ///< of those that ask through the gateway
+  std::string store = {};                    ///< that the page shows; empty: the user's own
+  std::string shifts = {};      ///< when they begin, as typed: "06:00,14:00"; empty: at midnight
+  std::string token_file = {};  ///< whose token the page asks for; empty: it asks for none
+};
+Result<Outcome> serve(const ServeOptions& options, Context& context);
 
 /// Whether Cm and Cmk of one uninterrupted run are told, too.
 enum class MachineStudy : std::uint8_t { no, yes };
@@ -226,6 +267,16 @@ struct CopyOptions {
 Result<Outcome> backup_store(const CopyOptions& options, Context& context);
 /// Everything in the store as JSON Lines.
 Result<Outcome> export_store(const CopyOptions& options, Context& context);
+
+/// The sinks that are served from the store.
+Result<Outcome> list_sinks(const StoreOptions& options, Context& context);
+
+struct ForgetOptions {
+  std::string store = {};  ///< empty: the user's own
+  std::string sink;
+};
+/// Gives a sink up, so that it holds back no trim.
+Result<Outcome> forget_sink(const ForgetOptions& options, Context& context);
 
 struct DumpOptions {
   std::string target;

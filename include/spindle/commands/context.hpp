@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "spindle/commands/companions.hpp"
+#include "spindle/commands/supervision.hpp"
 #include "spindle/report/progress.hpp"
 #include "spindle/report/renderer.hpp"
 #include "spindle/report/streams.hpp"
@@ -41,7 +43,9 @@ struct Surroundings {
   report::Streams& io;
   const sim::Serve& serve;
   const std::function<void()>& end_waits;  ///< ends every wait of every thread, as a signal would
+  const Companions& companions;
   UserOptions user = {};
+  Supervision supervision = {};
 };
 
 /// The part of a context that differs from one tool of a group to the next.

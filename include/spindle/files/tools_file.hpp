@@ -11,6 +11,7 @@
 #include "spindle/base/disk.hpp"
 #include "spindle/base/error.hpp"
 #include "spindle/files/finding.hpp"
+#include "spindle/files/sink.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::files {
@@ -50,6 +51,7 @@ struct Tools {
   std::map<std::string, std::vector<std::string>> groups = {};
   /// Why not all of the file is here; only of salvage_tools().
   std::optional<Error> left_out = std::nullopt;
+  std::vector<Sink> sinks = {};
 };
 
 /// Whether a word may stand for tools of a tools file: it is a tool's name, or a group's.

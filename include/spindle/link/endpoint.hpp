@@ -46,6 +46,8 @@ struct Endpoint {
   /// tcp: names the connection that it shares with other units of one command; empty: its own.
   std::string gateway = {};
   Claim claim = Claim::alone;
+
+  friend bool operator==(const Endpoint&, const Endpoint&) = default;
 };
 
 /// Whether the text can only be meant as a URL: it begins with "WORD:".

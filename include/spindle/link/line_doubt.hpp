@@ -36,6 +36,8 @@ class LineDoubt {
   void raise(TimePoint until) { until_ = std::max(until_, until); }
   /// The line is doubtful for good: another program has it, too.
   void stay() { lasting_ = true; }
+  /// What another session found on the same line, before this one had a turn.
+  void learn(const LineDoubt& other);
   [[nodiscard]] bool is_raised(TimePoint now) const { return lasting_ || now < until_; }
 
   /// How often a frame came that may have been taken for an answer. Noise does not count.

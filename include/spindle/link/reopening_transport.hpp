@@ -2,7 +2,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
+#include "spindle/link/session.hpp"
 #include "spindle/link/trace.hpp"
 #include "spindle/link/transport.hpp"
 
@@ -27,6 +29,15 @@ class ReopeningTransport final : public Transport {
   Result<void> send(ByteView bytes, TimePoint deadline) override;
   Result<std::size_t> receive(std::span<std::uint8_t> into, TimePoint deadline) override;
   void set_uninterruptible() override;
+  void set_interruptible() override;
+  void introduce(const SessionOptions& options) override;
+  [[nodiscard]] bool asks_owner() const override { return transport_ && transport_->asks_owner(); }
+  void set_urgent() override {
+    if (transport_) transport_->set_urgent();
+  }
+  void skip_verification() override {
+    if (transport_) transport_->skip_verification();
+  }
 
  private:
   Result<std::size_t> take(TimePoint deadline);
@@ -46,6 +57,7 @@ class ReopeningTransport final : public Transport {
   bool hangs_up_ = false;         ///< the server has closed a connection behind an answer
   bool asked_again_ = false;      ///< the last request
   bool shielded_ = false;
+  std::optional<SessionOptions> introduced_ = std::nullopt;
 };
 
 }  // namespace spindle::link

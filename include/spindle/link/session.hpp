@@ -139,17 +139,26 @@ class Session {
   /// After this, interrupts no longer end waits on this connection.
   void set_uninterruptible() { transport_->set_uninterruptible(); }
 
+  /// From now on its requests go before those of others on the same line.
+  void set_urgent() { transport_->set_urgent(); }
+
+  /// Whether another program has the line and is asked for everything.
+  [[nodiscard]] bool asks_owner() const { return asked_as_.has_value(); }
+
   /// RTU: from now on answers are believed without a proof behind them, also after trouble: a stop
   /// and its confirmation must not wait for more answers than they need.
-  void skip_verification() { proves_ = Proves::never; }
+  void skip_verification() {
+    proves_ = Proves::never;
+    transport_->skip_verification();
+  }
 
   void set_answer_timeout(Duration timeout) { options_.answer_timeout = timeout; }
   /// Whom the requests from now on are for.
-  void set_unit(modbus::UnitId unit) { options_.unit = unit; }
+  void set_unit(modbus::UnitId unit);
   /// For FC 08: another word for every request, and hardly that of an earlier process.
   [[nodiscard]] std::uint16_t fresh_word() const;
   /// For a profile that is only known after the first answer.
-  void set_rules(DemuxRules rules) { options_.rules = std::move(rules); }
+  void set_rules(DemuxRules rules);
   [[nodiscard]] const SessionOptions& options() const { return options_; }
   [[nodiscard]] const SessionCounters& counters() const { return counters_; }
   [[nodiscard]] Clock& clock() const { return *clock_; }
@@ -216,6 +225,11 @@ class Session {
   void check_step();
   [[nodiscard]] Transport::Stream stream() const;
   void go_on_with(Transport::Stream stream);
+  [[nodiscard]] Transport::Dialogue dialogue() const;
+  void go_on_with(const Transport::Dialogue& dialogue);
+  void hear_what_others_heard(Bytes frames);
+  void pass_on(const modbus::Adu& received) const;
+  bool take_late_with_id(const modbus::Adu& received);
   void keep(const modbus::Pdu& pdu);
   Result<void> keep_gap();
   Result<void> wait_for_silence(TimePoint not_before);
@@ -233,6 +247,8 @@ class Session {
 
   std::unique_ptr<Transport> transport_;
   Clock* clock_;
+  /// How the owner of the line is to ask for us; empty: the line is ours.
+  std::optional<SessionOptions> asked_as_ = std::nullopt;
   SessionOptions options_;
   Trace trace_;
   SessionCounters counters_ = {};
@@ -269,6 +285,8 @@ class Session {
   modbus::Pdu accepted_ = {};                ///< what would be refuted
   std::uint64_t refutations_ = 0;
   enum class Heard : std::uint8_t { nothing, line } heard_ = Heard::nothing;
+  bool has_turn_ = false;  ///< of a line that others have, too
+  bool had_turn_ = false;
   Duration longest_round_trip_ = {};
   std::optional<Error> out_of_step_ = std::nullopt;  ///< TCP: why nothing can be asked any more
   std::size_t torn_ = 0;  ///< TCP: bytes of a frame whose rest did not come in time

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,9 +10,12 @@
 
 #include "spindle/base/bytes.hpp"
 #include "spindle/base/clock.hpp"
+#include "spindle/link/line_doubt.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::link {
+
+struct SessionOptions;
 
 /// Bytes to and from one server, before a deadline. Knows nothing of what they mean.
 class Transport {
@@ -34,6 +38,13 @@ class Transport {
   /// (disarm, stop).
   virtual void set_uninterruptible() = 0;
 
+  /// Takes set_uninterruptible() back, where several sessions have this transport in turns.
+  virtual void set_interruptible() {}
+
+  /// Ends the receive() that another thread waits in, or the next one, as its deadline would. May
+  /// be called from any thread. A transport that nothing shares need not be able to.
+  virtual void wake() {}
+
   /// A request that was given up, and until when its answer may come.
   struct Unanswered {
     modbus::Adu request;
@@ -50,11 +61,25 @@ class Transport {
     std::optional<Error> out_of_step = std::nullopt;  ///< why the connection is of no use any more
   };
 
+  /// Where the dialogue with one unit of a serial line stands between two requests.
+  struct Dialogue {
+    std::optional<TimePoint> quarantined_until = std::nullopt;
+    TimePoint doubtful_until = {};
+    TimePoint past_until = {};
+    std::optional<modbus::Adu> abandoned = std::nullopt;
+    std::vector<Unanswered> unanswered = {};
+    LineDoubt doubt = {};
+  };
+
   /// How a line is left to the others of this program who have it, too.
   struct BusLease {
     TimePoint used_until = {};  ///< when the last byte was sent or received
     TimePoint late_until = {};  ///< until when an answer may come that was given up
     std::optional<Stream> stream = std::nullopt;  ///< empty: it has not begun, or there is none
+    /// Modbus TCP: what others received since the last turn and was not for them: whole frames.
+    /// Only where there is no stream yet, part of a frame may follow.
+    Bytes heard = {};
+    std::map<modbus::UnitId, Dialogue> dialogues = {};  ///< of all sessions, by unit
   };
 
   /// Where others of this program have the same line: waits until none of them awaits an answer,
@@ -63,6 +88,11 @@ class Transport {
   virtual BusLease acquire_bus() { return {}; }
   /// What the next one learns from acquire_bus().
   virtual void release_bus(const BusLease& left) { static_cast<void>(left); }
+  /// Modbus TCP: gives the others a frame that came in this turn and that nothing had asked for.
+  virtual void pass_on(ByteView frame) { static_cast<void>(frame); }
+  /// From now on this session's turns come before those of all that are not urgent, and do not wait
+  /// for long until one of those is over: for what leaves a tool safe.
+  virtual void set_urgent() {}
 
   /// Another program that has the line open, as far as the system tells: "minicom (process 4711)";
   /// empty when there is none.
@@ -78,6 +108,19 @@ class Transport {
 
   /// Whether others of this program have it, too, so that it is not for one of them to open anew.
   [[nodiscard]] virtual bool is_shared() const { return false; }
+
+  /// How the session on this transport goes about it, told whenever that changes.
+  virtual void introduce(const SessionOptions& options) { static_cast<void>(options); }
+  /// From now on answers are believed without a proof behind them; see Session.
+  virtual void skip_verification() {}
+  /// Whether another program has the line and is asked for everything: in frames of Modbus TCP with
+  /// ids, whatever is on the line itself. Silence, late answers and proofs are that program's
+  /// affair, and receive() also fails with what it says became of a request.
+  [[nodiscard]] virtual bool asks_owner() const { return false; }
+
+  /// What other programs call this line by, the same however it was spelt: "tcp-127.0.0.1-502",
+  /// "rtu-/dev/ttyUSB0". Empty where they cannot mean it.
+  [[nodiscard]] virtual std::string line_name() const { return {}; }
 };
 
 }  // namespace spindle::link

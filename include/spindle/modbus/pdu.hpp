@@ -80,7 +80,7 @@ enum class Fit : std::uint8_t {
 
 /// Judges a response by the request alone: the byte count fits the quantity, the echo of a write
 /// equals what was sent (address and value, address and quantity, loop-back word), FC 11h's byte
-/// count fits.
+/// count fits. Of a function that is not spoken here every answer fits.
 Fit fit(const Pdu& request, const Pdu& response);
 
 /// The registers of a response to FC 03/04.

@@ -22,4 +22,7 @@ Result<std::unique_ptr<link::Transport>> open_serial(const std::string& path,
                                                      const Clock& clock,
                                                      const Interrupt& interrupt);
 
+/// What other programs call the line of this port, by whatever path it is named.
+std::string serial_line_name(const std::string& path);
+
 }  // namespace spindle::posix

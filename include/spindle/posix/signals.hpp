@@ -11,7 +11,8 @@ namespace spindle::posix {
 /// process can catch, raises it and makes its eventfd readable (it stays readable). What was
 /// ignored before stays ignored, but for SIGINT, SIGTERM and SIGQUIT. A second signal ends the
 /// process at once with 128 + its number, unless it comes within 0.05 s: that is one wish said
-/// twice, and a motor is being stopped. SIGPIPE and SIGXFSZ are ignored. A fault of the process
+/// twice, and a motor is being stopped. SIGPIPE and SIGXFSZ are ignored, and SIGUSR1 and SIGUSR2,
+/// which mean nothing here and may be meant for another program. A fault of the process
 /// itself (SIGSEGV, SIGABRT and their like, unless another process sent it) ends it as always. The
 /// handlers before it come back at its end. At most one may exist.
 class SignalWatch {
@@ -28,6 +29,12 @@ class SignalWatch {
   /// From now on SIGTSTP (Ctrl-Z) raises the interrupt as SIGINT does, instead of suspending, and
   /// the use of a terminal that is another program's now (SIGTTIN, SIGTTOU) suspends neither.
   void refuse_suspend();
+
+  /// From now on SIGHUP does not end the process: it asks for what take_reload() tells.
+  void heed_reload();
+
+  /// Whether SIGHUP came since this was last asked.
+  bool take_reload();
 
   /// What is told on standard error when a second signal ends the process; empty: nothing. Words
   /// that are too long are cut.

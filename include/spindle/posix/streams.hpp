@@ -46,6 +46,10 @@ bool out_ends_within_line();
 /// is full or its terminal was halted with Ctrl-S.
 bool err_is_ready();
 
+/// Whether standard error goes to the system's journal: JOURNAL_STREAM names its device and inode
+/// (systemd.exec(5)), which a stream that was turned elsewhere has not.
+bool err_is_journal();
+
 /// Cells of a row of the terminal behind standard error; 0 when it is none, or does not say.
 std::size_t err_columns();
 
@@ -66,7 +70,8 @@ Streams standard_streams(const Clock& clock, const Interrupt& interrupt) {
           .err_is_ready = err_is_ready,
           .err_columns = err_columns,
           .out_ends_within_line = out_ends_within_line,
-          .out_for = write_out_for};
+          .out_for = write_out_for,
+          .err_is_journal = err_is_journal()};
 }
 
 }  // namespace spindle::posix

@@ -18,7 +18,9 @@
 
 namespace spindle::posix {
 
-/// Opens real lines. What the endpoint leaves out (port, rate, parity, stop bits) is the profile's.
+/// Opens real lines. A line that another spindle has, and on which it lets itself be asked, is not
+/// opened: that one is asked. What the endpoint leaves out (port, rate, parity, stop bits) is the
+/// profile's.
 std::function<Result<std::unique_ptr<link::Transport>>(
     const link::Endpoint& endpoint, const catalogue::LinkSpec& facts, Duration connect_timeout)>
 line_opener(Clock& clock, const Interrupt& interrupt);

@@ -57,6 +57,13 @@ enum class Verbosity : std::uint8_t { quiet, normal };
 
 std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity);
 
+/// How important a line on stderr is, as syslog(3) counts it.
+enum class Severity : std::uint8_t { error = 3, warning = 4, notice = 5, informational = 6 };
+
+/// The text as one line on stderr, marked with its severity (sd-daemon(3)) where the system's
+/// journal reads that.
+void say_line(const Streams& streams, Severity severity, std::string_view text);
+
 /// What users have to know about the values that are shown: one line on stderr, quiet or not. May
 /// be called from any thread.
 void say_warning(const Streams& streams, std::string_view sentence);

@@ -36,6 +36,8 @@ struct Streams {
   /// Writes what is taken of the text within this time, and returns how many bytes; fails as out()
   /// does. For who must not be held up by a reader; may be empty, where out() never waits long.
   std::function<Result<std::size_t>(std::string_view, Duration)> out_for = {};
+  /// Whether the system's journal reads err(), which wants to know how important a line is.
+  bool err_is_journal = false;
   Color color = Color::off;
 };
 

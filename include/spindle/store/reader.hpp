@@ -10,6 +10,7 @@
 
 #include "spindle/base/error.hpp"
 #include "spindle/store/rows.hpp"
+#include "spindle/store/sinks.hpp"
 
 namespace spindle::store {
 
@@ -45,6 +46,20 @@ struct Coverage {
   std::size_t unknown_gaps = 0;  ///< gaps of unknown size, or that may be larger
 };
 
+/// What stands behind a sink's place.
+struct Backlog {
+  std::size_t events = 0;
+  std::size_t gaps = 0;
+  std::size_t happenings = 0;
+  std::optional<WallTime> oldest = std::nullopt;  ///< of its events and gaps; empty: it has none
+};
+
+/// An event by how its tool counts it.
+struct Counted {
+  std::int64_t epoch = 0;
+  std::uint16_t number = 0;
+};
+
 /// Reads a store, also while it is written, and by several programs. Every function sees the store
 /// as it was at one moment; one that takes long keeps the writer's log from being emptied. Errors:
 /// `bad_file` where it is no store, a newer or a damaged one; `storage` where it cannot be read.
@@ -76,12 +91,30 @@ class Reader {
   /// The newest event's id; 0: there is none.
   virtual Result<RowId> newest() = 0;
 
+  /// The size of the store, without what its log holds.
+  virtual Result<std::uint64_t> bytes() = 0;
+
   virtual Result<std::vector<Coverage>> coverage() = 0;
   /// What SQLite's integrity check and ours find wrong, a line each; empty: nothing.
   virtual Result<std::vector<std::string>> integrity() = 0;
 
   /// A whole copy, made while others write. Error `usage`: the file is there.
   virtual Result<void> backup(const std::string& path) = 0;
+
+  /// Changes whenever another program has stored something.
+  virtual Result<std::int64_t> state() = 0;
+
+  /// How many rows there are behind these.
+  virtual Result<Backlog> behind(const Positions& positions) = 0;
+  /// The newest row of each stream.
+  virtual Result<Positions> ends() = 0;
+  /// The positions before everything that was stored of this time or later.
+  virtual Result<Positions> before(WallTime time) = 0;
+  /// The event of these kinds that a tool counted last before this number; empty: there is none.
+  virtual Result<std::optional<Counted>> counted_before(RowId tool, const Counted& event,
+                                                        const std::vector<std::string>& kinds) = 0;
+  /// The sinks that were served from here, by name.
+  virtual Result<std::vector<SinkRow>> sinks() = 0;
 };
 
 }  // namespace spindle::store

@@ -43,7 +43,8 @@ struct Place {
   std::optional<std::uint32_t> firmware = std::nullopt;
   std::string torque_unit = {};  ///< set on the tool; empty: not known
   WallTime since = {};
-  std::optional<WallTime> seen = std::nullopt;  ///< until when the tool was listened to there
+  std::optional<WallTime> seen = std::nullopt;       ///< until when the tool was listened to there
+  std::optional<std::int64_t> fence = std::nullopt;  ///< number of the lease; empty: under none
 };
 
 /// Why the events of a tool are counted in another epoch.
@@ -183,6 +184,10 @@ inline constexpr auto setting_words =
                          {"min_angle", Setting::min_angle},
                          {"max_angle", Setting::max_angle}});
 inline constexpr std::size_t setting_count = 6;
+
+/// The reason of a gap whose events are in the store of another collector, which had the tool then.
+/// It is no loss, and told to none but who reads this store.
+inline constexpr std::string_view recorded_elsewhere = "recorded by another collector";
 
 /// The settings of one preset as they were read. Target torque in ten-thousandths of the tool's
 /// unit, torque limit in ten-thousandths of a percent, angles in degrees.

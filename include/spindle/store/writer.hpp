@@ -82,6 +82,11 @@ class Writer {
   /// Empty: it never told anything.
   virtual Result<std::optional<Last>> last(RowId tool) = 0;
 
+  /// Another collector had the tool until this last event: what it tells from now on is counted
+  /// behind that, in its epoch. What this store does not have of it is a gap `recorded_elsewhere`.
+  /// Nothing is done where this store knows as much.
+  virtual Result<void> adopt(RowId tool, const Last& last) = 0;
+
   /// Stores all entries in their order, in one transaction. What became of each stands in the same
   /// order, and all may be handed over again: nothing is there twice. An event whose number the
   /// newest epoch has already is compared in every register: equal is `known` (one that begins an

@@ -10,6 +10,7 @@
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/link/doors.hpp"
 
 namespace spindle::work {
 
@@ -56,6 +57,7 @@ struct Environment {
   const files::Tools& tools;
   const ShowFrames& show_frames;  ///< may be empty
   CommonOptions common = {};
+  link::MakeDoors make_doors = {};  ///< lets other programs ask; empty: none can
 };
 
 /// The same environment with a clock and lines that signals do not end.
@@ -63,5 +65,8 @@ Environment uninterruptible(const Environment& environment);
 
 /// The same environment with other lines, which must outlive it.
 Environment with_lines(const Environment& environment, const device::OpenTransport& open);
+
+/// The same environment with other tools, which must outlive it.
+Environment with_tools(const Environment& environment, const files::Tools& tools);
 
 }  // namespace spindle::work

@@ -24,6 +24,10 @@ struct JournalOptions {
   std::size_t capacity = 100'000;                   ///< entries that may wait
   Duration first_retry = std::chrono::milliseconds(100);
   Duration last_retry = std::chrono::seconds(5);
+  /// Called by the journal's thread behind every commit, and about so often while nothing waits, as
+  /// long as storing works. May be empty.
+  std::function<void()> alive = {};
+  Duration alive_every = std::chrono::seconds(10);
 };
 
 /// What waits to be stored, and the thread that stores it: all that waits in one transaction.
@@ -55,6 +59,8 @@ class Journal {
 
   /// How many entries wait.
   [[nodiscard]] std::size_t waiting() const;
+  /// Whether events or gaps of this tool wait, so that the store does not know its last one yet.
+  [[nodiscard]] bool waits_for(store::RowId tool) const;
 
  private:
   struct Item {
@@ -72,6 +78,7 @@ class Journal {
   void find_lost_again(store::NewEvent& event);
   void flush_lost();
   void run();
+  void tell_alive(std::unique_lock<std::mutex>& lock);
   bool commit(std::unique_lock<std::mutex>& lock);
   bool note_failure(const Error& error);
   void tell_trouble(std::unique_lock<std::mutex>& lock, const std::optional<Error>& error);

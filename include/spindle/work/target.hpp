@@ -21,6 +21,8 @@ struct Target {
   std::vector<std::string> verified = {};
   Addressing addressing = Addressing::unicast;
   link::Reopening reopening = link::Reopening::never;
+
+  friend bool operator==(const Target&, const Target&) = default;
 };
 
 /// The error as one of this tool, with its address beside its name, unless it is one of a tool
@@ -30,6 +32,11 @@ Error with_target(Error error, const Target& target);
 /// The same target, whose connection is opened once more where the tool closes it: for commands
 /// that ask for one thing and end, while the context lives.
 Target reopening(Target target);
+
+/// The same targets, in which every unit behind a Modbus TCP port names its gateway, also the only
+/// one, as others may come to share its connection. A tool that sends unasked keeps its own; so
+/// does one whose profile is not known, until it has company.
+std::vector<Target> naming_gateways(std::vector<Target> targets, const Environment& environment);
 
 /// Name, @group or URL to targets, each once. Errors `bad_target` and `unknown_name` with a
 /// suggestion.
