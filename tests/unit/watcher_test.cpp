@@ -434,6 +434,23 @@ TEST_CASE("an event that was missed for a moment is a result, and no doubt about
   CHECK(shop.told<EventGap>().empty());
 }
 
+TEST_CASE("a first connection lost before it served raises no doubt about the next number") {
+  Workshop shop;
+  shop.clock.advance(1h);  // a computer that has been on for long
+  shop.wire.before = [&](const modbus::Pdu& request) {
+    if (request.function != write_single) return;
+    shop.wire.before = {};
+    shop.wire.cut();
+    shop.happen();
+    shop.happen();
+  };
+  REQUIRE(shop.watch(10s));
+  const auto gaps = shop.told<EventGap>();
+  REQUIRE(gaps.size() == 1);
+  CHECK(gaps.front().missed == 1U);
+  CHECK(shop.numbers().size() == 1);
+}
+
 TEST_CASE("another tool or firmware behind the address is said, and its old event is no result") {
   Workshop shop;
   sim::DeviceOptions other;
