@@ -63,7 +63,7 @@ class PacedClock:
     """Seconds that are as long as the machine makes them.
 
     A thread sleeps for a little while and then lets spindle say its version, again and again; the clock
-    goes on by what was slept, once both are done. On an idle machine that is a little less than real time.
+    goes on by what was slept. On an idle machine that is a little less than real time.
     Where a process has to wait before it may run, the clock waits as well: its second lasts as long as the
     same machine needs for the same work beside the test. It is never ahead of real time.
 
@@ -101,14 +101,21 @@ class PacedClock:
         return self._works
 
     def _go(self):
-        pause, pause_for = threading.Event(), self.SLEEP
+        pause, pauses = threading.Event(), 1
         while True:
-            pause.wait(pause_for)
+            # Shown in small steps: what is read twice never differs by more than the time between.
+            for _ in range(pauses):
+                pause.wait(self.SLEEP)
+                if self._works:
+                    self._show(self.SLEEP)
+                self._seconds = (self._shown() - self._began) / 1e9
+            pauses = 1
             if self._may_work():
                 used = self._work()
-                os.pwrite(self._face, (self._shown() + int(pause_for * 1e9)).to_bytes(8, "little"), 0)
-                pause_for = max(self.SLEEP, used * (self.SHARE - 1))
-            self._seconds = (self._shown() - self._began) / 1e9
+                pauses = max(1, round(used * (self.SHARE - 1) / self.SLEEP))
+
+    def _show(self, seconds):
+        os.pwrite(self._face, (self._shown() + int(seconds * 1e9)).to_bytes(8, "little"), 0)
 
     @staticmethod
     def _work():
