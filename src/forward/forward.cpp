@@ -26,6 +26,7 @@ using commands::ForwardOptions;
 using commands::Outcome;
 
 constexpr Duration reach_limit = std::chrono::seconds(5);
+constexpr Duration look_for_store_every = std::chrono::milliseconds(500);
 
 std::string host_name() {
   std::array<char, 256> name = {};
@@ -158,6 +159,27 @@ Result<Outcome> answer_recorder(const files::Sink& settings, const std::string& 
   return outcome;
 }
 
+/// A recorder that starts later, or has just begun, makes the store: who delivers until it is
+/// stopped waits for that.
+Result<void> wait_for_store(const std::string& path, const ForwardOptions& options,
+                            const ServiceManager& manager, Context& context) {
+  const bool runs_on = options.delivery == commands::Delivery::service &&
+                       options.execution == commands::Execution::real;
+  if (!runs_on || !context.disk.absent(path)) return {};
+  context.renderer.note(fmt::format("{}: there is no store yet; 'spindle record' makes it", path));
+  const auto notify = [&](const std::string& state) {
+    if (manager.notify) manager.notify(state);
+  };
+  notify("READY=1");
+  notify("STATUS=waiting for the store");
+  bool was_absent = true;  // once more, as it may be in the making
+  while (std::exchange(was_absent, context.disk.absent(path))) {
+    notify("WATCHDOG=1");
+    TRY(context.clock.sleep_until(context.clock.now() + look_for_store_every));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Outcome> run(const ForwardOptions& options, Context& context) {
@@ -166,6 +188,11 @@ Result<Outcome> run(const ForwardOptions& options, Context& context) {
   const std::string collector = settings.collector.empty() ? host_name() : settings.collector;
   if (options.keep_leases) return answer_recorder(settings, collector, context);
   TRY_LET(const auto path, work::store_place(options.store, context.state_folder));
+  const commands::Supervision& supervision = context.supervision;
+  if (supervision.heed_reload) supervision.heed_reload();
+  const ServiceManager manager =
+      supervision.take_manager ? supervision.take_manager() : ServiceManager();
+  TRY(wait_for_store(path, options, manager, context));
   TRY_LET(const auto rows, commands::StoredRows::open(path, context));
   if (options.execution == commands::Execution::dry_run) {
     return show(options, settings, collector, *rows, context);
@@ -173,10 +200,6 @@ Result<Outcome> run(const ForwardOptions& options, Context& context) {
   TRY_LET(const auto sink, make_sink(settings, collector, context));
   TRY_LET(const auto cursor, store::SinkCursor::open(path, settings.name));
   TRY(set_place(options, *cursor, settings.urls.front(), rows->reader(), context));
-  const commands::Supervision& supervision = context.supervision;
-  if (supervision.heed_reload) supervision.heed_reload();
-  const ServiceManager manager =
-      supervision.take_manager ? supervision.take_manager() : ServiceManager();
   return Relay({.rows = *rows,
                 .cursor = *cursor,
                 .sink = *sink,

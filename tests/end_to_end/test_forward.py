@@ -93,6 +93,18 @@ class ForwardTest(unittest.TestCase):
 
 
 class DeliveryTest(ForwardTest):
+    def test_a_store_that_is_not_there_yet_is_waited_for(self):
+        ready = make_store("ready.db")
+        store = support.home().path / "later.db"
+        store.unlink(missing_ok=True)
+        self.assertEqual(forward_once("mqtt://127.0.0.1:1", store).status, 3)
+        with Broker() as broker, Listener(broker.port) as listener, forwarding(broker.url, store) as running:
+            self.assertIn("there is no store yet", running.process.stderr.readline().decode())
+            ready.rename(store)
+            support.wait_until(listener.keys, "what is in the store came", LONG)
+            running.send_signal(signal.SIGTERM)
+            self.assertEqual(running.finish().status, 0)
+
     def test_once_delivers_all_results_and_gaps_with_their_keys(self):
         store = make_store("once.db")
         with Broker() as broker, Listener(broker.port) as listener:
