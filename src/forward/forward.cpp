@@ -141,11 +141,15 @@ Result<Outcome> show(const ForwardOptions& options, const files::Sink& settings,
   return outcome;
 }
 
-Result<Outcome> print(std::string_view text, Context& context) {
-  TRY(context.io.out(text));
+Outcome done() {
   Outcome outcome;
   outcome.succeed();
   return outcome;
+}
+
+Result<Outcome> print(std::string_view text, Context& context) {
+  TRY(context.io.out(text));
+  return done();
 }
 
 Result<Outcome> answer_recorder(const files::Sink& settings, const std::string& collector,
@@ -154,18 +158,16 @@ Result<Outcome> answer_recorder(const files::Sink& settings, const std::string& 
   TRY_LET(auto addresses, postgres_addresses(settings, password));
   LeaseKeeper keeper(std::move(addresses), collector, context.clock, context.interrupt);
   TRY(keep_leases(keeper, context.interrupt, context.io.out));
-  Outcome outcome;
-  outcome.succeed();
-  return outcome;
+  return done();
 }
 
 /// A recorder that starts later, or has just begun, makes the store: who delivers until it is
-/// stopped waits for that.
-Result<void> wait_for_store(const std::string& path, const ForwardOptions& options,
-                            const ServiceManager& manager, Context& context) {
+/// stopped waits for that. False: it was stopped.
+bool wait_for_store(const std::string& path, const ForwardOptions& options,
+                    const ServiceManager& manager, Context& context) {
   const bool runs_on = options.delivery == commands::Delivery::service &&
                        options.execution == commands::Execution::real;
-  if (!runs_on || !context.disk.absent(path)) return {};
+  if (!runs_on || !context.disk.absent(path)) return true;
   context.renderer.note(fmt::format("{}: there is no store yet; 'spindle record' makes it", path));
   const auto notify = [&](const std::string& state) {
     if (manager.notify) manager.notify(state);
@@ -175,9 +177,9 @@ Result<void> wait_for_store(const std::string& path, const ForwardOptions& optio
   bool was_absent = true;  // once more, as it may be in the making
   while (std::exchange(was_absent, context.disk.absent(path))) {
     notify("WATCHDOG=1");
-    TRY(context.clock.sleep_until(context.clock.now() + look_for_store_every));
+    if (!context.clock.sleep_until(context.clock.now() + look_for_store_every)) return false;
   }
-  return {};
+  return true;
 }
 
 }  // namespace
@@ -192,7 +194,7 @@ Result<Outcome> run(const ForwardOptions& options, Context& context) {
   if (supervision.heed_reload) supervision.heed_reload();
   const ServiceManager manager =
       supervision.take_manager ? supervision.take_manager() : ServiceManager();
-  TRY(wait_for_store(path, options, manager, context));
+  if (!wait_for_store(path, options, manager, context)) return done();
   TRY_LET(const auto rows, commands::StoredRows::open(path, context));
   if (options.execution == commands::Execution::dry_run) {
     return show(options, settings, collector, *rows, context);

@@ -100,6 +100,10 @@ class DeliveryTest(ForwardTest):
         self.assertEqual(forward_once("mqtt://127.0.0.1:1", store).status, 3)
         with Broker() as broker, Listener(broker.port) as listener, forwarding(broker.url, store) as running:
             self.assertIn("there is no store yet", running.process.stderr.readline().decode())
+            with forwarding(broker.url, store.with_name("never.db")) as vain:
+                vain.process.stderr.readline()
+                vain.send_signal(signal.SIGTERM)
+                self.assertEqual(vain.finish().status, 0)
             ready.rename(store)
             support.wait_until(listener.keys, "what is in the store came", LONG)
             running.send_signal(signal.SIGTERM)
