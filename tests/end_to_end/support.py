@@ -62,17 +62,19 @@ def sanitizer_options():
 class PacedClock:
     """Seconds that are as long as the machine makes them.
 
-    A thread sleeps for a little while and then lets spindle say its version, again and again; the clock
-    goes on by what was slept. On an idle machine that is a little less than real time.
-    Where a process has to wait before it may run, the clock waits as well: its second lasts as long as the
-    same machine needs for the same work beside the test. It is never ahead of real time.
+    A thread lets spindle say its version again and again, and sleeps in between. Of what it slept the clock goes
+    on by the share that this work got of the time that it took: all of it where a process never has to wait, a
+    tenth where the same work takes ten times as long as its processor time. So its second lasts as long as the
+    machine needs for the same work beside the test. It is never ahead of real time.
 
     The test files that run at the same time have one clock, or keeping time would be most of what the
     machine does: one of them works, the others read what it shows. When it ends, another one goes on.
     """
 
-    SLEEP = 0.02  # seconds between two pieces of work
+    SLEEP = 0.02  # seconds between two readings of the clock
     SHARE = 5  # the work takes one part in so many of a processor, or less
+    LONGEST = 1.0  # seconds between two pieces of work
+    SLOWEST = 0.02  # what is measured of a short piece of work is no more certain than this
 
     def __init__(self):
         name = hashlib.sha256(binary().encode()).hexdigest()[:16]
@@ -93,6 +95,9 @@ class PacedClock:
         """Nanoseconds; what no clock has ever worked on shows 0."""
         return int.from_bytes(os.pread(self._face, 8, 0), "little")
 
+    def _show(self, seconds):
+        os.pwrite(self._face, (self._shown() + int(seconds * 1e9)).to_bytes(8, "little"), 0)
+
     def _may_work(self):
         if not self._works:
             with contextlib.suppress(BlockingIOError):
@@ -101,32 +106,33 @@ class PacedClock:
         return self._works
 
     def _go(self):
-        pause, pauses = threading.Event(), 1
+        pause, pauses, pace = threading.Event(), 1, None
         while True:
             # Shown in small steps: what is read twice never differs by more than the time between.
             for _ in range(pauses):
                 pause.wait(self.SLEEP)
-                if self._works:
-                    self._show(self.SLEEP)
+                if pace is not None:
+                    self._show(self.SLEEP * pace)
                 self._seconds = (self._shown() - self._began) / 1e9
             pauses = 1
             if self._may_work():
-                used = self._work()
-                pauses = max(1, round(used * (self.SHARE - 1) / self.SLEEP))
-
-    def _show(self, seconds):
-        os.pwrite(self._face, (self._shown() + int(seconds * 1e9)).to_bytes(8, "little"), 0)
+                used, taken = self._work()
+                now = min(1.0, max(self.SLOWEST, used / taken))
+                pace = now if pace is None else (pace + now) / 2
+                pauses = max(1, round(min(used * (self.SHARE - 1), self.LONGEST) / self.SLEEP))
 
     @staticmethod
     def _work():
-        """The known piece of work; returns the seconds of a processor that it took."""
+        """The known piece of work; the seconds of a processor that it used, and those that it took."""
         silent = [(os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0) for number in (0, 1, 2)]
         program, environment = binary(), sanitizer_options() | {"PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8"}
+        began = time.monotonic()
         pid = os.posix_spawn(program, [program, "--version"], environment, file_actions=silent)
         _, status, used = os.wait4(pid, 0)
+        taken = time.monotonic() - began
         if status != 0:
             raise AssertionError(f"spindle --version ended with {os.waitstatus_to_exitcode(status)}")
-        return used.ru_utime + used.ru_stime
+        return max(used.ru_utime + used.ru_stime, 0.0005), max(taken, 0.0005)
 
 
 _clock = None
