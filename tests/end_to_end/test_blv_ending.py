@@ -54,7 +54,7 @@ class EndingTest(MotorTest):
         """The motor was not started yet; the driver would stop with an alarm when no master asks any more."""
         for number, status in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
             with self.subTest(number), Bus() as bus:
-                with support.Running(*arguments_of_start(bus.url, "--watchdog", "1s", "--json")) as started:
+                with support.Running(*arguments_of_start(bus.url, "--watchdog", "9s", "--json")) as started:
                     support.wait_until(lambda: bus.written(TIMEOUT), "the watchdog is set")
                     started.send_signal(number)
                     finished = started.finish()
@@ -97,7 +97,7 @@ class EndingTest(MotorTest):
         names = ("operation.2.speed", "operation.2.deceleration-time", "communication.timeout")
         with Bus() as bus:
             before = self.values(bus.url, *names)
-            with self.running(bus, "--watchdog", "2s", "--json") as started:
+            with self.running(bus, "--watchdog", "9s", "--json") as started:
                 support.wait_until(bus.turns, "the motor turns")
                 started.send_signal(signal.SIGINT)
                 finished = started.finish()
@@ -112,7 +112,7 @@ class EndingTest(MotorTest):
             self.assertEqual(run("do", child, "group=1").status, 0)
             before = self.values(child, "operation.2.speed", "operation.2.deceleration-time", "command.driver-input")
             heard = len(bus.requests())
-            finished = start(bus.url, "--for", "300ms", "--watchdog", "2s")
+            finished = start(bus.url, "--for", "300ms", "--watchdog", "9s")
             self.assertEqual(finished.status, 0, finished)
             functions = {request[1] for request in bus.requests()[heard:]}
             self.assertNotIn(WRITE_MULTIPLE, functions)  # the only function that reaches a group
