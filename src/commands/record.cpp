@@ -69,9 +69,9 @@ Result<Outcome> record(const RecordOptions& options, Context& context) {
   const auto plan = [&](const catalogue::Profile& profile) {
     return plan_watch(options.watch, profile);
   };
-  Roster roster([&](WatchedTool& tool, Assignment& assignment) {
+  Roster roster([&](WatchedTool& tool, Task& task) {
     RecordedTool& recorded = recorder.recorded(tool.target());
-    recorded.begin(assignment);
+    recorded.begin(task);
     const OwnedLines::Stay stay(lines, tool.target().endpoint);
     watch_tool(tool, open_transport, plan, device::Reconnection::whatever, recorded, context);
   });

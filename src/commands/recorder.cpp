@@ -131,8 +131,8 @@ RecordedTool::RecordedTool(const Target& target, Recorder& recorder)
   voice_.records.emplace(target_, unknown_, catalogue::CodeTables());
 }
 
-void RecordedTool::begin(Assignment& assignment) {
-  assignment_ = &assignment;
+void RecordedTool::begin(Task& task) {
+  task_ = &task;
   recorder_->counters().begin(entry_.shown);
   is_informed_ = false;
   is_up_ = false;
@@ -172,7 +172,7 @@ void RecordedTool::left(const Result<void>& watched, const std::optional<Error>&
   recorder_->release(target_.shown);
   recorder_->counters().note_link(entry_.shown, false);
   if (is_leaving()) recorder_->counters().leave(entry_.shown);
-  assignment_->note_tried();
+  task_->note_tried();
   const std::lock_guard lock(voice_mutex_);
   // A signal is how a recorder is usually ended.
   const bool as_asked = is_leaving() || recorder_->context().interrupt.signalled();
@@ -227,7 +227,7 @@ void RecordedTool::record(const device::LinkChange& news) {
   flush_gap();
   flush_link();
   note_link(news);
-  assignment_->note_tried();
+  task_->note_tried();
   if (news.state == device::LinkState::lost) recorder_->release(target_.shown);
   link_ = news;
   // What the tool is is known right behind a connection.

@@ -86,9 +86,9 @@ class RecordedTool final : public Listener {
   RecordedTool(const Target& target, Recorder& recorder);
 
   /// Its next watch begins, as it is assigned, for as long as the watch lasts.
-  void begin(Assignment& assignment);
+  void begin(Task& task);
   [[nodiscard]] const Target& entry() const { return entry_; }
-  [[nodiscard]] bool is_leaving() const { return assignment_->is_leaving(); }
+  [[nodiscard]] bool is_leaving() const { return task_->is_leaving(); }
 
   TimePoint until() override;
   void opened(const WatchedTool& tool) override;
@@ -131,7 +131,7 @@ class RecordedTool final : public Listener {
   const Target entry_;
   Target target_;
   Recorder* recorder_;
-  Assignment* assignment_ = nullptr;
+  Task* task_ = nullptr;
   bool is_informed_ = false;     ///< this watch was told what the tool told last
   std::mutex voice_mutex_ = {};  ///< the journal's thread tells the stream, too
   Voice voice_ = {};

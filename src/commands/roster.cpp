@@ -47,7 +47,7 @@ Roster::Change Roster::want(std::vector<WatchedTool> tools) {
   change.begun = wanted_.size() - change.kept - change.changed;
   // What ended by itself may go now that what was wrong was mended.
   for (const auto& seat : seats_) {
-    if (seat->is_done) seat->assignment.leaving_.store(true);
+    if (seat->is_done) seat->task.leaving_.store(true);
   }
   follow();
   return change;
@@ -69,9 +69,9 @@ Roster::Standing Roster::standing() {
     if (!may_watch(tool.target().shown)) ++standing.paused;
   }
   for (const auto& seat : seats_) {
-    if (seat->is_done || seat->assignment.is_leaving()) continue;
+    if (seat->is_done || seat->task.is_leaving()) continue;
     ++standing.watched;
-    if (!seat->assignment.tried_.load()) ++standing.untried;
+    if (!seat->task.tried_.load()) ++standing.untried;
   }
   return standing;
 }
@@ -88,7 +88,7 @@ void Roster::join() {
     return std::all_of(seats_.begin(), seats_.end(),
                        [](const auto& seat) { return seat->is_done; });
   });
-  for (const auto& seat : seats_) seat->assignment.leaving_.store(true);
+  for (const auto& seat : seats_) seat->task.leaving_.store(true);
   sweep();
 }
 
@@ -99,7 +99,7 @@ bool Roster::may_watch(const std::string& name) const {
 /// The one that has not to leave.
 Roster::Seat* Roster::seat_of(const std::string& name) const {
   const auto found = std::find_if(seats_.begin(), seats_.end(), [&](const auto& seat) {
-    return seat->entry.shown == name && !seat->assignment.is_leaving();
+    return seat->entry.shown == name && !seat->task.is_leaving();
   });
   return found == seats_.end() ? nullptr : found->get();
 }
@@ -107,7 +107,7 @@ Roster::Seat* Roster::seat_of(const std::string& name) const {
 bool Roster::leave(const std::string& name) {
   Seat* const seat = seat_of(name);
   if (seat == nullptr) return false;
-  seat->assignment.leaving_.store(true);
+  seat->task.leaving_.store(true);
   changed_.notify_all();
   return true;
 }
@@ -128,10 +128,10 @@ void Roster::begin(const WatchedTool& tool) {
 
 void Roster::run(Seat& seat) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return seat.assignment.is_leaving() || !has_to_wait(seat); });
-  if (!seat.assignment.is_leaving()) {
+  changed_.wait(lock, [&] { return seat.task.is_leaving() || !has_to_wait(seat); });
+  if (!seat.task.is_leaving()) {
     lock.unlock();
-    watch_(seat.tool, seat.assignment);
+    watch_(seat.tool, seat.task);
     lock.lock();
   }
   seat.is_done = true;
@@ -142,7 +142,7 @@ void Roster::run(Seat& seat) {
 bool Roster::has_to_wait(const Seat& seat) const {
   for (const auto& other : seats_) {
     if (other.get() == &seat) return false;
-    const bool leaves = other->assignment.is_leaving() && !other->is_done;
+    const bool leaves = other->task.is_leaving() && !other->is_done;
     if (leaves && conflict(other->entry, seat.entry)) return true;
   }
   return false;
@@ -151,7 +151,7 @@ bool Roster::has_to_wait(const Seat& seat) const {
 /// Takes away those that have left.
 void Roster::sweep() {
   const auto gone = std::stable_partition(seats_.begin(), seats_.end(), [](const auto& seat) {
-    return !(seat->is_done && seat->assignment.is_leaving());
+    return !(seat->is_done && seat->task.is_leaving());
   });
   // Their threads say nothing behind that they are done.
   std::for_each(gone, seats_.end(), [](const auto& seat) { seat->thread.join(); });

@@ -17,7 +17,7 @@
 namespace spindle::commands {
 
 /// What one tool's thread and the roster tell each other.
-class Assignment {
+class Task {
  public:
   /// The tool is not to be watched any more: its watch has to end soon, and leave it disarmed.
   [[nodiscard]] bool is_leaving() const { return leaving_.load(); }
@@ -37,7 +37,7 @@ class Assignment {
 class Roster {
  public:
   /// Watches a tool until it ends by itself, or is asked to leave. Called in the tool's thread.
-  using Watch = std::function<void(WatchedTool& tool, Assignment& assignment)>;
+  using Watch = std::function<void(WatchedTool& tool, Task& task)>;
 
   struct Change {
     std::size_t begun = 0;
@@ -80,7 +80,7 @@ class Roster {
 
     Target entry;  ///< as it is wanted; what the tool is may be found out later
     WatchedTool tool;
-    Assignment assignment = {};
+    Task task = {};
     bool is_done = false;
     std::thread thread = {};
   };

@@ -13,8 +13,8 @@
 
 using namespace spindle;
 using namespace std::chrono_literals;
-using commands::Assignment;
 using commands::RecordedTool;
+using commands::Task;
 using device::LinkChange;
 using device::LinkState;
 
@@ -24,10 +24,10 @@ namespace {
 struct Bench {
   Bench() : writer(store::Writer::open(folder.path() + "/events.db").value()) {}
 
-  RecordedTool& tool(const std::string& name, Assignment& assignment) {
+  RecordedTool& tool(const std::string& name, Task& task) {
     RecordedTool& recorded = recorder.recorded(
         {.shown = name, .endpoint = link::parse_endpoint("tcp://" + name).value()});
-    recorded.begin(assignment);
+    recorded.begin(task);
     return recorded;
   }
   /// What people were told meanwhile.
@@ -86,8 +86,8 @@ using Notes = std::vector<std::string>;
 
 TEST_CASE("recorder: a link is told when it changes, once a minute at most, and in the end") {
   Bench bench;
-  Assignment assignment;
-  RecordedTool& tool = bench.tool("station1", assignment);
+  Task task;
+  RecordedTool& tool = bench.tool("station1", task);
   tool.tell(LinkChange{LinkState::connected, 0, "connected: 1"});
   CHECK(bench.take_notes() == Notes{"station1: connected: 1"});
   for (int times = 0; times < 5; ++times) {
@@ -107,10 +107,10 @@ TEST_CASE("recorder: a link is told when it changes, once a minute at most, and 
 
 TEST_CASE("recorder: five hundred links that flap are five hundred lines a minute at most") {
   Bench bench;
-  Assignment assignment;
+  Task task;
   std::vector<RecordedTool*> tools;
   for (int number = 0; number < 500; ++number) {
-    tools.push_back(&bench.tool("station" + std::to_string(number), assignment));
+    tools.push_back(&bench.tool("station" + std::to_string(number), task));
   }
   std::size_t lines = 0;
   for (int second = 0; second < 180; ++second) {
@@ -125,8 +125,8 @@ TEST_CASE("recorder: five hundred links that flap are five hundred lines a minut
 
 TEST_CASE("recorder: a tool is tried when something is known of its link") {
   Bench bench;
-  Assignment assignment;
-  RecordedTool& tool = bench.tool("station1", assignment);
+  Task task;
+  RecordedTool& tool = bench.tool("station1", task);
   CHECK(bench.recorder.counters().connected() == 0);
   CHECK(bench.recorder.counters().metrics().links.count("station1") == 1);
   tool.tell(LinkChange{LinkState::connecting, 1, "refused"});

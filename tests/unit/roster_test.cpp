@@ -14,8 +14,8 @@
 
 using namespace spindle;
 using namespace std::chrono_literals;
-using commands::Assignment;
 using commands::Roster;
+using commands::Task;
 using commands::WatchedTool;
 
 namespace {
@@ -94,15 +94,15 @@ class Bench {
   }
 
  private:
-  void watch(WatchedTool& tool, Assignment& assignment) {
+  void watch(WatchedTool& tool, Task& task) {
     const std::string name = tool.target().shown;
     std::unique_lock lock(mutex_);
     log_.push_back("+" + name + " " + tool.target().endpoint.text);
     ++watched_[name];
-    assignment.note_tried();
+    task.note_tried();
     changed_.notify_all();
     const auto is_over = [&] {
-      return (assignment.is_leaving() && !held_[name]) || std::exchange(ended_[name], false);
+      return (task.is_leaving() && !held_[name]) || std::exchange(ended_[name], false);
     };
     while (!changed_.wait_for(lock, 1ms, is_over)) {
     }
@@ -120,7 +120,7 @@ class Bench {
   std::map<std::string, int> watched_ = {};
 
  public:
-  Roster roster = Roster([this](auto& tool, auto& assignment) { watch(tool, assignment); });
+  Roster roster = Roster([this](auto& tool, auto& task) { watch(tool, task); });
 };
 
 using Log = std::vector<std::string>;
