@@ -694,8 +694,11 @@ void Session::tell_retry(const modbus::Pdu& request) const {
 }
 
 Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
+  const TimePoint began = clock_->now();
   auto answer = send(outstanding.request, outstanding.bytes).and_then([&] {
-    outstanding.sent = clock_->now();
+    // On a near network the answer may be there before the call that sends has returned; a line has
+    // to take all bytes of a request before a unit can answer it.
+    outstanding.sent = is_rtu() ? clock_->now() : began;
     outstanding.deadline = std::max(outstanding.sent, last_activity_) + options_.answer_timeout;
     return await(outstanding);
   });
