@@ -140,7 +140,7 @@ void add_common_options(CLI::App& app, ParseState& draft) {
   work::CommonOptions& common = invocation.common;
   commands::UserOptions& user = invocation.user;
   bind.option("-o,--output", "FORMAT", invocation.format, one_of(format_words),
-              "table, json (JSON Lines) or csv; results --curve also has svg");
+              "table, json (JSON Lines) or csv");
   bind.flag(
       "--json", [] {}, "the same as -o json");  // see with_one_output_option()
   bind.option("--profile", "NAME|FILE", common.profile, "what the tool's registers mean");
@@ -274,8 +274,6 @@ void add_get(CLI::App& app, ParseState& draft) {
                 bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "show what the profile marks as secret");
                 bind_jobs(bind, options.jobs);
               });
 }
@@ -978,9 +976,6 @@ void bind_simulated_work(Binder& bind, sim::DeviceOptions& bm) {
       bind.option("--burst", "N", bm.burst, NumberFrom{0, 10'000},
                   "results that each of the operator's screws brings, all at once (default 1)")
           ->group(of_screwdrivers);
-  bind.option("--event-number", "N", bm.event_number, NumberFrom{0, 0xFFFF},
-              "number of the last event, which the next one counts on from")
-      ->group(of_screwdrivers);
   bind.check([every, burst, &bm]() -> std::optional<Error> {
     const bool work_is_described = every->count() > 0 || burst->count() > 0;
     if (work_is_described && !bm.rundown_every) {
@@ -1126,10 +1121,6 @@ std::optional<Error> check_results(const commands::ResultsOptions& options) {
       return unknown_choice("--kind", kind, known);
     }
   }
-  if (!options.curve.empty() &&
-      (!options.qdas.empty() || options.following == commands::Following::yes)) {
-    return usage("--curve shows one result that is stored", "leave --qdas and --follow out");
-  }
   if (options.qdas.empty()) return std::nullopt;
   if (options.following == commands::Following::yes) {
     return usage("--qdas and --follow exclude each other", "leave one of them out");
@@ -1159,8 +1150,6 @@ void bind_results(Binder& bind, commands::ResultsOptions& options) {
   bind.flag("-f,--follow", options.following, commands::Following::yes,
             "go on with what is stored from now on");
   bind.option("--qdas", "FOLDER", options.qdas, "write files for Q-DAS (.dfq) into this folder");
-  bind.option("--curve", "KEY", options.curve,
-              "the curves of one result, SERIAL/EPOCH/NUMBER; with -o svg drawn");
   bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
   bind.option("--store", "FILE", options.store, store_words);
   bind.check([&options] { return check_results(options); });
@@ -1173,8 +1162,7 @@ void add_results(CLI::App& app, ParseState& draft) {
                            "spindle results station3 --since '2026-11-30 14:00' --ng\n"
                            "spindle results @line1 --since 30d -o csv\n"
                            "spindle results --follow --json\n"
-                           "spindle results station3 --qdas quality\n"
-                           "spindle results --curve 2401190042/0/1962 -o svg > curve.svg",
+                           "spindle results station3 --qdas quality",
                            results_words};
   add_command(app, draft, words, draft.options.results, commands::results, bind_results);
 }
@@ -1439,10 +1427,6 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   if (!draft.only_as_text.empty() && invocation.format != report::Format::table) {
     return tl::unexpected(
         usage(draft.only_as_text, "leave out --json and --output, or name a file"));
-  }
-  if (invocation.format == report::Format::svg && draft.options.results.curve.empty()) {
-    return tl::unexpected(usage("only 'spindle results --curve' draws",
-                                "choose another --output: table, json or csv"));
   }
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));

@@ -3,7 +3,6 @@
 #include <map>
 #include <vector>
 
-#include "bystanders.hpp"
 #include "change_log.hpp"
 #include "set_records.hpp"
 #include "spindle/commands/commands.hpp"
@@ -27,8 +26,7 @@ class SetWriter {
         context_(&context),
         listing_(context, set_columns()),
         log_(change_log("set", tool, context)),
-        changer_(tool.device, log_),
-        bystanders_(tool, context) {}
+        changer_(tool.device, log_) {}
   SetWriter(const SetWriter&) = delete;
   SetWriter& operator=(const SetWriter&) = delete;
 
@@ -46,8 +44,6 @@ class SetWriter {
   work::Step write_one(const SetStep& step);
   /// Of a write that did not succeed.
   void give_up(const SetStep& step);
-  Result<void> look_before(const std::vector<SetStep>& steps);
-  void look_behind();
   Result<SetResult> end(Summary summary);
 
   OpenTool* tool_;
@@ -58,8 +54,6 @@ class SetWriter {
   work::Changer changer_;
   std::map<const SetStep*, device::Written> refused_ = {};
   SetResult result_ = {};
-  Bystanders bystanders_;
-  const SetStep* guarded_ = nullptr;  ///< the one step that is written alone; null: none is
 };
 
 }  // namespace spindle::commands

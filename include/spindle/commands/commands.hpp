@@ -36,7 +36,6 @@ struct GetOptions {
   std::string target;  ///< or a group
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
-  Secrets secrets = Secrets::leave_out;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> get(const GetOptions& options, Context& context);
@@ -240,8 +239,7 @@ struct ResultsOptions {
   Told told = Told::results;
   Following following = Following::no;
   std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
-  std::string qdas = {};   ///< folder for files in the format of Q-DAS; empty: none
-  std::string curve = {};  ///< SERIAL/EPOCH/NUMBER of the result whose curve is wanted; empty: none
+  std::string qdas = {};  ///< folder for files in the format of Q-DAS; empty: none
   Overwrite overwrite = Overwrite::refuse;
 };
 /// What was stored.
