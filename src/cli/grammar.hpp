@@ -21,8 +21,7 @@ inline constexpr auto color_words = enum_table<ColorChoice>({{"auto", ColorChoic
                                                              {"never", ColorChoice::never}});
 inline constexpr auto format_words = enum_table<report::Format>({{"table", report::Format::table},
                                                                  {"json", report::Format::json},
-                                                                 {"csv", report::Format::csv},
-                                                                 {"svg", report::Format::svg}});
+                                                                 {"csv", report::Format::csv}});
 
 /// What --rules, --include and --study of report take.
 inline constexpr auto rule_set_words =

@@ -56,21 +56,19 @@ ReportZone zone_of(const Assessed& assessed, const Clock& clock) {
 }
 
 Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
-                        const ReportOptions& options, store::Reader& reader, Context& context) {
-  TRY_LET(const auto curves, load_curves(assessed, reader));
+                        const ReportOptions& options, Context& context) {
   const std::string page = report_page(assessed, {.zone = zone,
                                                   .made = context.clock.wall(),
                                                   .version = std::string(context.version),
-                                                  .options = options,
-                                                  .curves = curves});
+                                                  .options = options});
   if (options.file == standard_output) return context.io.out(page);
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
 Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
-                         const ReportOptions& options, store::Reader& reader, Context& context) {
+                         const ReportOptions& options, Context& context) {
   if (!options.file.empty()) {
-    auto written = write_page(assessed, zone, options, reader, context);
+    auto written = write_page(assessed, zone, options, context);
     if (!written) return written;
   }
   if (context.user.format == report::Format::table) {
@@ -151,7 +149,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   Outcome outcome;
   outcome.succeed();
   if (!assessed.unmet.empty()) outcome.negate();
-  return tell_report(assessed, zone, options, **reader, context)
+  return tell_report(assessed, zone, options, context)
       .and_then([&] { return tell(summary_of(assessed, options), outcome, context); })
       .map([&] { return outcome; });
 }

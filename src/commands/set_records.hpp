@@ -23,8 +23,7 @@ enum class Ending : std::uint8_t {
   refused,
   unknown,
   rolled_back,
-  sent,
-  changed_along  ///< it was not written: the tool changed it when another one was
+  sent
 };
 
 inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::planned},
@@ -35,8 +34,7 @@ inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::pla
                                                          {"refused", Ending::refused},
                                                          {"unknown", Ending::unknown},
                                                          {"rolled-back", Ending::rolled_back},
-                                                         {"sent", Ending::sent},
-                                                         {"changed-along", Ending::changed_along}});
+                                                         {"sent", Ending::sent}});
 Ending ending_of(device::WriteResult result);
 
 std::span<const report::Column> set_plan_columns();
@@ -69,10 +67,6 @@ Summary set_summary(const SetCounts& counts, const std::string& target);
 
 /// What a change may cost, before it is made.
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context);
-
-/// "write control.torque-unit, which may change what other values mean": what of these is guarded
-/// and would change; empty where nothing is.
-std::string guarded_in_words(const std::vector<SetStep>& steps);
 
 /// When what was written acts, where that is not at once.
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);
