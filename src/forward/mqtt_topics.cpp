@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdint>
-
+#include "spindle/base/hash.hpp"
 #include "spindle/base/utf8.hpp"
 
 namespace spindle::forward {
@@ -11,16 +10,6 @@ namespace {
 
 constexpr std::size_t longest_level = 200;
 constexpr std::size_t kept_of_long = 160;
-
-/// FNV-1a, 64 bit.
-std::uint64_t hash_of(std::string_view text) {
-  std::uint64_t hash = 0xCBF29CE484222325ULL;
-  for (const char c : text) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= 0x100000001B3ULL;
-  }
-  return hash;
-}
 
 bool is_plain(const CodePoint& point, bool is_first) {
   if (!point.well_formed) return false;
