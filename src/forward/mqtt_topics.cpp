@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "spindle/base/hash.hpp"
+#include "spindle/base/percent.hpp"
 #include "spindle/base/utf8.hpp"
 
 namespace spindle::forward {
@@ -34,7 +35,7 @@ std::string level_of(std::string_view name) {
     if (is_plain(point, rest.size() == name.size())) {
       level += bytes;
     } else {
-      for (const char c : bytes) level += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+      for (const char c : bytes) level += percent_encoded(c);
     }
     rest.remove_prefix(point.length);
   }
