@@ -116,8 +116,6 @@ class CounterSource : public EventSource {
   EventTracker tracker_ = {};
   /// How long the tool was not listened to behind the last event that was recalled.
   std::optional<Duration> unseen_ = std::nullopt;
-  /// When the counter was last known here: a connection may be lost before it served.
-  TimePoint counted_at_ = {};
   bool tells_first_ = false;
   std::optional<std::uint16_t> first_ = std::nullopt;  ///< number of the event to tell as such
 };
@@ -134,12 +132,10 @@ void CounterSource::recall(std::optional<LastEvent> last) {
 Result<void> CounterSource::attach(Device& device, Duration unseen) {
   device_ = &device;
   if (tracker_.last()) {
-    tracker_.look_again(std::exchange(unseen_, std::nullopt)
-                            .value_or(std::min(unseen, Duration(clock_->now() - counted_at_))));
+    tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
   } else {
     TRY_LET(const auto number, device.event_number());
     tracker_.set_baseline(number);
-    counted_at_ = clock_->now();
     if (tells_first_) first_ = number;
     take_waiting();  // pushed before the counter was read, so they are old
   }
@@ -160,7 +156,6 @@ Result<void> CounterSource::poll() {
                  .before = static_cast<std::uint16_t>(number + 1),
                  .sequence = wrapped ? Sequence::wrap : Sequence::jump});
   tracker_.set_baseline(number);
-  counted_at_ = clock_->now();
   return {};
 }
 
@@ -200,7 +195,6 @@ void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime t
   const std::uint16_t number = layout_.number_of(block);
   const std::optional<std::uint16_t> last = tracker_.last();
   const Tracked tracked = tracker_.track(number, block);
-  counted_at_ = clock_->now();
   const bool is_first = std::exchange(first_, std::nullopt) == number &&
                         tracked.novelty == Sequence::repeat && !EventTracker::is_blank(block);
   if (is_first) {
