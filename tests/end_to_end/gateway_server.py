@@ -43,7 +43,7 @@ class Gateway(support.Port):
 
     def drop(self):
         """Ends the connections there are."""
-        for connection in self._connections:
+        for connection in list(self._connections):  # the next one may come meanwhile
             with contextlib.suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
 

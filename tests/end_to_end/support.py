@@ -256,7 +256,8 @@ class SerialEnd:
 
 
 class Home:
-    """An empty home folder, so that no tools file or profile of the machine plays a part."""
+    """An empty home folder, so that no tools file or profile of the machine plays a part, and no spindle of another
+    test: the number of a pseudo terminal is given again at once, and one that had the line may not have ended yet."""
 
     def __init__(self):
         self.path = pathlib.Path(tempfile.mkdtemp(prefix="spindle-end-to-end-"))
@@ -264,6 +265,7 @@ class Home:
     def environment(self, **extra):
         own = {
             "HOME": str(self.path),
+            "XDG_RUNTIME_DIR": str(self.path),
             "PATH": "/usr/bin:/bin",
             "LC_ALL": "C.UTF-8",
             "SPINDLE_PROFILE_PATH": str(ROOT / "profiles"),

@@ -194,7 +194,7 @@ class SharingTest(GatewayTest):
             watching.send_signal(signal.SIGINT)
             watching.finish()
         for name in NAMES:
-            self.assertEqual(links(records, name).count("lost"), 1, name)
+            self.assertEqual(links(records, name).count("lost"), 1, [r for r in records if r["type"] == "link"])
             self.assertEqual(links(records, name)[-1], "connected")
         self.assertEqual(gateway.met, 2)
 
