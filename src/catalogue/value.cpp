@@ -642,6 +642,10 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   return value;
 }
 
+std::string shown_of(const Parameter& parameter, const Value& value) {
+  return parameter.secrecy == Secrecy::secret ? "(secret)" : value.to_string();
+}
+
 Result<Value> parse_exact_value(const Parameter& parameter, std::string_view text) {
   auto value = parse_value(parameter, text);
   if (!value) return value;

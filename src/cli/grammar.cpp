@@ -91,6 +91,8 @@ struct AllOptions {
   commands::SimulateOptions simulate;
   bool check_tools = false;
   commands::ResultsOptions results;
+  commands::LogOptions log;
+  commands::UndoOptions undo;
   commands::StoreOptions store;
   commands::StoreOptions store_check;
   commands::TrimOptions store_trim;
@@ -103,6 +105,8 @@ struct AllOptions {
   commands::ProfileNameOptions profile_show;
   commands::ProfileNameOptions profile_check;
   commands::ProfileNewOptions profile_new;
+  std::vector<std::string> helped;  ///< words of the command that help is wanted of
+  std::vector<std::string> none;
 };
 
 /// The grammar while it is being parsed: the innermost command that was named.
@@ -124,6 +128,8 @@ struct ParseState {
 };
 
 constexpr std::string_view end_of_options = "--";
+constexpr std::string_view help_command = "help";
+constexpr std::string_view version_command = "version";
 
 /// Of options that only some profiles declare: CLI11's groups say which.
 constexpr std::string_view declared_prefix = "of ";
@@ -140,7 +146,7 @@ void add_common_options(CLI::App& app, ParseState& draft) {
   work::CommonOptions& common = invocation.common;
   commands::UserOptions& user = invocation.user;
   bind.option("-o,--output", "FORMAT", invocation.format, one_of(format_words),
-              "table, json (JSON Lines) or csv");
+              "table, json (JSON Lines) or csv; results --curve also has svg");
   bind.flag(
       "--json", [] {}, "the same as -o json");  // see with_one_output_option()
   bind.option("--profile", "NAME|FILE", common.profile, "what the tool's registers mean");
@@ -274,6 +280,8 @@ void add_get(CLI::App& app, ParseState& draft) {
                 bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
+                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                          "show what the profile marks as secret");
                 bind_jobs(bind, options.jobs);
               });
 }
@@ -297,7 +305,7 @@ void add_set(CLI::App& app, ParseState& draft) {
                 bind.required("TARGET", options.target, target_words);
                 bind.required("NAME=VALUE", options.assignments,
                               "what to write; a number may have its unit behind it: 1.5kW");
-                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
                           "check and show everything, write nothing");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);
                 bind.flag("--raw", options.raw, commands::RawWrites::ask,
@@ -466,7 +474,7 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
     }
   };
   bind.flag("--initial", add_first, "also the first value of everything polled");
-  bind.option("--count", "N", options.count, NumberFrom{1, 1'000'000'000},
+  bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000},
               "end after so many events, changes and samples");
   bind.option("--duration", "DURATION", options.duration, to_duration, "end after this time");
   bind.option("--idle-timeout", "DURATION", options.idle_timeout, to_duration,
@@ -533,7 +541,7 @@ void bind_record(Binder& bind, commands::RecordOptions& options) {
   });
   bind.option("--interval", "DURATION", options.watch.interval, to_duration,
               "time between two polls (default 200ms)");
-  bind.option("--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
+  bind.option("-c,--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
               "end after so many events and changes are stored");
   bind.option("--duration", "DURATION", options.watch.duration, to_duration, "end after this time");
   bind_gateway(bind, options.watch.gateway.listen, options.watch.gateway.rights,
@@ -578,7 +586,7 @@ void bind_forward(Binder& bind, commands::ForwardOptions& options) {
   bind.option("--from", "ID|TIME", options.from, "set the sink back, or ahead, to here first");
   bind.flag("--once", options.delivery, commands::Delivery::once,
             "end when the sink has all that is in the store now");
-  bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+  bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
             "show what would be sent; send nothing");
   bind.option("--window", "N", options.window, NumberFrom{1, 10'000},
               "send at most so many that are not acknowledged (default 100; MQTT)");
@@ -911,7 +919,7 @@ void add_restore(CLI::App& app, ParseState& draft) {
                 bind.option("--dir", "FOLDER", options.folder,
                             "restore each tool from its own backup in this folder, as backup "
                             "--dir writes it");
-                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
                           "show the plan, write nothing");
                 bind.flag("--force", options.model, commands::ModelCheck::off,
                           "also to a tool of another model");
@@ -976,6 +984,9 @@ void bind_simulated_work(Binder& bind, sim::DeviceOptions& bm) {
       bind.option("--burst", "N", bm.burst, NumberFrom{0, 10'000},
                   "results that each of the operator's screws brings, all at once (default 1)")
           ->group(of_screwdrivers);
+  bind.option("--event-number", "N", bm.event_number, NumberFrom{0, 0xFFFF},
+              "number of the last event, which the next one counts on from")
+      ->group(of_screwdrivers);
   bind.check([every, burst, &bm]() -> std::optional<Error> {
     const bool work_is_described = every->count() > 0 || burst->count() > 0;
     if (work_is_described && !bm.rundown_every) {
@@ -1121,6 +1132,10 @@ std::optional<Error> check_results(const commands::ResultsOptions& options) {
       return unknown_choice("--kind", kind, known);
     }
   }
+  if (!options.curve.empty() &&
+      (!options.qdas.empty() || options.following == commands::Following::yes)) {
+    return usage("--curve shows one result that is stored", "leave --qdas and --follow out");
+  }
   if (options.qdas.empty()) return std::nullopt;
   if (options.following == commands::Following::yes) {
     return usage("--qdas and --follow exclude each other", "leave one of them out");
@@ -1146,10 +1161,12 @@ void bind_results(Binder& bind, commands::ResultsOptions& options) {
   bind.flag("--gaps", options.told, commands::Told::gaps, "what was missed, and nothing else");
   bind.flag("--all", options.told, commands::Told::all,
             "also links, changes, totals, and what the recorder did");
-  bind.option("-n,--count", "N", options.count, NumberFrom{1, 1'000'000'000}, "the newest so many");
+  bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000}, "the newest so many");
   bind.flag("-f,--follow", options.following, commands::Following::yes,
             "go on with what is stored from now on");
   bind.option("--qdas", "FOLDER", options.qdas, "write files for Q-DAS (.dfq) into this folder");
+  bind.option("--curve", "KEY", options.curve,
+              "the curves of one result, SERIAL/EPOCH/NUMBER; with -o svg drawn");
   bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
   bind.option("--store", "FILE", options.store, store_words);
   bind.check([&options] { return check_results(options); });
@@ -1162,7 +1179,8 @@ void add_results(CLI::App& app, ParseState& draft) {
                            "spindle results station3 --since '2026-11-30 14:00' --ng\n"
                            "spindle results @line1 --since 30d -o csv\n"
                            "spindle results --follow --json\n"
-                           "spindle results station3 --qdas quality",
+                           "spindle results station3 --qdas quality\n"
+                           "spindle results --curve 2401190042/0/1962 -o svg > curve.svg",
                            results_words};
   add_command(app, draft, words, draft.options.results, commands::results, bind_results);
 }
@@ -1241,6 +1259,63 @@ void add_store(CLI::App& app, ParseState& draft) {
               [&draft](Binder& bind, Options&) { add_store_commands(bind.command(), draft); });
 }
 
+void add_log(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"log", "[TARGET...] [NAME|PATTERN...]",
+                           "what was changed on which tool, when, and how it ended",
+                           "spindle log\n"
+                           "spindle log station3 --since 7d\n"
+                           "spindle log '*.target-torque' --json"};
+  add_command(app, draft, words, draft.options.log, commands::log,
+              [](Binder& bind, commands::LogOptions& options) {
+                bind.argument("TARGET", options.arguments,
+                              "tools, groups, serial numbers, names or patterns of parameters");
+                bind.option("--since", "TIME", options.since, "from this time on");
+                bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000},
+                            "the newest so many");
+              });
+}
+
+void add_undo(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"undo", "[ID]",
+                           "take back what a command changed, if the tool still holds it",
+                           "spindle undo\n"
+                           "spindle undo 3f2a91c0 --dry-run"};
+  add_command(app, draft, words, draft.options.undo, commands::undo,
+              [](Binder& bind, commands::UndoOptions& options) {
+                bind.argument("ID", options.id,
+                              "of a change or a command, from 'spindle log' (default: the last)");
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          "check and show everything, write nothing");
+              });
+}
+
+/// These two are the options of the same names, as people type them; invocation_of() sees to it.
+void add_help(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {help_command,
+                           "[COMMAND]",
+                           "what there is, or how one command is used",
+                           "spindle help\nspindle help set\nspindle help store trim",
+                           nullptr,
+                           Invocation::ToolsFile::only_found};
+  const auto none = [](const auto&, Context&) -> Result<Outcome> { return Outcome(); };
+  add_command(app, draft, words, draft.options.helped, none,
+              [](Binder& bind, std::vector<std::string>& command) {
+                bind.argument("COMMAND", command, "the command, and one below it");
+              });
+}
+
+void add_version(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {version_command,
+                           "",
+                           "the version of the program and of its library",
+                           "spindle version\nspindle version --json",
+                           nullptr,
+                           Invocation::ToolsFile::only_found};
+  const auto none = [](const auto&, Context&) -> Result<Outcome> { return Outcome(); };
+  add_command(app, draft, words, draft.options.none, none,
+              [](Binder&, std::vector<std::string>&) {});
+}
+
 void build(CLI::App& app, ParseState& draft) {
   app.set_help_flag();
   app.allow_extras();
@@ -1250,7 +1325,8 @@ void build(CLI::App& app, ParseState& draft) {
        {add_identify,     add_list,        add_get,    add_set,      add_do,      add_watch,
         add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
         add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
-        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools}) {
+        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools,
+        add_log,          add_undo,        add_help,   add_version}) {
     add(app, draft);
   }
 }
@@ -1273,6 +1349,12 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
   return names;
 }
 
+Error unknown_command(const std::string& name, const std::vector<std::string>& known) {
+  std::string hint = suggestion(name, known);
+  if (hint.empty()) hint = "'spindle --help' lists all commands";
+  return usage(fmt::format("unknown command '{}'", name), std::move(hint));
+}
+
 Error unexpected_argument(const CLI::App& app, const ParseState& draft, const std::string& extra) {
   const std::string command = draft.chosen == nullptr ? "" : path_of(draft.chosen);
   if (extra.size() > 1 && extra.front() == '-') {
@@ -1284,10 +1366,7 @@ Error unexpected_argument(const CLI::App& app, const ParseState& draft, const st
     return usage(fmt::format("unknown option '{}'", name), hint);
   }
   if (draft.chosen == nullptr || !draft.chosen->get_subcommands({}).empty()) {
-    std::string hint =
-        suggestion(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
-    if (hint.empty()) hint = "'spindle --help' lists all commands";
-    return usage(fmt::format("unknown command '{}'", extra), hint);
+    return unknown_command(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
   }
   return usage(fmt::format("{}: '{}' is one argument too many", command, extra),
                fmt::format("'spindle {} --help' shows examples", command));
@@ -1353,11 +1432,20 @@ Description description_of(const CLI::App& app, const ParseState& draft) {
   return {.common = options_of(app), .commands = commands_of(app, draft)};
 }
 
-std::string help_of(const CLI::App& app, const ParseState& draft) {
+bool is_chosen(const ParseState& draft, std::string_view name) {
+  return draft.chosen != nullptr && path_of(draft.chosen) == name;
+}
+
+Result<std::string> help_of(const CLI::App& app, const ParseState& draft) {
   const Description description = description_of(app, draft);
-  if (draft.chosen == nullptr) return program_help(description);
-  const CommandDescription* command = find_command(description, path_of(draft.chosen));
-  return command_help(description, *command);
+  std::string name = draft.chosen == nullptr ? std::string() : path_of(draft.chosen);
+  if (is_chosen(draft, help_command) && !draft.help) {
+    name = fmt::format("{}", fmt::join(draft.options.helped, " "));
+  }
+  if (name.empty()) return program_help(description);
+  const CommandDescription* command = find_command(description, name);
+  if (command == nullptr) return tl::unexpected(unknown_command(name, command_names(app)));
+  return command_help(*command);
 }
 
 /// What nothing in the grammar takes.
@@ -1404,16 +1492,20 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   return !takes_words || (use == Invocation::ToolsFile::all_tools && !has_words);
 }
 
+Invocation telling(std::string text) {
+  Invocation help;
+  help.text = std::move(text);
+  return help;
+}
+
 Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   const auto extra = first_extra(app);
   // Where a command is misspelt, the program's help would hide it.
   const bool misspelt = extra && draft.chosen == nullptr;
   if (draft.help && !misspelt) {
-    Invocation help;
-    help.text = help_of(app, draft);
-    return help;
+    return help_of(app, draft).map(telling);
   }
-  const bool wants_version = draft.version && !misspelt;
+  const bool wants_version = (draft.version && !misspelt) || is_chosen(draft, version_command);
   if (extra && !wants_version) return tl::unexpected(unexpected_argument(app, draft, *extra));
   if (const auto empty = option_without_value(app)) {
     return tl::unexpected(empty_value(*empty));
@@ -1428,6 +1520,11 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
     return tl::unexpected(
         usage(draft.only_as_text, "leave out --json and --output, or name a file"));
   }
+  if (invocation.format == report::Format::svg && draft.options.results.curve.empty()) {
+    return tl::unexpected(usage("only 'spindle results --curve' draws",
+                                "choose another --output: table, json or csv"));
+  }
+  if (is_chosen(draft, help_command)) return help_of(app, draft).map(telling);
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
   }
@@ -1464,7 +1561,8 @@ Result<Invocation> parse_with(const std::vector<std::string>* named,
   } catch (const CLI::ParseError& error) {
     return tl::unexpected(parser_error(arguments, error));
   }
-  if (draft.help && named != nullptr) return tl::unexpected(usage("help needs all commands"));
+  const bool tells = draft.help || is_chosen(draft, help_command);
+  if (tells && named != nullptr) return tl::unexpected(usage("help needs all commands"));
   return invocation_of(app, draft);
 }
 
@@ -1479,6 +1577,7 @@ Description describe_grammar() {
 }
 
 Result<Invocation> parse(const std::vector<std::string>& arguments) {
+  if (arguments.empty()) return telling(program_help(describe_grammar()));
   // The commands that nothing names are a good part of a short run; a fault may have to know them.
   auto invocation = parse_with(&arguments, arguments);
   return invocation ? std::move(invocation) : parse_with(nullptr, arguments);

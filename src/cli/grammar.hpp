@@ -21,7 +21,8 @@ inline constexpr auto color_words = enum_table<ColorChoice>({{"auto", ColorChoic
                                                              {"never", ColorChoice::never}});
 inline constexpr auto format_words = enum_table<report::Format>({{"table", report::Format::table},
                                                                  {"json", report::Format::json},
-                                                                 {"csv", report::Format::csv}});
+                                                                 {"csv", report::Format::csv},
+                                                                 {"svg", report::Format::svg}});
 
 /// What --rules, --include and --study of report take.
 inline constexpr auto rule_set_words =

@@ -65,7 +65,7 @@ std::string program_help(const Description& description) {
       command_lines(description.commands), option_lines(description.common));
 }
 
-std::string command_help(const Description& description, const CommandDescription& command) {
+std::string command_help(const CommandDescription& command) {
   const std::string space = command.synopsis.empty() ? "" : " ";
   std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: spindle {}{}{}\n", command.meaning,
                                  indented(command.examples), command.name, space, command.synopsis);
@@ -75,8 +75,8 @@ std::string command_help(const Description& description, const CommandDescriptio
   if (!command.options.empty()) {
     text += fmt::format("\nArguments and options:\n{}", option_lines(command.options));
   }
-  if (command.appendix != nullptr) text += "\n" + command.appendix();
-  return text + fmt::format("\nOptions of every command:\n{}", option_lines(description.common));
+  const std::string more = command.appendix == nullptr ? "" : "more about it: 'man spindle'; ";
+  return text + fmt::format("\n{}options of every command: 'spindle --help'\n", more);
 }
 
 }  // namespace spindle::cli

@@ -80,7 +80,7 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
     case Invocation::ToolsFile::all_tools:
-      return files::load_tools(path, world.disk);
+      return files::usable_tools(path, world.disk);
     case Invocation::ToolsFile::salvaged:
       return files::salvage_tools(path, world.disk);
     case Invocation::ToolsFile::only_found:
@@ -138,7 +138,10 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                              .user = invocation.user,
                              .supervision = world.supervision},
                             {.renderer = renderer}};
-  context.supervision.load_tools = [&] { return find_tools(world, invocation); };
+  // A file that is read again while a command runs is taken whole, or not at all.
+  context.supervision.load_tools = [&] {
+    return find_tools(world, invocation).and_then(&files::without_faults);
+  };
   TRY(begin_capture(invocation.common.trace_file, world.disk));
   return invocation.run(context);
 }

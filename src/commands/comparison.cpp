@@ -46,6 +46,9 @@ std::string units_in_words(const Difference& difference) {
 report::Field side_field(std::string key, const std::optional<catalogue::Value>& value,
                          const Difference& difference) {
   if (!value) return {std::move(key), report::Cell(), "-"};
+  if (difference.parameter.secrecy == catalogue::Secrecy::secret) {
+    return {std::move(key), report::Cell(), shown_of(difference.parameter, *value)};
+  }
   const auto& [a, b] = std::tie(difference.a, difference.b);
   const bool looks_same =
       a && b && difference.units == catalogue::Units::same && a->to_string() == b->to_string();

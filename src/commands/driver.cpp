@@ -29,6 +29,15 @@ Targets reopening(Targets targets) {
   return targets;
 }
 
+void tell_caution(const OpenTool& tool, const Context& context) {
+  const auto& identity = tool.device.identity();
+  if (!identity || !tool.profile->identity) return;
+  const std::string caution = catalogue::caution_of(*tool.profile->identity, *identity);
+  if (caution.empty()) return;
+  context.renderer.note(fmt::format("warning: {}: firmware {}: {}", tool.target.shown,
+                                    identity->firmware.value_or(0), caution));
+}
+
 Result<void> begin_turn(const Target& target, const Context& context) {
   if (!context.interrupt.signalled()) return {};
   Error error = context.interrupt.error();

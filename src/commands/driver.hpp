@@ -35,6 +35,9 @@ std::string tools_in_words(const std::vector<std::string>& names, std::size_t of
 /// "; 1 of 3 tools failed"; empty where none did.
 std::string failed_in_words(std::size_t failed, std::size_t of);
 
+/// Before something is written: what the profile says of a tool with this firmware.
+void tell_caution(const OpenTool& tool, const Context& context);
+
 /// Whether such a failure says that the request is wrong rather than that the tool is not there.
 bool rejects_all(const Error& error);
 

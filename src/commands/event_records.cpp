@@ -8,6 +8,7 @@
 #include "motor_records.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/curve.hpp"
 #include "spindle/catalogue/value.hpp"
 
 namespace spindle::commands {
@@ -73,7 +74,7 @@ std::string missed_text(std::optional<std::uint32_t> missed) {
 
 NewsRecords::NewsRecords(const Target& target, const catalogue::Profile& profile,
                          catalogue::CodeTables tables)
-    : target_(&target), tables_(std::move(tables)) {
+    : target_(&target), profile_(&profile), tables_(std::move(tables)) {
   if (!profile.events) return;
   layout_.emplace(profile);
   for (const auto& field : layout_->fields()) {
@@ -111,19 +112,30 @@ Record NewsRecords::event(const device::ToolEvent& news, const Naming& naming) c
   record.fields.push_back({"kind", std::string(catalogue::to_text(kind))});
   record.fields.push_back({"source", std::string(origin_words.text(news.source))});
   std::string text;
-  for (const auto& [parameter, at, key] : layout_->fields()) {
+  for (const auto& field : layout_->fields()) {
+    if (!catalogue::EventLayout::has(field, news.block)) continue;
+    const auto& [parameter, at, key, form] = field;
     const auto words = catalogue::register_count(parameter->encoding);
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
-    if (!value) continue;
+    if (!value) {
+      if (parameter->encoding.kind == catalogue::Kind::date) text = "its clock says no date";
+      continue;
+    }
     record.fields.push_back({key, value_cell(*value), value->to_string()});
     if (key != error_key_) continue;
     std::string meaning = error_text(value->number.mantissa());
     if (value->number.mantissa() != 0) {
-      text = fmt::format("E{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ", meaning);
+      text = fmt::format("E{}{}{}{}{}", value->number.mantissa(), meaning.empty() ? "" : " ",
+                         meaning, text.empty() ? "" : "; ", text);
     }
     record.fields.push_back({key + "_text", text_or_null(std::move(meaning))});
   }
-  if (has_torque_) record.fields.push_back({"torque_unit", text_or_null(target_->torque_unit)});
+  if (has_torque_) {
+    const std::string own = torque_unit_of(news.block);
+    record.fields.push_back(
+        {"torque_unit", text_or_null(own.empty() ? target_->torque_unit : own)});
+  }
+  add_steps(record, news.block);
   record.fields.push_back({"raw", news.block});
   if (news.standing == device::Standing::result) {
     record.fields.push_back(result_of(kind));
@@ -134,6 +146,69 @@ Record NewsRecords::event(const device::ToolEvent& news, const Naming& naming) c
                                      : "remembered by a restarted tool, so perhaps an old result";
     text = fmt::format("{}{}{}", text, text.empty() ? "" : "; ", why);
   }
+  record.fields.push_back(only_shown("text", std::move(text)));
+  return record;
+}
+
+std::string NewsRecords::torque_unit_of(const Registers& block) const {
+  return layout_->torque_unit_of(block);
+}
+
+/// Where the steps of a rundown begin, in samples of its curves.
+void NewsRecords::add_steps(Record& record, const Registers& block) const {
+  if (!profile_->events->curves) return;
+  report::Texts names;
+  report::Words samples;
+  const auto facts = catalogue::curve_facts(*profile_, *layout_, block, target_->torque_unit);
+  for (const catalogue::StepMarker& step : facts.steps) {
+    names.push_back(step.name);
+    samples.push_back(step.sample);
+  }
+  record.fields.push_back({"steps", std::move(names)});
+  record.fields.push_back({"step_at", std::move(samples)});
+}
+
+Record NewsRecords::curve_header(const device::ToolCurve& news, const Naming& naming) const {
+  Record record = blank("curve", news.time);
+  add_name(record, naming);
+  record.fields.push_back({"number", news.number ? number(*news.number) : Cell()});
+  record.fields.push_back({"whole", news.is_whole});
+  catalogue::CurveFacts facts;
+  if (news.block) {
+    facts = catalogue::curve_facts(*profile_, *layout_, *news.block, target_->torque_unit);
+  }
+  const bool says_sampling = facts.sampling_ms != 0;
+  record.fields.push_back({"sampling_ms", says_sampling ? number(facts.sampling_ms) : Cell()});
+  for (std::size_t at = 0; at < news.channels.size(); ++at) {
+    const std::string key = fmt::format("channel_{}", at + 1);
+    const auto known = at < facts.channels.size() ? facts.channels[at] : catalogue::ChannelFacts();
+    record.fields.push_back({key + "_type", text_or_null(known.name)});
+    record.fields.push_back(
+        {key + "_is", std::string(catalogue::curve_quantity_words.text(known.is))});
+    record.fields.push_back({key + "_unit", text_or_null(known.unit)});
+    record.fields.push_back({key + "_count", count(news.channels[at].size() / sizeof(float))});
+  }
+  if (news.block) {
+    add_steps(record, *news.block);
+  }
+  return record;
+}
+
+Record NewsRecords::curve(const device::ToolCurve& news, const Naming& naming) const {
+  Record record = curve_header(news, naming);
+  std::string counts;
+  for (std::size_t at = 0; at < news.channels.size(); ++at) {
+    report::Numbers numbers;
+    for (const float sample : catalogue::to_samples(news.channels[at])) {
+      numbers.push_back(catalogue::to_decimal(sample));
+    }
+    counts += fmt::format("{}{}", counts.empty() ? "" : " and ", counted(numbers.size(), "sample"));
+    record.fields.push_back({fmt::format("channel_{}", at + 1), std::move(numbers)});
+  }
+  std::string text = news.trouble.empty() ? "curve with " + counts : news.trouble;
+  if (!news.block && news.trouble.empty()) text += " of no event that was seen";
+  if (news.block && !news.is_whole) text += ", not all that the event counts";
+  record.fields.push_back(only_shown("kind", "curve", news.is_whole ? Tone::plain : Tone::bad));
   record.fields.push_back(only_shown("text", std::move(text)));
   return record;
 }

@@ -33,6 +33,14 @@ class NewsRecords {
   [[nodiscard]] report::Record value(const device::PolledValue& news, const std::string& type,
                                      WallTime time) const;
   [[nodiscard]] report::Record motor(const device::MotorTransition& news) const;
+  /// Curves of an event, or of none that was seen, with all samples. Requires a profile with
+  /// curves.
+  [[nodiscard]] report::Record curve(const device::ToolCurve& news, const Naming& naming) const;
+  /// The same without the samples: what is stored beside them.
+  [[nodiscard]] report::Record curve_header(const device::ToolCurve& news,
+                                            const Naming& naming) const;
+  /// What a block says is the unit of its torques; empty: nothing.
+  [[nodiscard]] std::string torque_unit_of(const Registers& block) const;
   [[nodiscard]] report::Record gap(const device::EventGap& news, WallTime time,
                                    const Naming& naming) const;
   [[nodiscard]] report::Record lag(const device::PollLag& news, WallTime time) const;
@@ -47,8 +55,10 @@ class NewsRecords {
  private:
   [[nodiscard]] report::Record blank(std::string type, WallTime time) const;
   void add_name(report::Record& record, const Naming& naming) const;
+  void add_steps(report::Record& record, const Registers& block) const;
 
   const Target* target_;
+  const catalogue::Profile* profile_;
   std::optional<catalogue::EventLayout> layout_ = std::nullopt;  ///< where the profile has events
   std::string error_key_ = {};  ///< of the code that the texts explain
   bool has_torque_ = false;     ///< in the unit that is set on the tool

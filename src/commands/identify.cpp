@@ -36,6 +36,13 @@ Cell number_or_null(const std::optional<Number>& value) {
   return value ? number(static_cast<std::int64_t>(*value)) : Cell();
 }
 
+/// "4002 (4.0.2)" where the tool says both.
+std::string shown_firmware(const catalogue::Identity& identity) {
+  if (!identity.firmware) return {};
+  const std::string number = std::to_string(*identity.firmware);
+  return identity.version.empty() ? number : fmt::format("{} ({})", number, identity.version);
+}
+
 report::Record identity_record(const OpenTool& tool, const Identification& found,
                                Duration round_trip, const Clock& clock) {
   const catalogue::Identity& identity = found.identity;
@@ -55,7 +62,7 @@ report::Record identity_record(const OpenTool& tool, const Identification& found
                      {"controller_model_code", number_or_null(identity.controller_model_code)},
                      {"id", number_or_null(identity.id)},
                      {"serial", text_or_null(identity.serial)},
-                     {"firmware", number_or_null(identity.firmware)},
+                     {"firmware", number_or_null(identity.firmware), shown_firmware(identity)},
                      {"raw", to_compact_hex(identity.raw)},
                      {"round_trip_ms", milliseconds(round_trip), tenths.to_string() + " ms"},
                      {"notes", identity.notes},
@@ -118,9 +125,17 @@ Result<Identified> identify_one(OpenTool& tool, const Context& context) {
   }
   TRY_LET(const auto answer, tool.device.report_server_id());
   const Duration round_trip = tool.device.session().last_round_trip();
-  TRY_LET(const auto found, match_identity(answer, target.profile, context));
-  return Identified{identity_record(tool, found, round_trip, context.clock),
-                    misfit_of(target, found)};
+  TRY_LET(auto found, match_identity(answer, target.profile, context));
+  if (const auto more = work::ask_more(tool, found); !more) {
+    found.identity.notes.push_back(fmt::format(
+        "what it says of itself in registers is not known: {}", message_of(more.error())));
+  }
+  Identified identified{identity_record(tool, found, round_trip, context.clock),
+                        misfit_of(target, found)};
+  if (const std::string& version = found.identity.version; !version.empty()) {
+    identified.record.fields.push_back({"firmware_version", version});
+  }
+  return identified;
 }
 
 class Identify final : public Verb<std::monostate, Outcome> {

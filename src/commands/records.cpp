@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "spindle/base/text.hpp"
+#include "spindle/commands/commands.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -157,18 +158,23 @@ Cell milliseconds(Duration duration) {
 }
 
 report::Record value_record(const device::Reading& reading, const Target& target,
-                            const Clock& clock, device::Limits limits) {
+                            const Clock& clock, const GetOptions& options) {
   const Parameter& parameter = reading.parameter;
+  const bool is_hidden =
+      parameter.secrecy == catalogue::Secrecy::secret && options.secrets == Secrets::leave_out;
+  const auto& value = *reading.value;
   report::Record record{
       .type = "value", .target = target.shown, .time = clock.wall(), .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"table", std::string(catalogue::to_text(parameter.table))},
                    {"register", number(parameter.address.value)},
-                   {"raw", *reading.registers},
-                   {"value", value_cell(*reading.value), reading.value->to_string()},
-                   {"label", text_or_null(reading.value->label)},
+                   {"raw", is_hidden ? Registers() : *reading.registers},
+                   {"value", is_hidden ? Cell() : value_cell(value),
+                    is_hidden ? shown_of(parameter, value) : value.to_string()},
+                   {"label", is_hidden ? Cell() : text_or_null(value.label)},
                    {"unit", text_or_null(unit_of(parameter, target))}};
-  if (limits == device::Limits::read) {
+  if (is_hidden) record.fields.push_back({"secret", true, "yes"});
+  if (options.limits == device::Limits::read) {
     record.fields.push_back({"minimum", number_or_null(reading.minimum)});
     record.fields.push_back({"maximum", number_or_null(reading.maximum)});
   }
@@ -219,6 +225,8 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   if (parameter.hazard != catalogue::Hazard::none) {
     record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});
   }
+  if (parameter.guarding == catalogue::Guarding::alone) record.fields.push_back({"guarded", true});
+  if (parameter.secrecy == catalogue::Secrecy::secret) record.fields.push_back({"secret", true});
   return record;
 }
 

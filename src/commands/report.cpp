@@ -56,19 +56,21 @@ ReportZone zone_of(const Assessed& assessed, const Clock& clock) {
 }
 
 Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
-                        const ReportOptions& options, Context& context) {
+                        const ReportOptions& options, store::Reader& reader, Context& context) {
+  TRY_LET(const auto curves, load_curves(assessed, reader));
   const std::string page = report_page(assessed, {.zone = zone,
                                                   .made = context.clock.wall(),
                                                   .version = std::string(context.version),
-                                                  .options = options});
+                                                  .options = options,
+                                                  .curves = curves});
   if (options.file == standard_output) return context.io.out(page);
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
 Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
-                         const ReportOptions& options, Context& context) {
+                         const ReportOptions& options, store::Reader& reader, Context& context) {
   if (!options.file.empty()) {
-    auto written = write_page(assessed, zone, options, context);
+    auto written = write_page(assessed, zone, options, reader, context);
     if (!written) return written;
   }
   if (context.user.format == report::Format::table) {
@@ -149,7 +151,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   Outcome outcome;
   outcome.succeed();
   if (!assessed.unmet.empty()) outcome.negate();
-  return tell_report(assessed, zone, options, context)
+  return tell_report(assessed, zone, options, **reader, context)
       .and_then([&] { return tell(summary_of(assessed, options), outcome, context); })
       .map([&] { return outcome; });
 }

@@ -6,6 +6,7 @@
 #include "qdas_export.hpp"
 #include "result_selection.hpp"
 #include "result_stream.hpp"
+#include "results_curve.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "stored_records.hpp"
@@ -81,6 +82,7 @@ Result<Outcome> results(const ResultsOptions& options, Context& context) {
   TRY_LET(auto reader, open_store(options.store, context));
   ProfileShelf shelf(context.profiles);
   TRY_LET(auto records, StoredRecords::make(*reader, shelf, context));
+  if (!options.curve.empty()) return show_curve(options, *reader, records, context);
   TRY_LET(const auto selection, select_results(options.filter, records, context));
   if (!options.qdas.empty()) {
     return export_qdas(options, *reader, records, selection, context);

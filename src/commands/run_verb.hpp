@@ -87,6 +87,7 @@ Result<Outcome> VerbRun<V>::on_one(const Target& target) {
     });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
+  if (verb_->changes_tools()) tell_caution(opened->tool, *context_);
   const auto plan = verb_->examine(opened->tool, std::move(opened->prepared), *context_)
                         .and_then([&](Plan known) {
                           return ask_by(V::Basis::tool, opened->tool.target, std::move(known));
@@ -115,6 +116,7 @@ auto VerbRun<V>::open(const Target& target, Context& context) const -> Result<Op
   auto opened = open_prepared(target, verb_->need(), context,
                               [&](const Profile& profile) { return verb_->plan(profile, target); });
   if (!opened) return opened;
+  if (verb_->changes_tools()) tell_caution(opened->tool, context);
   auto plan = verb_->examine(opened->tool, std::move(opened->prepared), context);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   return Opened<Plan>{std::move(opened->tool), std::move(*plan)};

@@ -29,25 +29,32 @@ class Set final : public Verb<SetPlan, SetResult> {
     const auto& texts = options_->assignments;
     const bool raw_only = options_->raw == RawWrites::ask && !texts.empty() &&
                           std::all_of(texts.begin(), texts.end(), is_raw);
-    return raw_only ? Need::raw_registers : Need::named_registers;
+    return raw_only ? Need::raw_writes : Need::named_registers;
   }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
-    return parse_assignments(options_->assignments, profile, target, options_->raw)
-        .and_then([&](std::vector<Assignment> assignments) {
-          return check_storing(options_->storing, profile).map([&] {
-            return SetPlan{.assignments = std::move(assignments)};
-          });
-        });
+    const auto torque =
+        profile.torque_unit_from.empty() ? TorqueUnit::known : TorqueUnit::told_by_tool;
+    TRY_LET(auto assignments, parse(profile, target, torque));
+    return check_storing(options_->storing, profile).map([&] {
+      return SetPlan{.assignments = std::move(assignments)};
+    });
   }
 
   Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
+    if (!tool.profile->torque_unit_from.empty()) {
+      TRY_LET(auto told, parse(*tool.profile, tool.target, TorqueUnit::known));
+      plan.assignments = std::move(told);
+    }
     TRY_LET(auto steps, options_->addressing == Addressing::broadcast
                             ? steps_for_everybody(plan.assignments)
                             : check_against_tool(plan.assignments, tool.device));
     plan.steps = std::move(steps);
     plan.serial = serial_of(tool.device);
+    if (options_->undoing) {
+      TRY(check_undo(plan, *options_->undoing));
+    }
     tell_other_steps(plan.steps, tool.device.profile(), tool.target, context);
     tell_roundings(plan.steps, tool.target, context);
     return plan;
@@ -55,13 +62,15 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   Result<void> ask(const AllPlanned& planned, std::size_t of, Context& context) const override {
     if (is_dry_run()) return {};
-    if (is_group_) return ask_for_group(planned, of, context);
+    if (is_group_ || options_->undoing) return ask_for_group(planned, of, context);
     std::vector<std::string_view> what;
     if (options_->addressing == Addressing::broadcast) what.emplace_back("set");
     if (stores()) what.emplace_back(store_action);
     const std::string raw =
         options_->raw == RawWrites::ask ? raw_in_words(options_->assignments) : std::string();
     if (!raw.empty()) what.emplace_back(raw);
+    const std::string guarded = guarded_in_words(planned.front().plan.steps);
+    if (!guarded.empty()) what.emplace_back(guarded);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
                        context);
@@ -95,7 +104,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    SetWriter writer(tool, options_->storing, context);
+    SetWriter writer(options_->undoing ? "undo" : "set", tool, options_->storing, context);
     if (!is_group_) tell_risks(plan.steps, tool.target, context);
     return options_->addressing == Addressing::broadcast ? writer.send(plan.steps)
                                                          : writer.write(plan.steps);
@@ -135,6 +144,11 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
   [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
+
+  [[nodiscard]] Result<std::vector<Assignment>> parse(const Profile& profile, const Target& target,
+                                                      TorqueUnit torque) const {
+    return parse_assignments(options_->assignments, profile, target, options_->raw, torque);
+  }
 
   static report::Record planned_record(const SetStep& step, const Target& target,
                                        const Clock& clock) {

@@ -53,8 +53,38 @@ Result<void> check_danger(const Parameter& parameter, const Profile& profile) {
             .register_address = parameter.address.value});
 }
 
+/// Whether the profile lets it be written at all, whatever the user says.
+Result<void> check_listed(const Parameter& parameter, const Profile& profile) {
+  const bool is_raw_register = is_raw(parameter.name) && modbus::is_writable(parameter.table);
+  if (!is_raw_register) return {};
+  return profile
+      .may_write(parameter.table, parameter.written_at(),
+                 catalogue::register_count(parameter.encoding))
+      .map_error([&](Error error) {
+        error.name = parameter.name;
+        return error;
+      });
+}
+
+/// What is guarded is written alone: it may change what the others mean.
+Result<void> check_guarded(const std::vector<Assignment>& assignments) {
+  if (assignments.size() < 2) return {};
+  for (const Assignment& assignment : assignments) {
+    const Parameter& parameter = assignment.parameter;
+    if (parameter.guarding == catalogue::Guarding::none) continue;
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "it may change what other values mean, so it is written alone",
+              .hint = "give it in a command of its own, and look at the others behind it",
+              .name = parameter.name,
+              .register_address = parameter.address.value});
+  }
+  return {};
+}
+
 /// Whether the user may write it. What may move or lock a tool is no setting in any case.
 Result<void> check_access(const Parameter& parameter, const Profile& profile, RawWrites raw) {
+  if (auto allowed = check_listed(parameter, profile); !allowed) return allowed;
   const bool is_asked =
       raw == RawWrites::ask && is_raw(parameter.name) && modbus::is_writable(parameter.table);
   if (parameter.access == catalogue::Access::read_only && !is_asked) {
@@ -73,6 +103,13 @@ bool takes_unit(const Parameter& parameter, std::string_view text) {
       parameter.labels.begin(), parameter.labels.end(),
       [&](const catalogue::Label& label) { return same_ignoring_case(label.text, text); });
   return is_number && !is_label && parameter.bits.empty();
+}
+
+/// Whether the unit of what was typed is known once the tool was read.
+bool waits_for_unit(const Assignment& assignment, const Target& target, TorqueUnit torque) {
+  const Parameter& parameter = assignment.parameter;
+  return torque == TorqueUnit::told_by_tool && parameter.unit == catalogue::torque_unit &&
+         target.torque_unit.empty() && !Decimal::parse(assignment.text);
 }
 
 /// The numbers in the unit of the parameter, and what was converted.
@@ -101,7 +138,8 @@ Result<Assignment> with_numbers(Assignment assignment, const Target& target) {
 }
 
 /// What stands behind NAME=; what is meant by some of it is known once the tool was read.
-Result<Assignment> with_value(Assignment assignment, const Target& target) {
+Result<Assignment> with_value(Assignment assignment, const Target& target, TorqueUnit torque) {
+  if (waits_for_unit(assignment, target, torque)) return assignment;
   return with_numbers(std::move(assignment), target).and_then([](Assignment made) {
     const Parameter& parameter = made.parameter;
     const bool waits = !parameter.scale_by.empty() || !parameter.part.empty();
@@ -114,7 +152,7 @@ Result<Assignment> with_value(Assignment assignment, const Target& target) {
 }
 
 Result<Assignment> parse_assignment(const std::string& text, const Profile& profile,
-                                    const Target& target, RawWrites raw) {
+                                    const Target& target, RawWrites raw, TorqueUnit torque) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     return tl::unexpected(Error{.code = Errc::usage,
@@ -128,11 +166,12 @@ Result<Assignment> parse_assignment(const std::string& text, const Profile& prof
     fits.error().register_address = parameter.address.value;
     return tl::unexpected(std::move(fits.error()));
   }
-  return with_value({parameter, {}, text.substr(equals + 1)}, target).map_error([&](Error error) {
-    error.name = parameter.name;
-    error.register_address = parameter.address.value;
-    return error;
-  });
+  return with_value({parameter, {}, text.substr(equals + 1)}, target, torque)
+      .map_error([&](Error error) {
+        error.name = parameter.name;
+        error.register_address = parameter.address.value;
+        return error;
+      });
 }
 
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
@@ -233,7 +272,8 @@ Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
     if (same) continue;
     return tl::unexpected(work::changed_meanwhile(
         fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
-                    planned.before->to_string(), step.before->to_string())));
+                    shown_of(step.assignment.parameter, *planned.before),
+                    shown_of(step.assignment.parameter, *step.before))));
   }
   return {};
 }
@@ -269,10 +309,10 @@ std::string raw_in_words(const std::vector<std::string>& assignments) {
 
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const Profile& profile, const Target& target,
-                                                  RawWrites raw) {
+                                                  RawWrites raw, TorqueUnit torque) {
   std::vector<Assignment> assignments;
   for (const std::string& text : texts) {
-    TRY_LET(auto assignment, parse_assignment(text, profile, target, raw));
+    TRY_LET(auto assignment, parse_assignment(text, profile, target, raw, torque));
     for (const Assignment& earlier : assignments) {
       // Which bits these are is known once the tool was read.
       if (!earlier.parameter.part.empty() || !assignment.parameter.part.empty()) continue;
@@ -281,6 +321,7 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>
     }
     assignments.push_back(std::move(assignment));
   }
+  TRY(check_guarded(assignments));
   return assignments;
 }
 
@@ -302,6 +343,31 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   TRY(check_meanings_stay(parameters, steps));
   TRY(check_once(steps));
   return in_order(std::move(steps));
+}
+
+Result<void> check_undo(const SetPlan& plan, const Undoing& undoing) {
+  const bool is_other = !plan.serial.empty() && !undoing.serial.empty();
+  if (is_other && plan.serial != undoing.serial) {
+    return tl::unexpected(
+        Error{.code = Errc::mismatch,
+              .message = fmt::format("the change was made on serial {}, and this tool is serial {}",
+                                     undoing.serial, plan.serial)});
+  }
+  for (const SetStep& step : plan.steps) {
+    const std::string& name = step.assignment.parameter.name;
+    const auto left = undoing.left.find(name);
+    if (!step.changes() || !step.before || left == undoing.left.end()) continue;
+    const Value& before = *step.before;
+    const std::string present = before.is_number() ? before.number.to_string() : before.exact();
+    if (present == left->second) continue;
+    return tl::unexpected(
+        Error{.code = Errc::mismatch,
+              .message = fmt::format("it was changed again: the tool holds {}, the change left {}",
+                                     present, left->second),
+              .hint = fmt::format("'spindle log {}' shows the changes of this value", name),
+              .name = name});
+  }
+  return {};
 }
 
 Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignments) {

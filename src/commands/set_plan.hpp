@@ -45,12 +45,17 @@ bool is_raw(const std::string& assignment);
 /// "write @holding:4=17, of which it may not be known what it does"; empty where none is raw.
 std::string raw_in_words(const std::vector<std::string>& assignments);
 
+/// Whether the unit of torques is as the target has it, or will be told by the tool.
+enum class TorqueUnit : std::uint8_t { known, told_by_tool };
+
 /// What can be known from the profile and the target's torque unit: names, access, types, units,
-/// ranges, and that none starts a motor.
+/// ranges, that none starts a motor, and that what is guarded stands alone. A torque that was typed
+/// with a unit has no value yet where the tool will tell its own.
 Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
                                                   const catalogue::Profile& profile,
                                                   const Target& target,
-                                                  RawWrites raw = RawWrites::refuse);
+                                                  RawWrites raw = RawWrites::refuse,
+                                                  TorqueUnit torque = TorqueUnit::known);
 
 /// What only the tool can say: its present values, its own limits, and which bits have names. Reads
 /// only.
@@ -60,6 +65,10 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
 /// The plan with what the tool holds now. Reads only. Error `mismatch` where the tool is not the
 /// one that was planned for, or does not hold what it held then.
 Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device);
+
+/// Whether a change can be taken back: the tool is the one that it was made on, and holds what it
+/// left. Error `mismatch`.
+Result<void> check_undo(const SetPlan& plan, const Undoing& undoing);
 
 /// For everybody on a line. Everybody may have another setting, so only names of bits that always
 /// count can be sent.

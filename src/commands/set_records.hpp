@@ -23,7 +23,8 @@ enum class Ending : std::uint8_t {
   refused,
   unknown,
   rolled_back,
-  sent
+  sent,
+  changed_along  ///< it was not written: the tool changed it when another one was
 };
 
 inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::planned},
@@ -34,7 +35,8 @@ inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::pla
                                                          {"refused", Ending::refused},
                                                          {"unknown", Ending::unknown},
                                                          {"rolled-back", Ending::rolled_back},
-                                                         {"sent", Ending::sent}});
+                                                         {"sent", Ending::sent},
+                                                         {"changed-along", Ending::changed_along}});
 Ending ending_of(device::WriteResult result);
 
 std::span<const report::Column> set_plan_columns();
@@ -67,6 +69,10 @@ Summary set_summary(const SetCounts& counts, const std::string& target);
 
 /// What a change may cost, before it is made.
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context);
+
+/// "write control.torque-unit, which may change what other values mean": what of these is guarded
+/// and would change; empty where nothing is.
+std::string guarded_in_words(const std::vector<SetStep>& steps);
 
 /// When what was written acts, where that is not at once.
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);

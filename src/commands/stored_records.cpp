@@ -160,8 +160,8 @@ Naming StoredRecords::naming(RowId tool, std::int64_t epoch, RowId id) const {
 Record StoredRecords::event(const store::EventView& row) {
   const store::Place* place = this->place(row.place);
   const Speaker& speaker = this->speaker(place != nullptr ? *place : store::Place());
-  const bool fits = speaker.known != nullptr &&
-                    row.raw.size() == 2 * std::size_t{speaker.known->profile.events->count};
+  const bool fits = speaker.known != nullptr && row.raw.size() % 2 == 0 &&
+                    speaker.known->profile.events->has_form(row.raw.size() / 2);
   Record record = fits ? speaker.records->event(news_of(row), naming(row.tool, row.epoch, row.id))
                        : event_by_columns(row, speaker);
   if (fits && context_->user.format == report::Format::csv) {

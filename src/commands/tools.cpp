@@ -96,7 +96,12 @@ Result<Outcome> tools(Context& context) {
   }
   Listing listing(context, tool_columns);
   for (const files::Tool& tool : context.tools.tools) {
+    if (context.tools.faults.contains(tool.name)) continue;
     listing.add(tool_record(tool, context.tools, context.clock));
+  }
+  for (const auto& [entry, fault] : context.tools.faults) {
+    outcome.fail(fault);
+    listing.add(fault);
   }
   return finish(listing, outcome);
 }

@@ -32,10 +32,23 @@ Result<device::WatchPlan> check_purpose(const WatchOptions& options,
   return plan;
 }
 
+/// What is secret is not shown by the way.
+Result<void> check_secrets(const std::vector<catalogue::Parameter>& values) {
+  for (const catalogue::Parameter& parameter : values) {
+    if (parameter.secrecy == catalogue::Secrecy::open) continue;
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "it is a secret, and no stream shows it",
+                                .hint = "'spindle get --include-secrets' does",
+                                .name = parameter.name});
+  }
+  return {};
+}
+
 /// Why the counter alone cannot be polled instead; empty: it can.
 std::string_view why_not_unarmed(const catalogue::Profile& profile) {
   if (!profile.events) return "it has no events";
   if (!catalogue::sends_unasked(profile)) return "its events are polled, it sends nothing unasked";
+  if (!profile.events->first) return "where its last event can be read is not known";
   return profile.events->arm ? "" : "it sends its events whether they are wanted or not";
 }
 
@@ -79,6 +92,7 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
       options.names.empty() ? to_strings(profile.watched) : options.names;
   if (!names.empty()) {
     TRY_LET(auto values, profile.select(names));
+    TRY(check_secrets(values));
     plan.values = std::move(values);
   }
   return check_purpose(options, profile, std::move(plan));

@@ -166,6 +166,12 @@ report::Record WatchStream::record_of(const device::PollLag& news, const Voice& 
   return voice.records->lag(news, context_->clock.wall());
 }
 
+/// Thousands of numbers are only written where there is a reader.
+report::Record WatchStream::record_of(const device::ToolCurve& news, const Voice& voice) const {
+  return records_ == Records::shown ? voice.records->curve(news, voice.naming)
+                                    : voice.records->curve_header(news, voice.naming);
+}
+
 report::Record WatchStream::record_of(const device::LinkChange& news, const Voice& voice) {
   note_link(news);
   return voice.records->link(news, context_->clock.wall());

@@ -82,6 +82,7 @@ class WatchStream {
   report::Record record_of(const device::PolledValue& news, const Voice& voice);
   report::Record record_of(const device::EventGap& news, const Voice& voice);
   report::Record record_of(const device::PollLag& news, const Voice& voice);
+  [[nodiscard]] report::Record record_of(const device::ToolCurve& news, const Voice& voice) const;
   report::Record record_of(const device::LinkChange& news, const Voice& voice);
   void note_link(const device::LinkChange& news);
   void note_activity();

@@ -274,6 +274,33 @@ std::string profile_beside(const std::string& tools_file, std::string profile) {
   return names_profile_file(profile) ? beside(tools_file, std::move(profile)) : profile;
 }
 
+using Position = std::pair<std::size_t, std::size_t>;  ///< line and column
+
+Position position_of(const SourceLocation& at) { return {at.line, at.column}; }
+
+/// Where the last value begins that is part of this one.
+Position last_position(const YamlNode& node) {
+  if (!node.items.empty()) return last_position(node.items.back());
+  if (!node.entries.empty()) return last_position(node.entries.back().value);
+  return position_of(node.at);
+}
+
+/// The entry of the file that has its place there, as Tools::faults names it; empty: none has.
+std::string entry_at(const YamlNode& document, const Position& place) {
+  constexpr std::pair<std::string_view, std::string_view> kinds[] = {
+      {"tools", ""}, {"groups", "@"}, {"sinks", "sink "}};
+  for (const auto& [kind, prefix] : kinds) {
+    const YamlNode* entries = document.find(kind);
+    if (entries == nullptr) continue;
+    for (const YamlEntry& entry : entries->entries) {
+      const bool is_here =
+          position_of(entry.key_at) <= place && place <= last_position(entry.value);
+      if (is_here) return std::string(prefix) + entry.key;
+    }
+  }
+  return {};
+}
+
 /// Everything that can be read, with what is wrong.
 Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
   TRY_LET(const auto text, disk.read_trusted(path));
@@ -290,6 +317,11 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
   }
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
+  for (const Diagnostic& finding : findings.list()) {
+    const std::string entry =
+        documents.empty() ? "" : entry_at(documents.front(), {finding.line, finding.column});
+    tools.faults.try_emplace(entry, Error{.code = Errc::bad_file, .message = finding.to_string()});
+  }
   return tools;
 }
 
@@ -326,11 +358,25 @@ Result<Tools> load_tools(const std::string& path, const Disk& disk) {
   return tl::unexpected(refusal_of(findings));
 }
 
+Result<Tools> usable_tools(const std::string& path, const Disk& disk) {
+  Diagnostics findings;
+  auto tools = read_tools_file(path, disk, findings);
+  const bool is_of_the_whole = tools && tools->faults.contains("");
+  if (is_of_the_whole) return tl::unexpected(refusal_of(findings));
+  return tools;
+}
+
+Result<Tools> without_faults(Tools tools) {
+  if (tools.faults.empty()) return tools;
+  return tl::unexpected(tools.faults.begin()->second);
+}
+
 Tools salvage_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
   auto tools = read_tools_file(path, disk, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
+  tools->faults.clear();
   return std::move(*tools);
 }
 

@@ -12,6 +12,7 @@ std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosi
     case Format::csv:
       return make_csv_renderer(streams, verbosity);
     case Format::table:
+    case Format::svg:
       break;
   }
   return make_table_renderer(streams, verbosity);

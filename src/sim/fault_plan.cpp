@@ -100,6 +100,10 @@ constexpr std::array kinds = {
     KindInfo{FaultKind::reset_neighbour, "reset-neighbour", Argument::number, 1, 1, word_limit,
              "reset-neighbour[=N]",
              "a write is stored, and the register N (1) behind it becomes 0"},
+    KindInfo{FaultKind::zero_date, "zero-date", Argument::none, 0, 0, 0, "zero-date",
+             "an event has no date (firmware 4000 and later)"},
+    KindInfo{FaultKind::not_a_number, "not-a-number", Argument::none, 0, 0, 0, "not-a-number",
+             "the torque of an event is no number (firmware 4000 and later)"},
 };
 
 const KindInfo& info_of(FaultKind kind) {
@@ -202,6 +206,9 @@ FaultNeed need_of(FaultKind kind) {
     case FaultKind::store_other:
     case FaultKind::reset_neighbour:
       return FaultNeed::screwdriver;
+    case FaultKind::zero_date:
+    case FaultKind::not_a_number:
+      return FaultNeed::dated;
     default:
       return FaultNeed::nothing;
   }

@@ -64,6 +64,15 @@ Result<Target> target_of_tool(const files::Tool& tool, const Environment& enviro
 /// The tools of this name, or that of this URL. Only a file with faults can have a name twice.
 std::vector<Result<Target>> named_targets(const std::string& name, const Environment& environment) {
   std::vector<Result<Target>> found;
+  if (const auto fault = environment.tools.faults.find(name);
+      fault != environment.tools.faults.end()) {
+    Error error = fault->second;
+    error.target = name;
+    error.hint =
+        "until it is mended, this entry is not used; 'spindle tools --check' lists all faults";
+    found.emplace_back(tl::unexpected(std::move(error)));
+    return found;
+  }
   for (const files::Tool& tool : environment.tools.tools) {
     if (tool.name == name) found.push_back(target_of_tool(tool, environment));
   }
@@ -189,6 +198,11 @@ Resolution resolve_each_target(const std::vector<std::string>& texts,
                                          : environment.tools.groups.end();
     if (group == environment.tools.groups.end()) {
       add_named(text, environment, resolution);
+      continue;
+    }
+    if (const auto fault = environment.tools.faults.find(text);
+        fault != environment.tools.faults.end()) {
+      resolution.faults.push_back(fault->second);
       continue;
     }
     for (const std::string& name : group->second) add_named(name, environment, resolution);

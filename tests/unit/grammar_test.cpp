@@ -277,13 +277,34 @@ TEST_CASE("arguments that look like options, or are negative, arrive behind -- a
   CHECK(good("get t -5").run);  // a number is no option; no parameter has such a name
 }
 
+TEST_CASE("help and version are commands, too, and spindle alone is a question for help") {
+  CHECK(good("").text == good("--help").text);
+  CHECK(good("help").text == good("--help").text);
+  CHECK(good("help get").text == good("get --help").text);
+  CHECK(good("help store trim").text == good("store trim --help").text);
+  CHECK(good("help -q set").text == good("set --help").text);
+  CHECK(good("version").asks == Invocation::Asks::version);
+  CHECK(good("version --json").format == report::Format::json);
+  CHECK(parse(words("help gte")).error().message == "unknown command 'gte'");
+  CHECK(parse(words("help gte")).error().hint == "did you mean 'get'?");
+}
+
+TEST_CASE("the help of a command has its own options, and says where the others are") {
+  for (const std::string line : {"get --help", "record --help"}) {
+    CAPTURE(line);
+    const std::string text = *good(line).text;
+    CHECK(text.find("--connect-timeout") == std::string::npos);
+    CHECK(text.find("'spindle --help'") != std::string::npos);
+  }
+}
+
 TEST_CASE("what is wrong is named, with a suggestion or where to look") {
   struct Case {
     std::string line;
     std::string text;
   };
   const std::vector<Case> cases = {
-      {"", "no command is given; 'spindle --help' lists all commands"},
+      {"--json", "no command is given; 'spindle --help' lists all commands"},
       {"gte t", "unknown command 'gte'; did you mean 'get'?"},
       {"gte --help", "unknown command 'gte'; did you mean 'get'?"},
       {"profile lsit", "unknown command 'lsit'; did you mean 'list'?"},
@@ -294,7 +315,7 @@ TEST_CASE("what is wrong is named, with a suggestion or where to look") {
       {"get t --profile", "'--profile' needs a value; write --profile VALUE"},
       {"get t -o", "'-o' needs a value; write -o VALUE"},
       {"get t -o jsn",
-       "--output: 'jsn' is unknown; it takes table, json, csv; did you mean 'json'?"},
+       "--output: 'jsn' is unknown; it takes table, json, csv, svg; did you mean 'json'?"},
       {"get t --timeout 5", "--timeout: '5' is not a duration; write it like 500ms, 2.5s or 5min"},
       {"get t --timeout -1s",
        "--timeout: '-1s' is not a duration; write it like 500ms, 2.5s or 5min"},

@@ -462,7 +462,7 @@ TEST_CASE("doga-bm: counts") {
   CHECK(count("event.*") == 14);
   CHECK(count("status.*") == 14);
   CHECK(count("alarm.*") == 2);
-  CHECK(profile.parameters.size() == 255);
+  CHECK(profile.parameters.size() == 261);
   CHECK(profile.actions.size() == 6);
   CHECK(profile.exceptions.size() == 6);
 }

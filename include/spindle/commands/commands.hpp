@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct GetOptions {
   std::string target;  ///< or a group
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
+  Secrets secrets = Secrets::leave_out;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> get(const GetOptions& options, Context& context);
@@ -48,6 +50,12 @@ enum class Storing : std::uint8_t { no, yes };
 /// Whether registers may be written that the profile does not say can be.
 enum class RawWrites : std::uint8_t { refuse, ask };
 
+/// What is taken back: which tool it was, and what it has to hold still.
+struct Undoing {
+  std::string serial = {};                       ///< empty: not known
+  std::map<std::string, std::string> left = {};  ///< by name: what the change left, as recorded
+};
+
 struct SetOptions {
   std::string target;                    ///< or a group
   std::vector<std::string> assignments;  ///< NAME=VALUE
@@ -56,6 +64,7 @@ struct SetOptions {
   Addressing addressing = Addressing::unicast;
   RawWrites raw = RawWrites::refuse;
   std::size_t jobs = usual_jobs;
+  std::optional<Undoing> undoing = std::nullopt;  ///< of `undo`, which always asks
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
 
@@ -239,11 +248,27 @@ struct ResultsOptions {
   Told told = Told::results;
   Following following = Following::no;
   std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
-  std::string qdas = {};  ///< folder for files in the format of Q-DAS; empty: none
+  std::string qdas = {};   ///< folder for files in the format of Q-DAS; empty: none
+  std::string curve = {};  ///< SERIAL/EPOCH/NUMBER of the result whose curve is wanted; empty: none
   Overwrite overwrite = Overwrite::refuse;
 };
 /// What was stored.
 Result<Outcome> results(const ResultsOptions& options, Context& context);
+
+struct LogOptions {
+  std::vector<std::string> arguments = {};          ///< [TARGET...] [NAME|PATTERN...]
+  std::string since = {};                           ///< as typed; see parse_time()
+  std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
+};
+/// What was changed, by whom, and how it ended: the record of changes.
+Result<Outcome> log(const LogOptions& options, Context& context);
+
+struct UndoOptions {
+  std::string id = {};  ///< of a change, or of all changes of one command; empty: the last one
+  Execution execution = Execution::real;
+};
+/// Writes back what a command found, if the tool still holds what it left. Plans, asks, verifies.
+Result<Outcome> undo(const UndoOptions& options, Context& context);
 
 struct StoreOptions {
   std::string store = {};  ///< empty: the user's own

@@ -13,7 +13,8 @@
 
 namespace spindle::report {
 
-enum class Format : std::uint8_t { table, json, csv };
+/// `svg` is for commands that draw; what they say beside the drawing is as in a table.
+enum class Format : std::uint8_t { table, json, csv, svg };
 enum class Align : std::uint8_t { left, right };
 
 /// A column of a table or CSV file, filled from the field with this key ("target", "time" and
