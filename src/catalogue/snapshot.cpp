@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "spindle/base/hash.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 #include "spindle/catalogue/write_order.hpp"
@@ -87,22 +88,16 @@ std::vector<Parameter> numbered_space(const Profile& profile) {
   return space;
 }
 
-/// FNV-1a, 64 bits.
+/// Of several texts, each with its end.
 class Digest {
  public:
   void add(std::string_view text) {
-    for (const char c : text) add(static_cast<unsigned char>(c));
-    add(separator);
+    state_ = hash_of(std::string_view("\0", 1), hash_of(text, state_));
   }
   [[nodiscard]] std::string to_string() const { return fmt::format("{:016x}", state_); }
 
  private:
-  static constexpr unsigned char separator = 0;
-  void add(unsigned char byte) {
-    constexpr std::uint64_t prime = 0x100000001b3;
-    state_ = (state_ ^ byte) * prime;
-  }
-  std::uint64_t state_ = 0xcbf29ce484222325;
+  std::uint64_t state_ = hash_begin;
 };
 
 /// What only some encodings have: those that have none of it keep the digest that they always had.

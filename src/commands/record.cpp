@@ -25,13 +25,6 @@ Error not_stored(std::size_t left, const std::string& path) {
       .name = path};
 }
 
-/// From now on SIGHUP is a wish that is followed while the command runs.
-ServiceNews begin_service(const Context& context) {
-  const Supervision& supervision = context.supervision;
-  if (supervision.heed_reload) supervision.heed_reload();
-  return {supervision.take_manager ? supervision.take_manager() : ServiceManager(), context.clock};
-}
-
 work::JournalOptions pace_of(const RecordOptions& options, ServiceNews& news) {
   work::JournalOptions pace;
   if (options.gather) pace.gather = *options.gather;

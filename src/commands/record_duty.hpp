@@ -7,7 +7,7 @@
 #include "metrics_file.hpp"
 #include "recorder.hpp"
 #include "roster.hpp"
-#include "service_news.hpp"
+#include "spindle/commands/service_news.hpp"
 #include "tools_to_record.hpp"
 
 namespace spindle::commands {

@@ -12,7 +12,7 @@
 #include "leases.hpp"
 #include "record_counters.hpp"
 #include "roster.hpp"
-#include "service_news.hpp"
+#include "spindle/commands/service_news.hpp"
 #include "spindle/work/event_rows.hpp"
 #include "spindle/work/journal.hpp"
 #include "watch_stream.hpp"

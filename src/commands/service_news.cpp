@@ -1,4 +1,4 @@
-#include "service_news.hpp"
+#include "spindle/commands/service_news.hpp"
 
 #include <fmt/format.h>
 
@@ -83,6 +83,12 @@ void ServiceNews::trouble(bool is_in_trouble) {
   if (!manager_.watchdog) return;
   const Duration period = is_in_trouble ? patience_in_trouble : *manager_.watchdog;
   tell(fmt::format("WATCHDOG_USEC={}", microseconds(period)));
+}
+
+ServiceNews begin_service(const Context& context) {
+  const Supervision& supervision = context.supervision;
+  if (supervision.heed_reload) supervision.heed_reload();
+  return {supervision.take_manager ? supervision.take_manager() : ServiceManager(), context.clock};
 }
 
 }  // namespace spindle::commands

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "consent.hpp"
@@ -72,9 +73,11 @@ Result<Outcome> forget_sink(const ForgetOptions& options, Context& context) {
     if (sink.name == options.sink) positions = sink.positions;
   }
   if (!positions) {
+    std::string hint = suggestion(options.sink, names);
+    if (hint.empty()) hint = "'spindle store sinks' shows those that there are";
     return tl::unexpected(Error{.code = Errc::unknown_name,
                                 .message = fmt::format("there is no sink '{}'", options.sink),
-                                .hint = suggestion(options.sink, names),
+                                .hint = std::move(hint),
                                 .name = path});
   }
   TRY_LET(const auto backlog, reader->behind(*positions));

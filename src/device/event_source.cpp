@@ -158,8 +158,6 @@ class CounterSource : public EventSource {
   EventTracker tracker_ = {};
   /// How long the tool was not listened to behind the last event that was recalled.
   std::optional<Duration> unseen_ = std::nullopt;
-  /// When the counter was last known here: a connection may be lost before it served.
-  TimePoint counted_at_ = {};
   bool tells_first_ = false;
   std::optional<std::uint16_t> first_ = std::nullopt;  ///< number of the event to tell as such
 };
@@ -180,12 +178,10 @@ Result<void> CounterSource::attach(Device& device, Duration unseen) {
   curves_.flush();  // the rest of it went the old connection's way
   if (!has_place_) return attach_unread(unseen);
   if (tracker_.last()) {
-    tracker_.look_again(std::exchange(unseen_, std::nullopt)
-                            .value_or(std::min(unseen, Duration(clock_->now() - counted_at_))));
+    tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
   } else {
     TRY_LET(const auto number, device.event_number());
     tracker_.set_baseline(number);
-    counted_at_ = clock_->now();
     if (tells_first_) first_ = number;
     take_waiting();  // pushed before the counter was read, so they are old
   }
@@ -215,7 +211,6 @@ Result<void> CounterSource::poll() {
                  .before = static_cast<std::uint16_t>(number + 1),
                  .sequence = wrapped ? Sequence::wrap : Sequence::jump});
   tracker_.set_baseline(number);
-  counted_at_ = clock_->now();
   return {};
 }
 
@@ -322,7 +317,6 @@ void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime t
   const std::optional<std::uint16_t> last = tracker_.last();
   if (!has_place_ && !last) return judge_unread_first(block, time);
   const Tracked tracked = tracker_.track(number, layout_.key_of(block));
-  counted_at_ = clock_->now();
   const bool is_first = std::exchange(first_, std::nullopt) == number &&
                         tracked.novelty == Sequence::repeat && !EventTracker::is_blank(block);
   if (is_first) {

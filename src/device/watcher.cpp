@@ -230,7 +230,9 @@ Result<void> Watcher::begin() {
   meanings_known_ = false;
   if (!source_) return {};
   hears_ = true;
-  return source_->attach(link_->device, now - seen_at_).map([this] { seen_at_ = clock_->now(); });
+  // A connection may be lost before it served: what was read on it until then counts.
+  if (!seen_at_) seen_at_ = now;
+  return source_->attach(link_->device, now - *seen_at_).map([this] { seen_at_ = clock_->now(); });
 }
 
 // ---- serving ----

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "spindle/base/percent.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/base/utf8.hpp"
 
@@ -41,29 +42,13 @@ tl::unexpected<Error> bad(std::string message,
       Error{.code = Errc::bad_target, .message = std::move(message), .hint = std::move(hint)});
 }
 
-/// "%20" is a blank; empty where a '%' is not followed by two hexadecimal digits.
-std::optional<std::string> decoded(std::string_view text) {
-  std::string plain;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    if (text[at] != '%') {
-      plain += text[at];
-      continue;
-    }
-    const auto byte = parse_unsigned(fmt::format("0x{}", text.substr(at + 1, 2)), 0xFF);
-    if (!byte || at + 2 >= text.size()) return std::nullopt;
-    plain += static_cast<char>(*byte);
-    at += 2;
-  }
-  return plain;
-}
-
 bool is_control(char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7F'; }
 
 Result<std::string> read_base(std::string_view path) {
   while (path.starts_with('/')) path.remove_prefix(1);
   while (path.ends_with('/')) path.remove_suffix(1);
   if (path.empty()) return std::string(usual_base);
-  auto base = decoded(path);
+  auto base = percent_decoded(path);
   if (!base) return bad("a '%' in the topic is not followed by two hexadecimal digits");
   const bool is_text = is_utf8(*base) && std::none_of(base->begin(), base->end(), is_control);
   if (!is_text) return bad("the topic has control characters, or is no UTF-8");
@@ -134,7 +119,7 @@ bool has_password(std::string_view rest) {
   const std::size_t question = rest.find('?');
   if (question == std::string_view::npos) return false;
   for (const std::string_view option : split(rest.substr(question + 1), '&')) {
-    const auto name = decoded(option.substr(0, option.find('=')));
+    const auto name = percent_decoded(option.substr(0, option.find('=')));
     if (name && (*name == "password" || *name == "sslpassword")) return true;
   }
   return false;

@@ -164,19 +164,16 @@ Result<Outcome> answer_recorder(const files::Sink& settings, const std::string& 
 /// A recorder that starts later, or has just begun, makes the store: who delivers until it is
 /// stopped waits for that. False: it was stopped.
 bool wait_for_store(const std::string& path, const ForwardOptions& options,
-                    const ServiceManager& manager, Context& context) {
+                    commands::ServiceNews& news, Context& context) {
   const bool runs_on = options.delivery == commands::Delivery::service &&
                        options.execution == commands::Execution::real;
   if (!runs_on || !context.disk.absent(path)) return true;
   context.renderer.note(fmt::format("{}: there is no store yet; 'spindle record' makes it", path));
-  const auto notify = [&](const std::string& state) {
-    if (manager.notify) manager.notify(state);
-  };
-  notify("READY=1");
-  notify("STATUS=waiting for the store");
+  news.ready();
+  news.status("waiting for the store");
   bool was_absent = true;  // once more, as it may be in the making
   while (std::exchange(was_absent, context.disk.absent(path))) {
-    notify("WATCHDOG=1");
+    news.alive();
     if (!context.clock.sleep_until(context.clock.now() + look_for_store_every)) return false;
   }
   return true;
@@ -190,11 +187,8 @@ Result<Outcome> run(const ForwardOptions& options, Context& context) {
   const std::string collector = settings.collector.empty() ? host_name() : settings.collector;
   if (options.keep_leases) return answer_recorder(settings, collector, context);
   TRY_LET(const auto path, work::store_place(options.store, context.state_folder));
-  const commands::Supervision& supervision = context.supervision;
-  if (supervision.heed_reload) supervision.heed_reload();
-  const ServiceManager manager =
-      supervision.take_manager ? supervision.take_manager() : ServiceManager();
-  if (!wait_for_store(path, options, manager, context)) return done();
+  commands::ServiceNews news = commands::begin_service(context);
+  if (!wait_for_store(path, options, news, context)) return done();
   TRY_LET(const auto rows, commands::StoredRows::open(path, context));
   if (options.execution == commands::Execution::dry_run) {
     return show(options, settings, collector, *rows, context);
@@ -209,8 +203,8 @@ Result<Outcome> run(const ForwardOptions& options, Context& context) {
                 .collector = collector,
                 .options = options,
                 .context = context,
-                .notify = manager.notify,
-                .take_reload = supervision.take_reload})
+                .news = news,
+                .take_reload = context.supervision.take_reload})
       .run();
 }
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <cstdint>
-
+#include "spindle/base/hash.hpp"
+#include "spindle/base/percent.hpp"
 #include "spindle/base/utf8.hpp"
 
 namespace spindle::forward {
@@ -11,16 +11,6 @@ namespace {
 
 constexpr std::size_t longest_level = 200;
 constexpr std::size_t kept_of_long = 160;
-
-/// FNV-1a, 64 bit.
-std::uint64_t hash_of(std::string_view text) {
-  std::uint64_t hash = 0xCBF29CE484222325ULL;
-  for (const char c : text) {
-    hash ^= static_cast<unsigned char>(c);
-    hash *= 0x100000001B3ULL;
-  }
-  return hash;
-}
 
 bool is_plain(const CodePoint& point, bool is_first) {
   if (!point.well_formed) return false;
@@ -45,7 +35,7 @@ std::string level_of(std::string_view name) {
     if (is_plain(point, rest.size() == name.size())) {
       level += bytes;
     } else {
-      for (const char c : bytes) level += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+      for (const char c : bytes) level += percent_encoded(c);
     }
     rest.remove_prefix(point.length);
   }

@@ -4,6 +4,7 @@
 
 #include <string_view>
 
+#include "spindle/base/percent.hpp"
 #include "spindle/base/utf8.hpp"
 
 namespace spindle::forward {
@@ -20,9 +21,7 @@ std::string part(std::string_view text) {
     const bool is_plain =
         point.well_formed && !is_control && point.value != U'/' && point.value != U'%';
     if (is_plain) safe += bytes;
-    for (const char c : is_plain ? std::string_view() : bytes) {
-      safe += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-    }
+    for (const char c : is_plain ? std::string_view() : bytes) safe += percent_encoded(c);
     text.remove_prefix(point.length);
   }
   return safe;

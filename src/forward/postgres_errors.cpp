@@ -38,12 +38,14 @@ Said said_in_line(std::string_view line) {
   return {.text = std::string(line)};
 }
 
-/// One line of all that is not for the server's own developers.
+/// One line of all that is not for the server's own developers. What libpq itself asks or supposes
+/// stands on lines with a tab, and our own hint says it.
 Said said_in(const std::string& text) {
   Said all;
   for (const std::string_view line : split(text, '\n')) {
     const std::size_t begin = line.find_first_not_of(" \t");
     if (begin == std::string_view::npos || line.starts_with("LOCATION:")) continue;
+    if (line.starts_with('\t') && !all.text.empty()) continue;
     Said one = said_in_line(line.substr(begin));
     if (!one.state.empty()) all.state = one.state;
     all.text += (all.text.empty() ? "" : "; ") + one.text;

@@ -76,7 +76,7 @@ Result<void> Relay::work() {
 /// Returns without an error where it is done, or a signal came.
 Result<void> Relay::serve() {
   auto connected = connect();
-  if (!std::exchange(is_ready_, true)) notify("READY=1");
+  means_.news.ready();
   TRY(std::move(connected));
   states_.forget_told();
   while (!is_ended()) {
@@ -161,7 +161,7 @@ void Relay::fail(const Error& error) {
   if (text == told_) return;
   told_ = std::move(text);
   static_cast<void>(means_.context.renderer.error(named, wall()));
-  notify(fmt::format("STATUS={}", told_));
+  means_.news.status(told_);
 }
 
 void Relay::note_success(bool is_acknowledged) {
@@ -185,7 +185,8 @@ void Relay::wait(Duration time) {
 void Relay::look_around() {
   if (now() - looked_at_ < tell_every) return;
   looked_at_ = now();
-  notify("WATCHDOG=1");
+  means_.news.alive();
+  if (!told_.empty()) means_.news.status(told_);  // it may have come too soon behind another one
   if (means_.take_reload && means_.take_reload()) {
     means_.context.renderer.note(
         fmt::format("{}: a forwarder reads its settings when it starts; restart it to have others",
@@ -195,11 +196,12 @@ void Relay::look_around() {
   counted_at_ = now();
   write_metrics();
   if (!told_.empty()) return;
-  notify(fmt::format("STATUS={} delivered, {} waiting", *counters_.delivered, counters_.backlog));
+  means_.news.status(
+      fmt::format("{} delivered, {} waiting", *counters_.delivered, counters_.backlog));
 }
 
 void Relay::write_metrics() {
-  if (means_.options.metrics.empty() && !means_.notify) return;
+  if (means_.options.metrics.empty() && !means_.news.is_heard()) return;
   const auto backlog =
       means_.rows.reader().behind(outbox_ ? outbox_->positions() : means_.cursor.row().positions);
   if (!backlog) return;

@@ -5,12 +5,12 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "backoff.hpp"
 #include "outbox.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/commands/metrics.hpp"
+#include "spindle/commands/service_news.hpp"
 #include "spindle/forward/sink.hpp"
 #include "spindle/store/sinks.hpp"
 #include "tool_states.hpp"
@@ -31,8 +31,7 @@ class Relay {
     std::string collector;
     const commands::ForwardOptions& options;
     commands::Context& context;
-    /// A service manager is told a state, such as "READY=1"; may be empty.
-    std::function<void(std::string_view state)> notify = {};
+    commands::ServiceNews& news;
     /// Whether new settings were asked for since this was last asked; may be empty.
     std::function<bool()> take_reload = {};
   };
@@ -63,9 +62,6 @@ class Relay {
   Result<commands::Outcome> finish(const Result<void>& worked);
   [[nodiscard]] TimePoint now() const { return means_.context.clock.now(); }
   [[nodiscard]] WallTime wall() const { return means_.context.clock.wall(); }
-  void notify(std::string_view state) const {
-    if (means_.notify) means_.notify(state);
-  }
 
   Means means_;
   std::optional<store::Positions> end_ = std::nullopt;  ///< of Delivery::once
@@ -75,7 +71,6 @@ class Relay {
   commands::SinkMetrics counters_ = {};
   std::size_t unsaved_ = 0;   ///< acknowledged, and not said so in the store yet
   bool is_going_on_ = false;  ///< something was acknowledged, or nothing waited, since a failure
-  bool is_ready_ = false;
   std::string told_ = {};     ///< the failure that was told; empty: there is none
   std::string trouble_ = {};  ///< with the file of metrics, as was told
   TimePoint connected_at_ = {};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "spindle/base/hash.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/chart/escape.hpp"
 #include "spindle/chart/run_chart.hpp"
@@ -199,14 +200,7 @@ std::string names_text(const std::vector<std::string>& names) {
 
 }  // namespace
 
-std::string key_of(const std::string& name) {
-  // FNV-1a, 64 bits.
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : name) {
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  }
-  return fmt::format("t{:016x}", hash);
-}
+std::string key_of(const std::string& name) { return fmt::format("t{:016x}", hash_of(name)); }
 
 std::string card_html(const Station& station, const LinkView& link, const Moment& moment) {
   const std::string key = key_of(station.name);

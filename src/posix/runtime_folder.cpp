@@ -6,8 +6,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdlib>
+
+#include "spindle/base/hash.hpp"
 
 namespace spindle::posix {
 namespace {
@@ -31,13 +32,6 @@ bool is_own(const std::string& folder) { return owner_of(folder) == ::geteuid();
 std::string variable(const char* name) {
   const char* const value = std::getenv(name);
   return value == nullptr ? "" : value;
-}
-
-/// FNV-1a, 64 bits.
-std::uint64_t number_of(const std::string& text) {
-  std::uint64_t number = 0xCBF29CE484222325U;
-  for (const char c : text) number = (number ^ static_cast<unsigned char>(c)) * 0x100000001B3U;
-  return number;
 }
 
 }  // namespace
@@ -82,7 +76,7 @@ std::optional<std::string> socket_path(const std::string& folder, const std::str
   std::replace(name.begin(), name.end(), '/', '_');
   std::string path = in_folder(name);
   constexpr std::size_t longest = sizeof(sockaddr_un::sun_path) - 1;
-  if (path.size() > longest) path = in_folder(fmt::format("line-{:016x}", number_of(line)));
+  if (path.size() > longest) path = in_folder(fmt::format("line-{:016x}", hash_of(line)));
   if (path.size() > longest) return std::nullopt;
   return path;
 }

@@ -16,6 +16,7 @@
 #include <system_error>
 #include <utility>
 
+#include "spindle/base/percent.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::store {
@@ -71,10 +72,9 @@ Error served(const std::string& store, const std::string& sink,
 std::string file_name(const std::string& sink) {
   std::string name;
   for (const char c : sink) {
-    const auto byte = static_cast<unsigned char>(c);
     const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
                           (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
-    name += is_plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
+    name += is_plain ? std::string(1, c) : percent_encoded(c);
   }
   return name;
 }

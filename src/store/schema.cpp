@@ -8,6 +8,8 @@
 #include <optional>
 #include <string_view>
 
+#include "spindle/base/percent.hpp"
+
 namespace spindle::store {
 namespace {
 
@@ -182,7 +184,7 @@ std::string unchanging(const std::string& path) {
   for (const char c : path) {
     const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '/' ||
                           c == '.' || c == '-' || c == '_';
-    uri += is_plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    uri += is_plain ? std::string(1, c) : percent_encoded(c);
   }
   return uri + "?immutable=1";
 }

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "spindle/base/percent.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::work {
@@ -17,29 +18,14 @@ std::string written(std::string_view word) {
   std::string text;
   for (const char c : word) {
     const auto byte = static_cast<unsigned char>(c);
-    if (byte <= 0x20 || byte == 0x7F || c == '%') {
-      text += fmt::format("%{:02X}", byte);
-    } else {
-      text += c;
-    }
+    const bool is_plain = byte > 0x20 && byte != 0x7F && c != '%';
+    text += is_plain ? std::string(1, c) : percent_encoded(c);
   }
   return text;
 }
 
 std::optional<std::string> read(std::string_view text) {
-  std::string word;
-  if (text == "%") return word;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    if (text[at] != '%') {
-      word += text[at];
-      continue;
-    }
-    const auto byte = parse_unsigned(fmt::format("0x{}", text.substr(at + 1, 2)), 0xFF);
-    if (!byte || at + 2 >= text.size()) return std::nullopt;
-    word += static_cast<char>(*byte);
-    at += 2;
-  }
-  return word;
+  return text == "%" ? std::string() : percent_decoded(text);
 }
 
 std::string hex_of(const Registers& block) {

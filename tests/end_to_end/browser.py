@@ -22,6 +22,13 @@ FLAGS = (
     "--disable-dev-shm-usage", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 )  # fmt: skip
 PATIENCE = 5 * support.DEADLINE
+# What the browser says of a question that named a node or a context of a document that another one has followed.
+REPLACED = ("Could not find node", "No node with given id", "Cannot find context", "context was destroyed",
+            "navigated or closed")
+
+
+class Replaced(AssertionError):
+    """The document was replaced between two questions: ask again."""
 
 
 class Tab:
@@ -36,7 +43,7 @@ class Tab:
 
     def open(self, url):
         self.call("Page.navigate", url=url)
-        support.wait_until(lambda: self.run("document.readyState") == "complete", f"{url} is loaded", PATIENCE)
+        self.until("document.readyState === 'complete'", f"{url} is loaded")
 
     def run(self, expression):
         """The value of an expression of JavaScript."""
@@ -46,7 +53,25 @@ class Tab:
         return answer["result"].get("value")
 
     def until(self, expression, what):
-        return support.wait_until(lambda: self.run(f"!!({expression})"), what, PATIENCE)
+        return self._wait(lambda: self.run(f"!!({expression})"), what)
+
+    def html_with(self, part):
+        """The document as it stands, once that part is in it. Works where scripts do not run."""
+
+        def html():
+            root = self.call("DOM.getDocument", depth=-1)["root"]["nodeId"]
+            text = self.call("DOM.getOuterHTML", nodeId=root)["outerHTML"]
+            return part in text and text
+
+        return self._wait(html, f"{part} is in the page")
+
+    @staticmethod
+    def _wait(condition, what):
+        def in_one_document():
+            with contextlib.suppress(Replaced):
+                return condition()
+
+        return support.wait_until(in_one_document, what, PATIENCE)
 
     def text(self, selector="body"):
         return self.run(f"document.querySelector({json.dumps(selector)}).innerText")
@@ -138,7 +163,8 @@ class Browser:
 
         answer = support.wait_until(answered, f"the browser answers {method}", PATIENCE)
         if "error" in answer:
-            raise AssertionError(f"{method}: {answer['error']}")
+            is_replaced = any(words in answer["error"]["message"] for words in REPLACED)
+            raise (Replaced if is_replaced else AssertionError)(f"{method}: {answer['error']}")
         return answer["result"]
 
     def tab(self):

@@ -131,12 +131,15 @@ class EndingTest(MotorTest):
             os.set_blocking(writing, True)
             with support.Running(*arguments_of_start(bus.url, "--for", "500ms", "--json"), stdout=writing) as started:
                 os.close(writing)
-                support.wait_until(lambda: bus.has_started() and STOP in bus.commands(), "the motor is stopped")
+                is_stopped = lambda: bus.has_started() and STOP in bus.commands()  # noqa: E731
+                support.wait_until(lambda: is_stopped() or started.process.poll() is not None, "the motor is stopped")
+                was_stopped = is_stopped()
                 told = b""
                 while chunk := os.read(reading, 65536):
                     told += chunk
                 os.close(reading)
                 finished = started.finish()
+            self.assertTrue(was_stopped, finished)
             self.assertEqual(finished.status, 0, finished)
             self.assertIn(b'"result":"ran"', told)
             self.assert_stopped(bus, finished)

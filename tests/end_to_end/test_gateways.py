@@ -38,8 +38,9 @@ class GatewayTest(unittest.TestCase):
     def meter(self, link=""):
         (self.folder / "meter.yaml").write_text(METER % link, "utf-8")
 
-    def gateway(self, more="", keys="", **how):
-        """A gateway, and a tools file with its three units as the group `line`."""
+    def gateway(self, more="&timeout=9s", keys="", **how):
+        """A gateway, and a tools file with its three units as the group `line`. Only where a test is about silence
+        the time for an answer is short: a machine may be busy for a while."""
         gateway = self.enterContext(Gateway(**how))
         lines = [
             f'  {name}: {{url: "{gateway.url_of(unit, more)}", profile: meter.yaml{keys}}}\n'
@@ -148,7 +149,9 @@ class SharingTest(GatewayTest):
     def test_a_unit_that_is_not_there_is_an_error_of_its_own(self):
         for what in (SILENT, 0x0A, 0x0B):
             with self.subTest(what=what):
-                gateway = self.gateway(behave=lambda unit, _, what=what: what if unit == 2 else None, exclusive=True)
+                gateway = self.gateway(
+                    "", behave=lambda unit, _, what=what: what if unit == 2 else None, exclusive=True
+                )
                 finished = self.run_tool("get", "@line", "voltage", "--json")
                 self.check_values(finished.records("value"), ("one", "three"))
                 self.assertEqual([record["target"] for record in finished.records("error")], ["two"], finished)
@@ -221,7 +224,7 @@ class SharingTest(GatewayTest):
 
 class TransactionTest(GatewayTest):
     def test_without_the_key_the_error_names_it(self):
-        self.gateway(ids=lambda asked: 0)
+        self.gateway("", ids=lambda asked: 0)
         finished = self.run_tool("get", "one", "voltage")
         self.assertEqual(finished.status, 5, finished)
         self.assertIn("the answer has transaction id 0000 instead of", finished.stderr)
@@ -233,7 +236,7 @@ class TransactionTest(GatewayTest):
             for place in ("url", "tools", "profile"):
                 with self.subTest(ids=name, place=place):
                     self.meter(", transaction: ignored" if place == "profile" else "")
-                    more = "&transaction=ignored" if place == "url" else ""
+                    more = "&timeout=9s" + ("&transaction=ignored" if place == "url" else "")
                     keys = ", transaction: ignored" if place == "tools" else ""
                     gateway = self.gateway(more, keys, ids=ids)
                     finished = self.run_tool("get", "@line", "--json")

@@ -215,10 +215,7 @@ class ReadTest(Seen):
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
         tab.set_width(800)
         tab.call("Page.navigate", url=page.url + "/")
-        document = lambda: tab.call("DOM.getDocument", depth=-1)["root"]["nodeId"]  # noqa: E731
-        html = support.wait_until(
-            lambda: (text := tab.call("DOM.getOuterHTML", nodeId=document())["outerHTML"]) and "</footer>" in text and text,
-            "the page is loaded", PATIENCE)
+        html = tab.html_with("</footer>")
         self.assertRegex(html, r"Without JavaScript this page shows what was known at \d\d:\d\d:\d\d")
         self.assertRegex(html, r'<dt>NG</dt><dd>[1-9]')
         self.assertNotIn("/events", " ".join(tab.asked))

@@ -241,6 +241,7 @@ TEST_CASE("errors of a connection are told apart") {
     const Error error = connection_error(row.text);
     CHECK(error.status() == row.status);
     CHECK(error.message.find("LOCATION") == std::string::npos);
+    CHECK(error.message.find("Is the server running") == std::string::npos);
     CHECK(error.message.find('\n') == std::string::npos);
   }
   CHECK(connection_error(rows[4].text).message.find("28P01") == std::string::npos);

@@ -1,4 +1,4 @@
-#include "commands/service_news.hpp"
+#include "spindle/commands/service_news.hpp"
 
 #include <doctest/doctest.h>
 

@@ -179,7 +179,8 @@ class Watcher {
   TimePoint poll_due_ = {};
   TimePoint retry_at_ = {};
   TimePoint connected_at_ = {};
-  TimePoint seen_at_ = {};    ///< when the tool last said something
+  /// When the tool last said something; empty: it never did.
+  std::optional<TimePoint> seen_at_ = std::nullopt;
   unsigned attempts_ = 0;     ///< that came to nothing since there was a link
   unsigned short_lived_ = 0;  ///< attempts and links one after the other that did not last
   bool served_ = false;       ///< this link has kept the tool alive, or brought an event

@@ -6,6 +6,7 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/service_manager.hpp"
+#include "spindle/commands/context.hpp"
 
 namespace spindle::commands {
 
@@ -32,6 +33,8 @@ class ServiceNews {
   /// manager is asked to wait for an hour. No error: it goes on.
   void trouble(bool is_in_trouble);
 
+  /// Whether there is a manager.
+  [[nodiscard]] bool is_heard() const { return static_cast<bool>(manager_.notify); }
   /// How often alive() has to be called; empty: never.
   [[nodiscard]] std::optional<Duration> period() const;
 
@@ -47,5 +50,9 @@ class ServiceNews {
   std::optional<TimePoint> said_at_ = std::nullopt;
   std::optional<TimePoint> alive_at_ = std::nullopt;
 };
+
+/// For a command that runs on: what it tells its manager, if it has one. From now on SIGHUP ends
+/// nothing, but is a wish of which Supervision tells. The context must outlive it.
+ServiceNews begin_service(const Context& context);
 
 }  // namespace spindle::commands
