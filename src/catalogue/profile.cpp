@@ -62,6 +62,12 @@ std::optional<Parameter> find_numbered(const NumberedSpec& facts, std::string_vi
   return make_numbered(facts, static_cast<std::uint16_t>(*number));
 }
 
+/// The names that are near, or all of them.
+Remedy remedy_for_name(const Profile& profile, std::string_view name) {
+  if (all_digits(name)) return {std::string(name), fmt::format("@holding:{}", name)};
+  return remedy_for(name, names_of(profile.parameters), "spindle list TARGET");
+}
+
 /// "p900" deserves the numbers that exist rather than a similar name.
 std::string hint_for(const Profile& profile, std::string_view name) {
   if (profile.numbered && name.starts_with(profile.numbered->prefix) &&
@@ -206,8 +212,10 @@ Result<Parameter> find_any(const Profile& profile, std::string_view name) {
   if (auto bit = find_bit(profile, name)) {
     return std::move(*bit).map([&](Parameter part) { return profile.marked(std::move(part)); });
   }
-  return tl::unexpected(unknown(name, fmt::format("no such parameter in profile {}", profile.id),
-                                hint_for(profile, name)));
+  Error error = unknown(name, fmt::format("no such parameter in profile {}", profile.id),
+                        hint_for(profile, name));
+  error.remedy = remedy_for_name(profile, name);
+  return tl::unexpected(std::move(error));
 }
 
 void leave_out_unreadable(const Profile& profile, std::vector<Parameter>& parameters) {
@@ -235,8 +243,9 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
   if (found.empty() && profile.numbered) found = match_numbered(profile, name);
   if (purpose == Purpose::reading) leave_out_unreadable(profile, found);
   if (found.empty()) {
-    return tl::unexpected(
-        unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {}));
+    Error error = unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {});
+    error.remedy.right = "spindle list TARGET";
+    return tl::unexpected(std::move(error));
   }
   return found;
 }
@@ -466,8 +475,9 @@ Result<Action> Profile::find_action(std::string_view name) const {
   }
   std::string hint = suggestion(name, names_of(actions));
   if (hint.empty()) hint = "'spindle do TARGET' lists the actions";
-  return tl::unexpected(
-      unknown(name, fmt::format("no such action in profile {}", id), std::move(hint)));
+  Error error = unknown(name, fmt::format("no such action in profile {}", id), std::move(hint));
+  error.remedy = remedy_for(name, names_of(actions), "spindle do TARGET");
+  return tl::unexpected(std::move(error));
 }
 
 bool Profile::is_guarded_start(std::string_view action) const {

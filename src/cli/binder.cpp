@@ -13,6 +13,12 @@ Error usage(std::string message, std::string hint) {
   return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
 }
 
+Error for_help(std::string_view path, Error error) {
+  error.remedy.right = fmt::format("spindle {} --help", path);
+  error.hint = fmt::format("'{}' shows examples", error.remedy.right);
+  return error;
+}
+
 Error bad_option(std::string_view option, std::string message, std::string hint) {
   Error error = usage(std::move(message), std::move(hint));
   error.code = Errc::bad_value;
@@ -76,7 +82,9 @@ Error unknown_choice(std::string_view option, const std::string& text,
                      const std::vector<std::string>& words) {
   std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));
   if (const std::string meant = suggestion(text, words); !meant.empty()) hint += "; " + meant;
-  return bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint));
+  Error error = bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint));
+  error.remedy = remedy_for(text, words);
+  return error;
 }
 
 std::optional<Error> Faults::first() const {
@@ -91,8 +99,7 @@ std::optional<Error> Faults::first() const {
 }
 
 Error Binder::missing(std::string_view path, std::string_view argument) {
-  return usage(fmt::format("{}: {} is missing", path, argument),
-               fmt::format("'spindle {} --help' shows examples", path));
+  return for_help(path, usage(fmt::format("{}: {} is missing", path, argument)));
 }
 
 }  // namespace spindle::cli

@@ -19,6 +19,8 @@ namespace spindle::cli {
 
 /// The error of a command line that cannot be understood.
 Error usage(std::string message, std::string hint = {});
+/// The same with the advice to read the help of the command.
+Error for_help(std::string_view path, Error error);
 /// The error of an option whose value is not what it takes.
 Error bad_option(std::string_view option, std::string message, std::string hint);
 

@@ -12,6 +12,8 @@
 #include "binder.hpp"
 #include "help.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/commands/naming.hpp"
+#include "spindle/link/endpoint.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/work/connect.hpp"
 #include "version.hpp"
@@ -38,9 +40,11 @@ struct Words {
 /// is named, because most of a short run would else be the others'.
 enum class Extent : std::uint8_t { whole, as_named };
 
-struct WatchArguments {
-  commands::WatchOptions options;
-  std::vector<std::string> arguments;  ///< TARGET... [NAME|PATTERN...]
+/// The options of a command with its words, before it is known which of them are tools.
+template <typename Options>
+struct Worded {
+  Options options = {};
+  commands::TypedWords typed = {};
 };
 
 /// Registers as they are typed, before it is known whether all of it goes together.
@@ -59,6 +63,7 @@ struct DumpArguments {
   commands::DumpOptions options;
   RegisterArguments registers;
 };
+using WordedDump = Worded<DumpArguments>;
 
 struct ScanArguments {
   commands::ScanOptions options;
@@ -69,30 +74,31 @@ struct ScanArguments {
 
 /// The options of every command, where the parser writes them.
 struct AllOptions {
-  commands::IdentifyOptions identify;
+  Worded<commands::IdentifyOptions> identify;
   commands::ListOptions list;
-  commands::GetOptions get;
-  commands::SetOptions set;
-  commands::DoOptions perform;
-  commands::PingOptions ping;
+  Worded<commands::GetOptions> get;
+  Worded<commands::SetOptions> set;
+  Worded<commands::DoOptions> perform;
+  Worded<commands::PingOptions> ping;
   ScanArguments scan;
-  WatchArguments watch;
+  Worded<commands::WatchOptions> watch;
   commands::RecordOptions record;
   commands::ForwardOptions forward;
   commands::ServeOptions serve;
   commands::ReportOptions report;
-  commands::RemoteStartOptions remote_start;
-  commands::RemoteStopOptions remote_stop;
-  commands::AlarmsOptions alarms;
-  commands::BackupOptions backup;
-  DumpArguments dump;
+  Worded<commands::RemoteStartOptions> remote_start;
+  Worded<commands::RemoteStopOptions> remote_stop;
+  Worded<commands::AlarmsOptions> alarms;
+  Worded<commands::BackupOptions> backup;
+  WordedDump dump;
   commands::DiffOptions diff;
-  commands::RestoreOptions restore;
+  Worded<commands::RestoreOptions> restore;
   commands::SimulateOptions simulate;
   bool check_tools = false;
   commands::ResultsOptions results;
   commands::LogOptions log;
   commands::UndoOptions undo;
+  commands::UseOptions use;
   commands::StoreOptions store;
   commands::StoreOptions store_check;
   commands::TrimOptions store_trim;
@@ -124,6 +130,9 @@ struct ParseState {
   const CLI::App* chosen = nullptr;
   /// Instead of what the command's words say.
   std::optional<Invocation::ToolsFile> tools_file = std::nullopt;
+  std::vector<std::string> behind_dashes = {};  ///< words that name no tool
+  bool takes_behind = false;                    ///< the command takes them so
+  bool takes_default = false;                   ///< tools may be meant that no word names
   std::string only_as_text = {};  ///< why neither JSON nor CSV can be had; empty: they can
 };
 
@@ -235,20 +244,119 @@ void add_command(CLI::App& parent, ParseState& draft, const Words& words, Option
 
 constexpr std::string_view target_words = "tool name, @group or URL";
 
+/// The words of a command, whichever they are.
+template <typename Options>
+void bind_words(Binder& bind, ParseState& draft, Worded<Options>& worded,
+                std::string_view meaning) {
+  draft.takes_default = true;
+  draft.takes_behind = true;
+  bind.argument("TARGET", worded.typed.words, meaning);
+  bind.check([&draft, &worded]() -> std::optional<Error> {
+    const auto& behind = draft.behind_dashes;
+    worded.typed.words.insert(worded.typed.words.end(), behind.begin(), behind.end());
+    worded.typed.behind_dashes = behind.size();
+    return std::nullopt;
+  });
+}
+
+// take() gives the options of a command what of its words is a tool, and what is not.
+
+Result<void> take(commands::SortedWords words, commands::GetOptions& options) {
+  options.targets = std::move(words.targets);
+  options.names = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::WatchOptions& options) {
+  options.targets = std::move(words.targets);
+  options.names = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::DoOptions& options) {
+  options.targets = std::move(words.targets);
+  options.actions = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::SetOptions& options) {
+  options.targets = std::move(words.targets);
+  options.assignments = std::move(words.others);
+  const bool is_empty = options.assignments.empty() && options.file.empty();
+  return is_empty ? tl::unexpected(Binder::missing("set", "NAME=VALUE")) : Result<void>();
+}
+
+/// Beside --dir there is no FILE, and all words are names.
+Result<void> take(commands::SortedWords words, commands::RestoreOptions& options) {
+  options.targets = std::move(words.targets);
+  options.patterns = std::move(words.others);
+  if (!options.folder.empty()) return {};
+  if (options.patterns.empty()) return tl::unexpected(Binder::missing("restore", "FILE"));
+  options.file = std::move(options.patterns.front());
+  options.patterns.erase(options.patterns.begin());
+  return {};
+}
+
+Error one_too_many(std::string_view command, std::string_view word) {
+  return for_help(command, usage(fmt::format("{}: '{}' is one argument too many", command, word)));
+}
+
+Result<void> take(commands::SortedWords words, DumpArguments& dump) {
+  if (words.others.empty()) return tl::unexpected(Binder::missing("dump", "FILE"));
+  if (words.targets.size() > 1) return tl::unexpected(one_too_many("dump", words.targets[1]));
+  if (words.others.size() > 1) return tl::unexpected(one_too_many("dump", words.others[1]));
+  dump.options.target = std::move(words.targets.front());
+  dump.options.file = std::move(words.others.front());
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::RemoteStartOptions& options) {
+  if (words.targets.size() > 1) {
+    return tl::unexpected(one_too_many("remote-start", words.targets[1]));
+  }
+  options.target = std::move(words.targets.front());
+  return {};
+}
+
+/// Of commands whose words are all tools.
+template <typename Options>
+requires requires(Options options) { options.targets; }
+Result<void> take(commands::SortedWords words, Options& options) {
+  options.targets = std::move(words.targets);
+  return {};
+}
+
+/// Runs a command once its words are told apart.
+template <typename Options, typename RunCommand>
+auto with_words(std::string_view command, commands::OtherWords kind, RunCommand run) {
+  return [=](const Worded<Options>& worded, Context& context) -> Result<Outcome> {
+    TRY_LET(auto words, commands::sort_words(worded.typed, kind, command, context));
+    Options options = worded.options;
+    TRY(take(std::move(words), options));
+    return run(options, context).map_error([&](Error error) {
+      error = commands::or_misspelt_tool(std::move(error), context);
+      if (error.asked_of.empty()) error.asked_of = asked_of(options);
+      return error;
+    });
+  };
+}
+
 void bind_jobs(Binder& bind, std::size_t& jobs) {
   bind.option("--jobs", "N", jobs, NumberFrom{1, 10'000}, "how many tools at a time (default 64)");
 }
 
 void add_identify(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"identify", "TARGET...",
+  constexpr Words words = {"identify", "[TARGET...]",
                            "who is there: maker, model, serial, firmware, profile",
                            "spindle identify sim:doga-bm\n"
                            "spindle identify tcp://192.168.10.23:5000\n"
                            "spindle identify station3 station4 --json"};
-  add_command(app, draft, words, draft.options.identify, commands::identify,
-              [](Binder& bind, commands::IdentifyOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
-                bind_jobs(bind, options.jobs);
+  add_command(app, draft, words, draft.options.identify,
+              with_words<commands::IdentifyOptions>("identify", commands::OtherWords::none,
+                                                    commands::identify),
+              [&draft](Binder& bind, Worded<commands::IdentifyOptions>& worded) {
+                bind_words(bind, draft, worded, target_words);
+                bind_jobs(bind, worded.options.jobs);
               });
 }
 
@@ -259,7 +367,8 @@ void add_list(CLI::App& app, ParseState& draft) {
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
   add_command(app, draft, words, draft.options.list, commands::list,
-              [](Binder& bind, commands::ListOptions& options) {
+              [&draft](Binder& bind, commands::ListOptions& options) {
+                draft.takes_default = true;
                 bind.argument("PATTERN", options.arguments,
                               "names or patterns; a tool name or URL may stand before them");
               });
@@ -267,17 +376,18 @@ void add_list(CLI::App& app, ParseState& draft) {
 
 void add_get(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
-      "get", "TARGET [NAME|PATTERN...]",
-      "read parameters by name, pattern, number (p242) or raw register "
-      "(@holding:2, @holding:4/f32, @coil:5), counted from 0",
+      "get", "[TARGET...] [NAME|PATTERN...]",
+      "read parameters by name, pattern, number (p242) or raw register (@holding:2)",
       "spindle get sim:doga-bm 'preset.1.*torque*'\n"
       "spindle get station3 status.ready status.alarm\n"
       "spindle get @line1 'preset.1.*' --json\n"
       "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:0..31"};
-  add_command(app, draft, words, draft.options.get, commands::get,
-              [](Binder& bind, commands::GetOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
+  add_command(app, draft, words, draft.options.get,
+              with_words<commands::GetOptions>("get", commands::OtherWords::names, commands::get),
+              [&draft](Binder& bind, Worded<commands::GetOptions>& worded) {
+                commands::GetOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "tools, and names, patterns, numbers or raw registers");
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
                 bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
@@ -293,44 +403,49 @@ constexpr std::string_view broadcast_words =
     "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
 
 void add_set(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"set", "TARGET NAME=VALUE...",
+  constexpr Words words = {"set", "[TARGET...] NAME=VALUE...",
                            "check everything, show old and new, write only what differs, read back",
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
                            "spindle set station3 preset.1.mode=TC/AM preset.1.speed=900\n"
                            "spindle set station3 preset.2.target-torque=3.10 --dry-run\n"
                            "spindle set @line1 preset.1.target-torque=2.80\n"
                            "spindle set sim:orientalmotor-blv operation.2.speed=1200"};
-  add_command(app, draft, words, draft.options.set, commands::set,
-              [](Binder& bind, commands::SetOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.required("NAME=VALUE", options.assignments,
-                              "what to write; a number may have its unit behind it: 1.5kW");
-                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
-                          "check and show everything, write nothing");
-                bind.flag("--save", options.storing, commands::Storing::yes, save_words);
-                bind.flag("--raw", options.raw, commands::RawWrites::ask,
-                          "also registers such as @holding:4 that no profile says can be written");
-                bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
-                          broadcast_words);
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.set,
+      with_words<commands::SetOptions>("set", commands::OtherWords::assignments, commands::set),
+      [&draft](Binder& bind, Worded<commands::SetOptions>& worded) {
+        commands::SetOptions& options = worded.options;
+        bind_words(bind, draft, worded,
+                   "tools, and NAME=VALUE (also 1.5kW, +5%), NAME+=STEP, NAME-=STEP");
+        bind.option("-f,--file", "FILE", options.file,
+                    "lines of NAME=VALUE, # begins a comment; - is standard input");
+        bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                  "check and show everything, write nothing");
+        bind.flag("--save", options.storing, commands::Storing::yes, save_words);
+        bind.flag("--raw", options.raw, commands::RawWrites::ask,
+                  "also registers such as @holding:4 that no profile says can be written");
+        bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
+                  broadcast_words);
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 constexpr std::string_view accept_unverified_words =
     "send what may move or lock the tool although its register is not certain";
 
 void add_do(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"do", "TARGET [ACTION[=VALUE]...]",
+  constexpr Words words = {"do", "[TARGET...] [ACTION[=VALUE]...]",
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
                            "spindle do station3 alarm-reset\n"
                            "spindle do @line1 lock=unlocked"};
-  add_command(app, draft, words, draft.options.perform, commands::perform,
-              [](Binder& bind, commands::DoOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.argument("ACTION", options.actions,
-                              "actions, with =VALUE where they take one");
+  add_command(app, draft, words, draft.options.perform,
+              with_words<commands::DoOptions>("do", commands::OtherWords::names, commands::perform),
+              [&draft](Binder& bind, Worded<commands::DoOptions>& worded) {
+                commands::DoOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "tools, and actions, with =VALUE where they take one");
                 bind.flag("--accept-unverified", options.acceptance,
                           commands::Acceptance::unverified, accept_unverified_words);
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
@@ -340,15 +455,17 @@ void add_do(CLI::App& app, ParseState& draft) {
 }
 
 void add_ping(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"ping", "TARGET [-c N]",
+  constexpr Words words = {"ping", "[TARGET...] [-c N]",
                            "round-trip statistics without touching any value",
                            "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
                            "spindle ping station3\n"
                            "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
-  add_command(app, draft, words, draft.options.ping, commands::ping,
-              [](Binder& bind, commands::PingOptions& options) {
-                bind.required("TARGET", options.target, target_words);
+  add_command(app, draft, words, draft.options.ping,
+              with_words<commands::PingOptions>("ping", commands::OtherWords::none, commands::ping),
+              [&draft](Binder& bind, Worded<commands::PingOptions>& worded) {
+                commands::PingOptions& options = worded.options;
+                bind_words(bind, draft, worded, target_words);
                 bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000},
                             "how many requests (default 4)");
                 bind.option("--interval", "DURATION", options.interval, to_duration,
@@ -449,20 +566,7 @@ void bind_gateway(Binder& bind, std::string& listen, link::Rights& rights,
             "let what other programs write through --listen pass");
 }
 
-/// The first argument is a target, and so is every one behind it that can be nothing else.
-Result<Outcome> run_watch(const WatchArguments& watch, Context& context) {
-  commands::WatchOptions options = watch.options;
-  for (const std::string& argument : watch.arguments) {
-    const bool is_target = options.targets.empty() ||
-                           (options.names.empty() && commands::is_target(argument, context));
-    (is_target ? options.targets : options.names).push_back(argument);
-  }
-  return commands::watch(options, context);
-}
-
-void bind_watch(Binder& bind, WatchArguments& watch) {
-  commands::WatchOptions& options = watch.options;
-  bind.required("TARGET", watch.arguments, "tools, then names or patterns of values to poll");
+void bind_watch(Binder& bind, commands::WatchOptions& options) {
   bind.option("--interval", "DURATION", options.interval, to_duration,
               "time between two polls (default 200ms)");
   // --all wins over --initial.
@@ -492,12 +596,18 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
 }
 
 void add_watch(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"watch", "TARGET... [NAME|PATTERN...]",
+  constexpr Words words = {"watch", "[TARGET...] [NAME|PATTERN...]",
                            "events as they happen and changes of polled values, until stopped",
                            "spindle watch station3\n"
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
-  add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
+  add_command(
+      app, draft, words, draft.options.watch,
+      with_words<commands::WatchOptions>("watch", commands::OtherWords::names, commands::watch),
+      [&draft](Binder& bind, Worded<commands::WatchOptions>& worded) {
+        bind_words(bind, draft, worded, "tools, and names or patterns of values to poll");
+        bind_watch(bind, worded.options);
+      });
 }
 
 std::string record_words() {
@@ -726,7 +836,6 @@ constexpr auto stop_modes = enum_table<catalogue::StopMode>(
     {{"decelerate", catalogue::StopMode::decelerate}, {"instant", catalogue::StopMode::instant}});
 
 void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
-  bind.required("TARGET", options.target, "tool name or URL");
   bind.option("--for", "DURATION", options.limit, to_duration, "stop after this time");
   bind.option("--preset", "N", options.preset, "select this preset first")->group(of_start_action);
   bind.option("--direction", "D", options.direction, "select this direction first")
@@ -755,19 +864,24 @@ void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
 
 void add_remote_start(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
-      "remote-start", "TARGET [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
+      "remote-start", "[TARGET] [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
       "spindle remote-start station3 --preset 2\n"
       "spindle remote-start station3 --for 2s --yes --json\n"
       "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
       "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
-  add_command(app, draft, words, draft.options.remote_start, commands::remote_start,
-              bind_remote_start);
+  add_command(app, draft, words, draft.options.remote_start,
+              with_words<commands::RemoteStartOptions>("remote-start", commands::OtherWords::none,
+                                                       commands::remote_start),
+              [&draft](Binder& bind, Worded<commands::RemoteStartOptions>& worded) {
+                bind_words(bind, draft, worded, "tool name or URL");
+                bind_remote_start(bind, worded.options);
+              });
 }
 
 void add_remote_stop(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"remote-stop",
-                           "TARGET...",
+                           "[TARGET...]",
                            "stop now; never asks",
                            "spindle remote-stop station3\n"
                            "spindle remote-stop @line1\n"
@@ -775,9 +889,12 @@ void add_remote_stop(CLI::App& app, ParseState& draft) {
                            "orientalmotor-blv --broadcast",
                            nullptr,
                            Invocation::ToolsFile::salvaged};
-  add_command(app, draft, words, draft.options.remote_stop, commands::remote_stop,
-              [](Binder& bind, commands::RemoteStopOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
+  add_command(app, draft, words, draft.options.remote_stop,
+              with_words<commands::RemoteStopOptions>("remote-stop", commands::OtherWords::none,
+                                                      commands::remote_stop),
+              [&draft](Binder& bind, Worded<commands::RemoteStopOptions>& worded) {
+                commands::RemoteStopOptions& options = worded.options;
+                bind_words(bind, draft, worded, target_words);
                 bind.option("--stop", "HOW", options.stop, one_of(stop_modes),
                             "how a motor stops: decelerate (default) or instant");
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
@@ -786,24 +903,27 @@ void add_remote_stop(CLI::App& app, ParseState& draft) {
 }
 
 void add_alarms(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"alarms", "TARGET [--reset]",
+  constexpr Words words = {"alarms", "[TARGET...] [--reset]",
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
                            "spindle alarms @line1\n"
                            "spindle alarms station3 --reset"};
-  add_command(app, draft, words, draft.options.alarms, commands::alarms,
-              [](Binder& bind, commands::AlarmsOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.flag("--reset", options.reset, commands::AlarmReset::yes,
-                          "also reset the present alarm");
-                bind.flag("--accept-unverified", options.acceptance,
-                          commands::Acceptance::unverified, accept_unverified_words);
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.alarms,
+      with_words<commands::AlarmsOptions>("alarms", commands::OtherWords::none, commands::alarms),
+      [&draft](Binder& bind, Worded<commands::AlarmsOptions>& worded) {
+        commands::AlarmsOptions& options = worded.options;
+        bind_words(bind, draft, worded, target_words);
+        bind.flag("--reset", options.reset, commands::AlarmReset::yes,
+                  "also reset the present alarm");
+        bind.flag("--accept-unverified", options.acceptance, commands::Acceptance::unverified,
+                  accept_unverified_words);
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 void add_backup(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
+  constexpr Words words = {"backup", "[TARGET...] [-f FILE|-] [--dir FOLDER]",
                            "every stored parameter into a file that people can read and git can "
                            "compare",
                            "spindle backup station3\n"
@@ -812,21 +932,23 @@ void add_backup(CLI::App& app, ParseState& draft) {
   const auto note_file = [&draft](const std::string& file) {
     if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
   };
-  add_command(app, draft, words, draft.options.backup, commands::backup,
-              [note_file](Binder& bind, commands::BackupOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
-                bind.option("-f,--file", "FILE", options.file,
-                            "where to (default TARGET.yaml in the present folder); - is standard "
-                            "output")
-                    ->each(note_file);
-                bind.option("--dir", "FOLDER", options.folder,
-                            "one file TARGET.yaml a tool in this folder");
-                bind.flag("--force", options.overwrite, Overwrite::allow,
-                          "replace files that are there");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "also what the profile marks as secret");
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.backup,
+      with_words<commands::BackupOptions>("backup", commands::OtherWords::none, commands::backup),
+      [&draft, note_file](Binder& bind, Worded<commands::BackupOptions>& worded) {
+        commands::BackupOptions& options = worded.options;
+        bind_words(bind, draft, worded, target_words);
+        bind.option("-f,--file", "FILE", options.file,
+                    "where to (default TARGET.yaml in the present folder); - is standard "
+                    "output")
+            ->each(note_file);
+        bind.option("--dir", "FOLDER", options.folder,
+                    "one file TARGET.yaml a tool in this folder");
+        bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
+        bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                  "also what the profile marks as secret");
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 /// Beside --dir no second side and no FILE is named, so what stands there is the first NAME. Else
@@ -842,7 +964,7 @@ std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
 }
 
 void add_dump(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"dump", "TARGET FILE [--registers 0..999]",
+  constexpr Words words = {"dump", "[TARGET] FILE [--registers 0..999]",
                            "raw registers into a file that diff can compare",
                            "spindle dump station3 monday.yaml\n"
                            "spindle dump tcp://192.168.10.40 unknown.yaml --registers 0..999\n"
@@ -856,24 +978,25 @@ void add_dump(CLI::App& app, ParseState& draft) {
     options.table = arguments.registers.table;
     return commands::dump(options, context);
   };
-  add_command(app, draft, words, draft.options.dump, run,
-              [note_file](Binder& bind, DumpArguments& arguments) {
-                commands::DumpOptions& options = arguments.options;
-                bind.required("TARGET", options.target, "tool name or URL");
-                bind.required("FILE", options.file, "where to; - is standard output");
-                bind.check([&options, note_file]() -> std::optional<Error> {
-                  note_file(options.file);
-                  return std::nullopt;
-                });
-                bind_registers(bind, arguments.registers,
-                               "which (default: all that the profile knows, of every table)");
-                bind.option("--pause", "DURATION", options.pause, to_duration,
-                            "between two requests (default 20ms)");
-                bind.flag("--force", options.overwrite, Overwrite::allow,
-                          "replace a file that is there");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "also what the profile marks as secret");
-              });
+  add_command(
+      app, draft, words, draft.options.dump,
+      with_words<DumpArguments>("dump", commands::OtherWords::names, run),
+      [&draft, note_file](Binder& bind, WordedDump& worded) {
+        DumpArguments& arguments = worded.options;
+        commands::DumpOptions& options = arguments.options;
+        bind_words(bind, draft, worded, "the tool, and FILE: where to; - is standard output");
+        bind.check([&worded, note_file]() -> std::optional<Error> {
+          if (!worded.typed.words.empty()) note_file(worded.typed.words.back());
+          return std::nullopt;
+        });
+        bind_registers(bind, arguments.registers,
+                       "which (default: all that the profile knows, of every table)");
+        bind.option("--pause", "DURATION", options.pause, to_duration,
+                    "between two requests (default 20ms)");
+        bind.flag("--force", options.overwrite, Overwrite::allow, "replace a file that is there");
+        bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                  "also what the profile marks as secret");
+      });
 }
 
 void add_diff(CLI::App& app, ParseState& draft) {
@@ -905,17 +1028,20 @@ void add_diff(CLI::App& app, ParseState& draft) {
 }
 
 void add_restore(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"restore", "TARGET {FILE|--dir FOLDER} [NAME|PATTERN...]",
+  constexpr Words words = {"restore", "[TARGET...] {FILE|--dir FOLDER} [NAME|PATTERN...]",
                            "plan, confirm, write what differs, verify; put back if it fails",
                            "spindle restore station3 station3.yaml --dry-run\n"
                            "spindle restore station3 station3.yaml 'preset.1.*'\n"
                            "spindle restore station3 old-tool.yaml --yes --json\n"
                            "spindle restore @line1 --dir backups"};
-  add_command(app, draft, words, draft.options.restore, commands::restore,
-              [](Binder& bind, commands::RestoreOptions& options) {
-                bind.required("TARGET", options.target, "tool name or URL; with --dir also @group");
-                bind.argument("FILE", options.file, "backup file");
-                bind.argument("NAME", options.patterns, "restore only these");
+  add_command(app, draft, words, draft.options.restore,
+              with_words<commands::RestoreOptions>("restore", commands::OtherWords::names,
+                                                   commands::restore),
+              [&draft](Binder& bind, Worded<commands::RestoreOptions>& worded) {
+                commands::RestoreOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "the tool (with --dir tools and @groups), the backup FILE, and names or "
+                           "patterns: restore only these");
                 bind.option("--dir", "FOLDER", options.folder,
                             "restore each tool from its own backup in this folder, as backup "
                             "--dir writes it");
@@ -927,10 +1053,6 @@ void add_restore(CLI::App& app, ParseState& draft) {
                           "leave what was written when something fails");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);
                 bind_jobs(bind, options.jobs);
-                bind.check([&options] {
-                  return make_name_of("FILE", options.file, options.folder, options.patterns,
-                                      "restore");
-                });
               });
 }
 
@@ -1281,11 +1403,36 @@ void add_undo(CLI::App& app, ParseState& draft) {
                            "spindle undo\n"
                            "spindle undo 3f2a91c0 --dry-run"};
   add_command(app, draft, words, draft.options.undo, commands::undo,
-              [](Binder& bind, commands::UndoOptions& options) {
+              [&draft](Binder& bind, commands::UndoOptions& options) {
+                draft.takes_default = true;  // the record names tools
                 bind.argument("ID", options.id,
                               "of a change or a command, from 'spindle log' (default: the last)");
                 bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
                           "check and show everything, write nothing");
+              });
+}
+
+void add_use(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"use", "[TARGET|-]", "the tool that is meant where none is named",
+                           "spindle use station3\n"
+                           "spindle use\n"
+                           "spindle use -"};
+  add_command(app, draft, words, draft.options.use, commands::use,
+              [](Binder& bind, commands::UseOptions& options) {
+                bind.argument("TARGET", options.target,
+                              "tool name, @group or URL; - forgets it; none: show it");
+                bind.flag("--clear", options.forget, commands::Forgetting::yes, "forget it");
+                bind.check([&options]() -> std::optional<Error> {
+                  if (options.target == "-") {
+                    options.target.clear();
+                    options.forget = commands::Forgetting::yes;
+                  }
+                  const bool is_both =
+                      !options.target.empty() && options.forget == commands::Forgetting::yes;
+                  if (!is_both) return std::nullopt;
+                  return usage("use: --clear forgets the default, and a TARGET makes one",
+                               "leave one of them out");
+                });
               });
 }
 
@@ -1326,7 +1473,7 @@ void build(CLI::App& app, ParseState& draft) {
         add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
         add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
         add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools,
-        add_log,          add_undo,        add_help,   add_version}) {
+        add_log,          add_undo,        add_use,    add_help,     add_version}) {
     add(app, draft);
   }
 }
@@ -1352,24 +1499,27 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
 Error unknown_command(const std::string& name, const std::vector<std::string>& known) {
   std::string hint = suggestion(name, known);
   if (hint.empty()) hint = "'spindle --help' lists all commands";
-  return usage(fmt::format("unknown command '{}'", name), std::move(hint));
+  Error error = usage(fmt::format("unknown command '{}'", name), std::move(hint));
+  error.remedy = remedy_for(name, known, "spindle --help");
+  return error;
 }
 
 Error unexpected_argument(const CLI::App& app, const ParseState& draft, const std::string& extra) {
   const std::string command = draft.chosen == nullptr ? "" : path_of(draft.chosen);
   if (extra.size() > 1 && extra.front() == '-') {
     const std::string name = extra.substr(0, extra.find('='));
-    std::string hint = suggestion(name, option_names(app, draft.chosen));
-    if (hint.empty())
-      hint =
-          fmt::format("'spindle {}--help' lists all options", command.empty() ? "" : command + " ");
-    return usage(fmt::format("unknown option '{}'", name), hint);
+    const auto known = option_names(app, draft.chosen);
+    const std::string help = fmt::format("spindle {}--help", command.empty() ? "" : command + " ");
+    std::string hint = suggestion(name, known);
+    if (hint.empty()) hint = fmt::format("'{}' lists all options", help);
+    Error error = usage(fmt::format("unknown option '{}'", name), std::move(hint));
+    error.remedy = remedy_for(name, known, help);
+    return error;
   }
   if (draft.chosen == nullptr || !draft.chosen->get_subcommands({}).empty()) {
     return unknown_command(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
   }
-  return usage(fmt::format("{}: '{}' is one argument too many", command, extra),
-               fmt::format("'spindle {} --help' shows examples", command));
+  return for_help(command, usage(fmt::format("{}: '{}' is one argument too many", command, extra)));
 }
 
 Error empty_value(const std::string& option) {
@@ -1492,6 +1642,27 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   return !takes_words || (use == Invocation::ToolsFile::all_tools && !has_words);
 }
 
+/// Whether the first word is a URL that is no name: then the tools file only tells whether others
+/// are tools, too, and its faults keep no command from what it is asked for.
+bool begins_with_url(const CLI::App& command) {
+  for (const CLI::Option* known : command.get_options()) {
+    const auto& words = known->results();
+    if (!known->get_positional() || words.empty()) continue;
+    return link::looks_like_url(words.front()) && !files::may_name_tools(words.front());
+  }
+  return false;
+}
+
+/// What of the tools file is read for the words of this command.
+Invocation::ToolsFile tools_use_for(const CLI::App& command, const ParseState& draft,
+                                    Invocation::ToolsFile use) {
+  using ToolsFile = Invocation::ToolsFile;
+  const bool may_be_default = draft.takes_default && !begins_with_url(command);
+  if (!may_be_default && !names_tools(command, use)) return ToolsFile::only_found;
+  const bool is_by_url = use == ToolsFile::loaded && draft.takes_default && !may_be_default;
+  return is_by_url ? ToolsFile::salvaged : use;
+}
+
 Invocation telling(std::string text) {
   Invocation help;
   help.text = std::move(text);
@@ -1526,7 +1697,9 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   }
   if (is_chosen(draft, help_command)) return help_of(app, draft).map(telling);
   if (draft.chosen == nullptr) {
-    return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
+    Error error = usage("no command is given", "'spindle --help' lists all commands");
+    error.remedy.right = "spindle --help";
+    return tl::unexpected(std::move(error));
   }
   invocation.user.format = invocation.format;
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
@@ -1534,8 +1707,8 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   // for it.
   const bool told = !invocation.common.tools_file.empty() &&
                     invocation.tools_use != Invocation::ToolsFile::salvaged;
-  if (!told && !names_tools(*draft.chosen, invocation.tools_use)) {
-    invocation.tools_use = Invocation::ToolsFile::only_found;
+  if (!told) {
+    invocation.tools_use = tools_use_for(*draft.chosen, draft, invocation.tools_use);
   }
   return std::move(invocation);
 }
@@ -1548,11 +1721,8 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
 }
 
 /// Where `named` is there, only commands that it names are known; help is of all of them.
-Result<Invocation> parse_with(const std::vector<std::string>* named,
-                              const std::vector<std::string>& arguments) {
+Result<Invocation> parse_words(ParseState& draft, const std::vector<std::string>& arguments) {
   CLI::App app;
-  ParseState draft;
-  draft.named = named;
   build(app, draft);
   try {
     auto words = with_one_output_option(arguments);
@@ -1562,8 +1732,23 @@ Result<Invocation> parse_with(const std::vector<std::string>* named,
     return tl::unexpected(parser_error(arguments, error));
   }
   const bool tells = draft.help || is_chosen(draft, help_command);
-  if (tells && named != nullptr) return tl::unexpected(usage("help needs all commands"));
+  if (tells && draft.named != nullptr) return tl::unexpected(usage("help needs all commands"));
   return invocation_of(app, draft);
+}
+
+Result<Invocation> parse_with(const std::vector<std::string>* named,
+                              const std::vector<std::string>& arguments) {
+  const auto dashes = std::find(arguments.begin(), arguments.end(), end_of_options);
+  if (dashes != arguments.end()) {
+    ParseState draft;
+    draft.named = named;
+    draft.behind_dashes.assign(dashes + 1, arguments.end());
+    auto invocation = parse_words(draft, {arguments.begin(), dashes});
+    if (draft.takes_behind) return invocation;
+  }
+  ParseState draft;
+  draft.named = named;
+  return parse_words(draft, arguments);
 }
 
 }  // namespace

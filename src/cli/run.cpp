@@ -130,7 +130,8 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                              .tools = tools,
                              .show_frames = show_frames,
                              .common = invocation.common,
-                             .make_doors = world.make_doors},
+                             .make_doors = world.make_doors,
+                             .target_variable = variable(world, "SPINDLE_TARGET")},
                             {.io = world.io,
                              .serve = world.serve,
                              .end_waits = world.end_waits,
@@ -189,6 +190,7 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   if (!arguments.empty() && arguments.front() == completion_command) {
     return run_completion({arguments.begin() + 1, arguments.end()}, world);
   }
+  world.io.typed = arguments;
   auto invocation = parse(arguments);
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
   const report::Verbosity verbosity =

@@ -130,7 +130,7 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
 }
 
 Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {
-  TRY_LET(auto targets, resolve_one_or_group(options.a, Addressing::unicast, context));
+  TRY_LET(auto targets, resolve_one_or_group({options.a}, Addressing::unicast, context));
   TRY_LET(auto paths, check_names_only(options.patterns, context).and_then([&] {
     return paths_in_folder(targets.tools, options.folder);
   }));

@@ -29,7 +29,10 @@ Result<void> check_guard(const ActionRequest& request, const Profile& profile) {
       .hint = profile.is_guarded_start(request.action.name)
                   ? "'spindle remote-start' starts it under a guard that always ends in a stop"
                   : "",
-      .name = request.action.name});
+      .name = request.action.name,
+      .remedy = {.right = profile.is_guarded_start(request.action.name)
+                              ? "spindle remote-start TARGET"
+                              : ""}});
 }
 
 Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const Profile& profile,
@@ -96,6 +99,11 @@ class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
 
   [[nodiscard]] bool changes_tools() const override { return true; }
 
+  [[nodiscard]] std::string_view otherwise(const std::string& word,
+                                           const Profile& profile) const override {
+    return profile.find_action(word) ? "an action" : "";
+  }
+
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
     return check_deeds(*options_, profile, target);
   }
@@ -117,7 +125,8 @@ class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
       }
       outcome.succeed();
     }
-    return finish(listing, outcome, summary_of(outcome, tool.target.addressing, tool.target.shown),
+    return finish(listing, outcome,
+                  with_change(summary_of(outcome, tool.target.addressing, tool.target.shown), log),
                   context);
   }
 
@@ -159,7 +168,7 @@ Result<Outcome> list_all_actions(const Targets& targets, const DoOptions& option
 }  // namespace
 
 Result<Outcome> perform(const DoOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, options.addressing, context)
+  return resolve_one_or_group(options.targets, options.addressing, context)
       .and_then([&](const Targets& targets) {
         if (options.actions.empty()) return list_all_actions(targets, options, context);
         return run_verb(Do(options, targets.is_group), targets, options.jobs, context);

@@ -19,9 +19,13 @@
 /// waiting.
 namespace spindle::commands {
 
-/// What one name, @group or URL means; a broadcast has one target, which is everybody.
-Result<Targets> resolve_one_or_group(const std::string& text, Addressing addressing,
+/// What names, @groups and URLs mean; a broadcast has one target, which is everybody. The default
+/// target counts as a group of one: its name is told, and what changes it is asked about.
+Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addressing addressing,
                                      const Context& context);
+
+/// Error `usage` where a word that was taken for a tool may also mean something else.
+Error doubtful(const std::string& word, std::string_view what, const Context& context);
 
 /// The same targets, whose connections are opened once more where the tools close them.
 Targets reopening(Targets targets);

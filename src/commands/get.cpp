@@ -3,6 +3,7 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/commands/commands.hpp"
 
 namespace spindle::commands {
@@ -40,7 +41,13 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
   [[nodiscard]] Fit fit() const override { return Fit::one; }
 
   Result<Plan> plan(const catalogue::Profile& profile, const Target& /*target*/) const override {
-    return profile.select(options_->names);
+    return catalogue::meant_by(options_->names, profile)
+        .and_then([&](const std::vector<std::string>& names) { return profile.select(names); });
+  }
+
+  [[nodiscard]] std::string_view otherwise(const std::string& word,
+                                           const catalogue::Profile& profile) const override {
+    return catalogue::is_meant(word, profile) ? "a parameter" : "";
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
@@ -67,7 +74,7 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
 }  // namespace
 
 Result<Outcome> get(const GetOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, Addressing::unicast, context)
+  return resolve_one_or_group(options.targets, Addressing::unicast, context)
       .and_then([&](Targets targets) {
         return run_verb(Get(options, context), reopening(std::move(targets)), options.jobs,
                         context);

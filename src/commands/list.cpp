@@ -1,7 +1,9 @@
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/default_target.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -45,6 +47,12 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
       !options.arguments.empty() && is_target(options.arguments.front(), context);
   if (has_target) return of_target(options, context);
   if (!context.common.profile.empty()) return offline(options, context);
+  TRY_LET(const auto usual, work::default_target(context));
+  if (usual) {
+    ListOptions of_usual = options;
+    of_usual.arguments.insert(of_usual.arguments.begin(), usual->text);
+    return of_target(of_usual, context);
+  }
   if (!options.arguments.empty()) return of_target(options, context);
   return tl::unexpected(Error{.code = Errc::usage,
                               .message = "list what? neither a target nor a profile is named",
@@ -57,7 +65,10 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
 
 Result<Outcome> list(const ListOptions& options, Context& context) {
   TRY_LET(const auto subject, subject_of(options, context));
-  auto parameters = subject.profile.describe(subject.patterns);
+  auto parameters = catalogue::meant_by(subject.patterns, subject.profile)
+                        .and_then([&](const std::vector<std::string>& names) {
+                          return subject.profile.describe(names);
+                        });
   if (!parameters) {
     parameters.error().asked_of = subject.target;
     return tl::unexpected(std::move(parameters.error()));

@@ -36,7 +36,10 @@ struct Wanted {
     const auto is_tool = [&](const std::string& text) {
       return text == change.target || text == change.serial;
     };
-    const auto is_name = [&](const std::string& text) { return glob_match(text, change.name); };
+    const auto is_name = [&](const std::string& text) {
+      return glob_match(text, change.name) || change.name.ends_with("." + text) ||
+             change.name.starts_with(text + ".");
+    };
     return change.time >= since &&
            (tools.empty() || std::any_of(tools.begin(), tools.end(), is_tool)) &&
            (names.empty() || std::any_of(names.begin(), names.end(), is_name));

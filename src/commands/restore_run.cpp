@@ -375,7 +375,7 @@ Result<RestoreResult> RestoreRun::end() {
   if (!told && errors_.empty()) return tl::unexpected(std::move(told.error()));
   const RestoreResult result{outcome_, counts_};
   if (!told) return result;
-  Summary summary = restore_summary(counts_, saved_, tool_->target.shown);
+  Summary summary = with_change(restore_summary(counts_, saved_, tool_->target.shown), log_);
   if (!errors_.empty()) summary.sentence += fmt::format(", {} rolled back", counts_.rolled_back);
   return tell(std::move(summary), outcome_, *context_).map([&] { return result; });
 }

@@ -36,6 +36,7 @@ class VerbRun {
   Result<Outcome> on_group(const std::vector<Target>& tools);
 
  private:
+  Result<Plan> plan_for(const Profile& profile, const Target& target) const;
   Result<Opened<Plan>> open(const Target& target, Context& context) const;
   Result<Opened<Plan>> open_again(const Planned<Plan>& planned, Context& context) const;
   Result<Plan> ask_for_one(const Target& target, Plan plan) const;
@@ -66,6 +67,16 @@ Result<Outcome> run_verb(const V& verb, const Targets& targets, std::size_t jobs
   return targets.is_group ? run.on_group(targets.tools) : run.on_one(targets.tools.front());
 }
 
+/// A word that was taken for a tool must not be meant as something else.
+template <typename V>
+auto VerbRun<V>::plan_for(const Profile& profile, const Target& target) const -> Result<Plan> {
+  for (const std::string& word : context_->user.doubtful) {
+    const std::string_view meaning = verb_->otherwise(word, profile);
+    if (!meaning.empty()) return tl::unexpected(doubtful(word, meaning, *context_));
+  }
+  return verb_->plan(profile, target);
+}
+
 // ---- one tool ----
 
 template <typename V>
@@ -82,7 +93,7 @@ Result<Outcome> VerbRun<V>::on_one(const Target& target) {
     return ask_for_one(asked, std::move(plan));
   };
   auto opened = open_prepared(target, verb_->need(), *context_, [&](const Profile& profile) {
-    return verb_->plan(profile, target).and_then([&](Plan plan) {
+    return plan_for(profile, target).and_then([&](Plan plan) {
       return ask_by(V::Basis::profile, target, std::move(plan));
     });
   });
@@ -114,7 +125,7 @@ auto VerbRun<V>::finish(OpenTool& tool, const Plan& plan, Context& context) cons
 template <typename V>
 auto VerbRun<V>::open(const Target& target, Context& context) const -> Result<Opened<Plan>> {
   auto opened = open_prepared(target, verb_->need(), context,
-                              [&](const Profile& profile) { return verb_->plan(profile, target); });
+                              [&](const Profile& profile) { return plan_for(profile, target); });
   if (!opened) return opened;
   if (verb_->changes_tools()) tell_caution(opened->tool, context);
   auto plan = verb_->examine(opened->tool, std::move(opened->prepared), context);
@@ -161,7 +172,7 @@ auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) c
     known = known_target(*tool);
     *profile = *tool->profile;
   }
-  return verb_->plan(*profile, target).map([&](Plan plan) {
+  return plan_for(*profile, target).map([&](Plan plan) {
     return Planned<Plan>{std::move(known), std::move(plan)};
   });
 }
@@ -259,7 +270,7 @@ Result<void> VerbRun<V>::check_all_fit(const std::vector<Target>& tools) const {
     if (target.profile.empty()) continue;
     const auto profile = load_profile(target, *context_);
     if (!profile) return tl::unexpected(with_target(profile.error(), target));
-    const auto plan = verb_->plan(*profile, target);
+    const auto plan = plan_for(*profile, target);
     if (!plan) return tl::unexpected(with_target(plan.error(), target));
   }
   return {};
@@ -274,7 +285,7 @@ Result<void> VerbRun<V>::check_one_fits(const std::vector<Target>& tools) const 
     if (target.profile.empty()) return {};
     const auto profile = load_profile(target, *context_);
     if (!profile) return {};  // told as one of this tool
-    const auto plan = verb_->plan(*profile, target);
+    const auto plan = plan_for(*profile, target);
     if (plan) return {};
     if (checked) checked = tl::unexpected(plan.error());
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "recording.hpp"
 #include "records.hpp"
 
 namespace spindle::commands {
@@ -108,6 +109,10 @@ report::Record step_record(const SetStep& step, Ending ending, const Value& now,
   return change_record(step.assignment.parameter, step.before, ending, now, target, clock);
 }
 
+report::Record planned_step_record(const SetStep& step, const Target& target, const Clock& clock) {
+  return step_record(step, Ending::planned, step.assignment.value, target, clock);
+}
+
 void SetCounts::add(const SetCounts& other) {
   changed += other.changed;
   unchanged += other.unchanged;
@@ -139,6 +144,16 @@ Summary set_summary(const SetCounts& counts, const std::string& target) {
     summary.sentence += fmt::format(", {} failed, {} not tried", counts.failed, counts.left);
   }
   return summary;
+}
+
+Result<void> show_set_plans(const std::vector<Planned<SetPlan>>& planned, Context& context) {
+  Listing listing(context, with_target_column(set_plan_columns()));
+  for (const auto& [target, plan] : planned) {
+    for (const SetStep& step : plan.steps) {
+      listing.add(step_record(step, Ending::planned, step.assignment.value, target, context.clock));
+    }
+  }
+  return listing.end();
 }
 
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context) {
@@ -186,7 +201,7 @@ void tell_other_steps(const std::vector<SetStep>& steps, const catalogue::Profil
 void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
                     const Context& context) {
   for (const SetStep& step : steps) {
-    const auto& [parameter, value, text, converted] = step.assignment;
+    const auto& [parameter, value, text, converted, relative] = step.assignment;
     if (!converted.empty()) {
       context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name, converted));
     }

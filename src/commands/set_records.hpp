@@ -10,6 +10,7 @@
 #include "set_plan.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/work/connect.hpp"
+#include "verb.hpp"
 
 namespace spindle::commands {
 
@@ -51,6 +52,9 @@ report::Record change_record(const catalogue::Parameter& parameter,
 report::Record step_record(const SetStep& step, Ending ending, const catalogue::Value& now,
                            const Target& target, const Clock& clock);
 
+/// What would become of a step.
+report::Record planned_step_record(const SetStep& step, const Target& target, const Clock& clock);
+
 /// What was written, or would be, of one tool or of several.
 struct SetCounts {
   std::size_t changed = 0;
@@ -66,6 +70,9 @@ SetCounts counts_of(const std::vector<SetStep>& steps);
 
 Summary plan_summary(const SetCounts& counts, const std::string& target);
 Summary set_summary(const SetCounts& counts, const std::string& target);
+
+/// What is planned for each tool, in one list.
+Result<void> show_set_plans(const std::vector<Planned<SetPlan>>& planned, Context& context);
 
 /// What a change may cost, before it is made.
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context);

@@ -90,7 +90,7 @@ void SetWriter::fail(const Error& error) {
 }
 
 void SetWriter::send_one(const SetStep& step) {
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   work::LoggedChange change =
       work::logged(parameter, value, value, ending_words.text(Ending::sent));
   change.old_value.reset();
@@ -115,7 +115,7 @@ work::Step SetWriter::write_one(const SetStep& step) {
     succeed(step, Ending::unchanged, *step.before);
     return work::Step::unchanged;
   }
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   device::Written written = changer_.make(parameter, *step.before, value);
   if (written.done()) {
     Value now = *written.now;
@@ -131,7 +131,7 @@ work::Step SetWriter::write_one(const SetStep& step) {
 }
 
 void SetWriter::give_up(const SetStep& step) {
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   const device::Written& written = refused_.at(&step);
   ++result_.counts.failed;
   note(step, ending_of(written.result), written.now.value_or(value));
@@ -142,7 +142,9 @@ Result<SetResult> SetWriter::end(Summary summary) {
   auto drawn = listing_.end();
   const bool stores = storing_ == Storing::yes && result_.outcome.failed() == 0;
   if (drawn && stores) drawn = store(*tool_, log_, result_.outcome, *context_);
-  if (drawn) drawn = tell(std::move(summary), result_.outcome, *context_);
+  if (drawn) {
+    drawn = tell(with_change(std::move(summary), log_), result_.outcome, *context_);
+  }
   return drawn.map([&] { return result_; });
 }
 

@@ -28,8 +28,7 @@ link::Trace frames_as_lines(const std::string& target, const report::Streams& io
   const auto line = [&io, &clock, target](std::string text) {
     if (io.err_is_ready && !io.err_is_ready()) return;
     text.erase(text.find_last_not_of(' ') + 1);
-    report::say_line(io, report::Severity::informational,
-                     fmt::format("{} {} {}", report::to_text(clock.wall()), target, text));
+    report::say_frame(io, fmt::format("{} {} {}", report::to_text(clock.wall()), target, text));
   };
   return {.bytes =
               [line](link::Direction direction, ByteView bytes) {

@@ -29,7 +29,8 @@ Error nothing_to_undo(const std::string& id) {
   return {.code = Errc::unknown_name,
           .message = id.empty() ? "the record of changes has nothing that can be taken back"
                                 : fmt::format("the record of changes has no change '{}'", id),
-          .hint = "'spindle log' shows what was changed"};
+          .hint = "'spindle log' shows what was changed",
+          .remedy = {.right = "spindle log"}};
 }
 
 /// The changes that are meant, in the order in which they were made.
@@ -62,13 +63,14 @@ Error not_recorded(const PastChange& change) {
 Result<Outcome> undo(const UndoOptions& options, Context& context) {
   TRY_LET(const auto history, read_changes(context));
   TRY_LET(const auto chosen, choose(options.id, history));
-  SetOptions wanted{.target = chosen.front()->target,
+  const std::string& target = chosen.front()->target;
+  SetOptions wanted{.targets = {target},
                     .assignments = {},
                     .execution = options.execution,
                     .undoing = Undoing{.serial = chosen.front()->serial}};
   std::map<std::string, std::string> before;
   for (const PastChange* change : chosen) {
-    if (change->target != wanted.target || change->serial != wanted.undoing->serial) {
+    if (change->target != target || change->serial != wanted.undoing->serial) {
       return tl::unexpected(Error{.code = Errc::usage,
                                   .message = "changes of several tools have this id",
                                   .hint = fmt::format("name one, such as {}", change->id)});

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "driver.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/device/run_model.hpp"
 
 namespace spindle::commands {
@@ -91,7 +93,8 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
   const std::vector<std::string> names =
       options.names.empty() ? to_strings(profile.watched) : options.names;
   if (!names.empty()) {
-    TRY_LET(auto values, profile.select(names));
+    TRY_LET(const auto meant, catalogue::meant_by(names, profile));
+    TRY_LET(auto values, profile.select(meant));
     TRY(check_secrets(values));
     plan.values = std::move(values);
   }
@@ -101,6 +104,10 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
 Result<void> check_watch(const WatchOptions& options, const WatchedTool& tool, ProfileShelf& shelf,
                          const Context& context) {
   if (tool.known() == nullptr) return check_for_any_profile(options, shelf, context);
+  for (const std::string& word : context.user.doubtful) {
+    if (!catalogue::is_meant(word, tool.known()->profile)) continue;
+    return tl::unexpected(doubtful(word, "a parameter", context));
+  }
   return plan_watch(options, tool.known()->profile).map([](const device::WatchPlan&) {});
 }
 

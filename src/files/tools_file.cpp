@@ -328,7 +328,10 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
 /// What is said of a file that has these faults.
 Error refusal_of(const Diagnostics& findings) {
   Error error = findings.error();
-  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
+  if (findings.list().size() > 1) {
+    error.hint = "'spindle tools --check' lists every fault";
+    error.remedy.right = "spindle tools --check";
+  }
   return error;
 }
 

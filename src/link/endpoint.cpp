@@ -70,7 +70,11 @@ Result<Parts> take_apart(std::string_view url) {
   }
   std::string hint = suggestion(name, scheme_names());
   if (hint.empty()) hint = forms;
-  return tl::unexpected(bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint));
+  Error error = bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint);
+  if (const auto meant = closest(name, scheme_names())) {
+    error.remedy = {std::string(url), std::string(url).replace(0, colon, *meant)};
+  }
+  return tl::unexpected(std::move(error));
 }
 
 Result<void> parse_port(Endpoint& endpoint, std::string_view text) {
@@ -355,7 +359,13 @@ Result<void> apply_option(Endpoint& endpoint, std::string_view item,
   }
   std::string hint = suggestion(name, names);
   if (hint.empty()) hint = fmt::format("here there is {}", fmt::join(names, ", "));
-  return tl::unexpected(bad_target(endpoint.text, fmt::format("unknown option '{}'", name), hint));
+  Error error = bad_target(endpoint.text, fmt::format("unknown option '{}'", name), hint);
+  if (const auto meant = closest(name, names)) {
+    std::string mended = endpoint.text;
+    mended.replace(mended.rfind(name), name.size(), *meant);
+    error.remedy = {endpoint.text, std::move(mended)};
+  }
+  return tl::unexpected(std::move(error));
 }
 
 /// Whether it begins with "WORD:".

@@ -139,7 +139,9 @@ Result<const KindInfo*> find_kind(std::string_view text, std::string_view name) 
   for (const KindInfo& info : kinds) names.emplace_back(info.name);
   std::string hint = suggestion(name, names);
   if (hint.empty()) hint = "'spindle simulate --help' lists them";
-  return tl::unexpected(bad(text, "there is none of that name", std::move(hint)));
+  Error error = bad(text, "there is none of that name", std::move(hint));
+  error.remedy.right = "spindle simulate --help";
+  return tl::unexpected(std::move(error));
 }
 
 Result<void> parse_argument(Fault& fault, const KindInfo& row, std::string_view text,

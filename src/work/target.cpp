@@ -31,7 +31,8 @@ Error unknown_target(const std::string& text, const files::Tools& tools) {
   }
   return {.code = Errc::unknown_name,
           .message = fmt::format("unknown target '{}'", text),
-          .hint = std::move(hint)};
+          .hint = std::move(hint),
+          .remedy = remedy_for(text, known, tools.path.empty() ? "" : "spindle tools")};
 }
 
 Result<Target> target_of_url(const std::string& url, const Environment& environment) {
@@ -70,6 +71,9 @@ std::vector<Result<Target>> named_targets(const std::string& name, const Environ
     error.target = name;
     error.hint =
         "until it is mended, this entry is not used; 'spindle tools --check' lists all faults";
+    const std::string& file = environment.common.tools_file;
+    error.remedy.right =
+        "spindle tools --check" + (file.empty() ? file : " --tools " + shell_word(file));
     found.emplace_back(tl::unexpected(std::move(error)));
     return found;
   }
@@ -179,7 +183,8 @@ Error unproven(const Target& target) {
       Error{.code = Errc::usage,
             .message = "a tool on a serial line cannot prove what it is",
             .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
-                    "shows all"},
+                    "shows all",
+            .remedy = {.right = "spindle profile list"}},
       target);
 }
 
@@ -230,7 +235,8 @@ Result<Target> resolve_target(const std::string& text, const Environment& enviro
       .code = Errc::usage,
       .message = fmt::format("'{}' is {} tools, and {}", text, targets.size(), words.why),
       .hint = words.remedy.empty() ? fmt::format("{} {}", words.instead, targets.front().shown)
-                                   : std::string(words.remedy)});
+                                   : std::string(words.remedy),
+      .remedy = words.remedy.empty() ? Remedy{text, targets.front().shown} : Remedy()});
 }
 
 }  // namespace spindle::work

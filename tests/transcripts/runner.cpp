@@ -27,6 +27,7 @@
 //   %disk full|empty      whether it takes any more
 //   %hide progress        from here on the line that a terminal shows for a moment is left out
 //   %answer TEXT          what the user types at the next question
+//   %env NAME [VALUE]     a variable of the environment; without a value it is not set
 //   $ spindle ARGUMENTS   followed by what it prints
 //   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
@@ -118,6 +119,15 @@ std::string without_source_folder(std::string text) {
   return text;
 }
 
+/// Nor has the folder of a transcript a name that stays.
+std::string without_own_folder(std::string text) {
+  const std::string folder = fs::current_path().string();
+  for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
+    text.replace(at, folder.size(), "$FOLDER");
+  }
+  return text;
+}
+
 enum class Marking { mark_stderr, plain };
 
 /// A simulated tool behind an address, alive from one command to the next.
@@ -129,6 +139,20 @@ struct Tool {
   sim::AnswerCounter answers;
   std::uint32_t connections = 0;
 };
+
+/// Whether a sentence on stderr goes on behind column 100. A word that alone is too wide, frames,
+/// and what can be pasted are not broken.
+bool is_too_wide(const std::string& line) {
+  constexpr std::string_view mark = "! ";
+  constexpr std::size_t widest = 100;
+  if (!line.starts_with(mark) || line.size() <= mark.size() + widest) return false;
+  const std::string_view text = std::string_view(line).substr(mark.size());
+  const bool is_whole = text.starts_with("  try: ") ||
+                        text.find(" -> ") != std::string_view::npos ||
+                        text.find(" <- ") != std::string_view::npos;
+  const std::size_t begin = text.find_first_not_of(' ');
+  return !is_whole && text.substr(0, widest).find(' ', begin) != std::string_view::npos;
+}
 
 class Stage {
  public:
@@ -245,6 +269,10 @@ class Stage {
               [=, this] { bus->answer({99}, unit, write, clock_.now()); });
   }
 
+  void set_variable(const std::vector<std::string>& words) {
+    variables_[words.at(1)] = words.size() > 2 ? words.at(2) : std::string();
+  }
+
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
   /// Runs one command line (without "spindle") and returns what a terminal would show.
@@ -288,21 +316,26 @@ class Stage {
         .environment = [this](std::string_view name) -> std::optional<std::string> {
           if (name == "XDG_STATE_HOME") return "/state";
           if (name == "SPINDLE_PROFILE_PATH" && !own_profiles_.empty()) return own_profiles_;
-          return std::nullopt;
+          const auto found = variables_.find(std::string(name));
+          return found == variables_.end() ? std::nullopt : std::optional(found->second);
         },
         .disk = disk_.functions(),
         .installation = {SPINDLE_SOURCE_DIR, "3.1.6"},
         .shipped = shipped::profiles()};
     status_ = cli::run(arguments, world);
     Lines lines;
-    std::istringstream stream(without_source_folder(std::move(shown)));
+    std::istringstream stream(without_own_folder(without_source_folder(std::move(shown))));
     for (std::string line; std::getline(stream, line);) lines.push_back(line);
+    for (const std::string& line : lines) {
+      if (marking == Marking::mark_stderr && is_too_wide(line)) too_wide_.push_back(line);
+    }
     if (status_ != 0 && marking == Marking::mark_stderr)
       lines.push_back(fmt::format("[{}]", status_));
     return lines;
   }
 
   [[nodiscard]] int status() const { return status_; }
+  [[nodiscard]] const Lines& too_wide() const { return too_wide_; }
   [[nodiscard]] test::MemoryDisk& disk() { return disk_; }
 
  private:
@@ -343,6 +376,8 @@ class Stage {
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
+  std::map<std::string, std::string> variables_;
+  Lines too_wide_;
   test::MemoryDisk disk_;
   bool hides_progress_ = false;
   int status_ = 0;
@@ -375,6 +410,7 @@ class Player {
     return played_;
   }
   [[nodiscard]] int commands() const { return commands_; }
+  [[nodiscard]] const Lines& too_wide() const { return stage_.too_wide(); }
 
  private:
   std::size_t play_line(const Lines& lines, std::size_t index) {
@@ -409,6 +445,7 @@ class Player {
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
     if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));
+    if (words.at(0) == "env") stage_.set_variable(words);
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
     if (words.at(0) == "profile") copy_profile(words.at(1));
@@ -516,6 +553,8 @@ int main(int count, char** arguments) {
     std::cerr << path << ": no command in it\n";
     return 1;
   }
+  for (const std::string& line : player.too_wide()) std::cerr << "too wide: " << line << '\n';
+  if (!player.too_wide().empty() && std::getenv("SPINDLE_UPDATE") == nullptr) return 1;
   if (std::getenv("SPINDLE_UPDATE") != nullptr) {
     std::ofstream file(path);
     for (const std::string& line : played) file << line << '\n';

@@ -520,3 +520,68 @@ TEST_CASE("a closed pipe is handed on by every function that writes") {
     CHECK(wrote.error().code == Errc::closed_pipe);
   }
 }
+
+namespace {
+
+std::size_t widest_line(const std::string& text) {
+  std::size_t widest = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    widest = std::max(widest, end - begin);
+    begin = end + 1;
+  }
+  return widest;
+}
+
+}  // namespace
+
+TEST_CASE("an error is the cause, what can be pasted, and the rest, on lines of 100 columns") {
+  Caught caught;
+  caught.streams.typed = {"get", "staton3"};
+  const auto renderer = make_renderer(Format::table, caught.streams, Verbosity::normal);
+  Error error{.code = Errc::unknown_name,
+              .message = "unknown target 'staton3'",
+              .hint = "did you mean 'station3'?",
+              .remedy = {"staton3", "station3"}};
+  REQUIRE(renderer->error(error, moment));
+  CHECK(caught.err ==
+        "spindle: unknown target 'staton3'; did you mean 'station3'?\n"
+        "  try: spindle get station3\n");
+  caught.err.clear();
+  error.hint.clear();
+  for (int word = 0; word < 40; ++word) error.hint += "hint ";
+  error.hint += "end";
+  error.details = {"one", "two"};
+  REQUIRE(renderer->error(error, moment));
+  CHECK(caught.err.starts_with(
+      "spindle: unknown target 'staton3'\n  try: spindle get station3\n  hint hint"));
+  CHECK(caught.err.ends_with("end\n  one\n  two\n"));
+  CHECK(widest_line(caught.err) <= 100);
+}
+
+TEST_CASE("the journal gets an error as one line, and JSON what can be pasted as a key") {
+  Caught caught;
+  caught.streams.typed = {"get", "staton3"};
+  caught.streams.err_is_journal = true;
+  const Error error{.code = Errc::unknown_name,
+                    .message = "unknown target 'staton3'",
+                    .hint = "did you mean 'station3'?",
+                    .remedy = {"staton3", "station3"},
+                    .details = {"one"}};
+  REQUIRE(make_renderer(Format::json, caught.streams, Verbosity::normal)->error(error, moment));
+  CHECK(caught.err == "<3>spindle: unknown target 'staton3'; did you mean 'station3'?\n");
+  const json told = json::parse(caught.out());
+  CHECK(told["try"] == "spindle get station3");
+  CHECK(told["details"] == json::array({"one"}));
+  CHECK(told["hint"] == "did you mean 'station3'?");
+}
+
+TEST_CASE("a sentence is broken at blanks, and a word that is too wide stays whole") {
+  std::string words;
+  for (int word = 0; word < 60; ++word) words += "word ";
+  CHECK(widest_line(wrapped(words)) <= 100);
+  CHECK(wrapped("short") == "short");
+  const std::string path(150, 'x');
+  CHECK(wrapped("in " + path + " it is") == "in\n  " + path + "\n  it is");
+  CHECK(wrapped("  begins") == "  begins");
+}

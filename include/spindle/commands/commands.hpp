@@ -34,7 +34,7 @@ struct ListOptions {
 Result<Outcome> list(const ListOptions& options, Context& context);
 
 struct GetOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
   Secrets secrets = Secrets::leave_out;
@@ -57,8 +57,9 @@ struct Undoing {
 };
 
 struct SetOptions {
-  std::string target;                    ///< or a group
-  std::vector<std::string> assignments;  ///< NAME=VALUE
+  std::vector<std::string> targets;  ///< or groups
+  std::vector<std::string> assignments;  ///< NAME=VALUE, NAME+=STEP; NAME may be a pattern
+  std::string file = {};                 ///< with more of them, a line each; "-": standard input
   Execution execution = Execution::real;
   Storing storing = Storing::no;
   Addressing addressing = Addressing::unicast;
@@ -69,7 +70,7 @@ struct SetOptions {
 Result<Outcome> set(const SetOptions& options, Context& context);
 
 struct DoOptions {
-  std::string target;                ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
   Addressing addressing = Addressing::unicast;
@@ -78,7 +79,7 @@ struct DoOptions {
 Result<Outcome> perform(const DoOptions& options, Context& context);
 
 struct PingOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   unsigned count = 4;
   Duration interval = std::chrono::seconds(1);
   std::size_t jobs = usual_jobs;
@@ -208,7 +209,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 enum class AlarmReset : std::uint8_t { no, yes };
 
 struct AlarmsOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   AlarmReset reset = AlarmReset::no;
   Acceptance acceptance = Acceptance::verified_only;
   std::size_t jobs = usual_jobs;
@@ -270,6 +271,16 @@ struct UndoOptions {
 /// Writes back what a command found, if the tool still holds what it left. Plans, asks, verifies.
 Result<Outcome> undo(const UndoOptions& options, Context& context);
 
+/// Whether the default target is given up.
+enum class Forgetting : std::uint8_t { no, yes };
+
+struct UseOptions {
+  std::string target = {};  ///< that is meant from now on where none is named; empty: show it
+  Forgetting forget = Forgetting::no;
+};
+/// The default target.
+Result<Outcome> use(const UseOptions& options, Context& context);
+
 struct StoreOptions {
   std::string store = {};  ///< empty: the user's own
 };
@@ -329,7 +340,7 @@ enum class ModelCheck : std::uint8_t { strict, off };
 enum class OnFailure : std::uint8_t { roll_back, leave };
 
 struct RestoreOptions {
-  std::string target;  ///< with a folder also a group
+  std::vector<std::string> targets;  ///< with a folder several, and groups
   std::string file;    ///< not with a folder
   std::string folder;  ///< each tool is restored from its backup in it; empty: from `file`
   std::vector<std::string> patterns;

@@ -49,7 +49,8 @@ class Renderer {
   virtual void note(std::string_view sentence) = 0;
   /// The closing counts: a JSON line on stdout, or `sentence` on stderr.
   virtual Result<void> summary(const Record& record, std::string_view sentence) = 0;
-  /// The sentence on stderr, and for JSON also an `error` line on stdout.
+  /// The sentence on stderr, with a command to try where there is one, and for JSON also an `error`
+  /// line on stdout.
   virtual Result<void> error(const Error& error, WallTime time) = 0;
 };
 
@@ -61,9 +62,19 @@ std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosi
 /// How important a line on stderr is, as syslog(3) counts it.
 enum class Severity : std::uint8_t { error = 3, warning = 4, notice = 5, informational = 6 };
 
-/// The text as one line on stderr, marked with its severity (sd-daemon(3)) where the system's
+/// The text with line breaks in place of spaces, so that no line is wider than people read well; a
+/// word that is wider stays whole. Lines behind the first one are indented.
+std::string wrapped(std::string_view text, std::size_t columns = 100);
+
+/// How wide a line on stderr may be: 100 columns, or those of a narrower terminal.
+std::size_t columns_of(const Streams& streams);
+
+/// The text as one sentence on stderr, on as many lines as it takes, marked with its severity (sd-daemon(3)) where the system's
 /// journal reads that.
 void say_line(const Streams& streams, Severity severity, std::string_view text);
+
+/// The same as one line, however wide: a frame is looked for by programs, too.
+void say_frame(const Streams& streams, std::string_view text);
 
 /// What users have to know about the values that are shown: one line on stderr, quiet or not. May
 /// be called from any thread.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
@@ -39,6 +40,8 @@ struct Streams {
   /// Whether the system's journal reads err(), which wants to know how important a line is.
   bool err_is_journal = false;
   Color color = Color::off;
+  /// What the user typed behind the program's name: an error may say how to mend it.
+  std::vector<std::string> typed = {};
 };
 
 }  // namespace spindle::report

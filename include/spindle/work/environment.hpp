@@ -57,7 +57,8 @@ struct Environment {
   const files::Tools& tools;
   const ShowFrames& show_frames;  ///< may be empty
   CommonOptions common = {};
-  link::MakeDoors make_doors = {};  ///< lets other programs ask; empty: none can
+  link::MakeDoors make_doors = {};   ///< lets other programs ask; empty: none can
+  std::string target_variable = {};  ///< $SPINDLE_TARGET; empty: it is not set
 };
 
 /// The same environment with a clock and lines that signals do not end.
