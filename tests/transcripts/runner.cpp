@@ -147,9 +147,10 @@ bool is_too_wide(const std::string& line) {
   constexpr std::size_t widest = 100;
   if (!line.starts_with(mark) || line.size() <= mark.size() + widest) return false;
   const std::string_view text = std::string_view(line).substr(mark.size());
-  const bool is_whole = text.starts_with("  try: ") ||
-                        text.find(" -> ") != std::string_view::npos ||
-                        text.find(" <- ") != std::string_view::npos;
+  // A frame of --verbose begins with its time, and progress is no line that stays.
+  const bool is_frame = glob_match("[0-9]*T*Z *", text.substr(0, 30));
+  const bool is_whole =
+      is_frame || text.starts_with("  try: ") || text.find('\x1b') != std::string_view::npos;
   const std::size_t begin = text.find_first_not_of(' ');
   return !is_whole && text.substr(0, widest).find(' ', begin) != std::string_view::npos;
 }
