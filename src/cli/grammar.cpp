@@ -776,7 +776,7 @@ void bind_report_form(Binder& bind, commands::ReportOptions& options) {
   bind.option("--study", "STUDY", options.machine, one_of(study_words),
               "machine: also Cm and Cmk of the longest run of 50 or more without an interruption");
   bind.repeatable("--require", "INDEX=VALUE", options.required,
-                  "status 1 where a stratum has less, repeatable; see below");
+                  "status 1 where a stratum has less, repeatable");
   bind.flag("--require-low", options.required_of, commands::RequiredOf::lower_bound,
             "require it of the lower end of the 95 % interval");
 }
@@ -1074,7 +1074,7 @@ void bind_simulated_line(Binder& bind, commands::SimulateOptions& options) {
   bind.flag("--no-gap", options.gaps, sim::LineModel::Gaps::ignored,
             "serial tools: also hear clients that keep too short a silence");
   bind.repeatable("--fault", "FAULT", options.faults,
-                  "make the tool misbehave, repeatable; see below");
+                  "make the tool misbehave, repeatable");
   bind.option("--busy", "DURATION", options.tool.busy, to_busy,
               "how long Configuration takes (default 200ms, at most 1s)")
       ->group(of_command_word);
@@ -1142,7 +1142,7 @@ void add_simulate(CLI::App& app, ParseState& draft) {
                 bind_simulated_line(bind, options);
                 bind_simulated_work(bind, options.tool.bm);
                 bind.repeatable("--outage", "OUTAGE", options.outages,
-                                "let the tool be away at times, repeatable; see below");
+                                "let the tool be away at times, repeatable");
               });
 }
 
@@ -1587,7 +1587,7 @@ bool is_chosen(const ParseState& draft, std::string_view name) {
 }
 
 Result<std::string> help_of(const CLI::App& app, const ParseState& draft) {
-  const Description description = description_of(app, draft);
+  const Description description = describe_grammar();  // also of commands that are not typed
   std::string name = draft.chosen == nullptr ? std::string() : path_of(draft.chosen);
   if (is_chosen(draft, help_command) && !draft.help) {
     name = fmt::format("{}", fmt::join(draft.options.helped, " "));

@@ -117,8 +117,8 @@ Result<std::vector<Parameter>> parameters_to_set(const std::string& name, const 
   return std::vector<Parameter>{std::move(parameter)};
 }
 
-Result<std::optional<Step>> step_of(const TypedAssignment& typed, const Parameter& parameter,
-                                    const std::string& unit) {
+Result<std::optional<ValueStep>> step_of(const TypedAssignment& typed, const Parameter& parameter,
+                                         const std::string& unit) {
   const bool is_number = is_plain_number(parameter, typed.value);
   const auto hundredths = percentage(typed.value);
   if (!typed.sign) {
@@ -126,7 +126,7 @@ Result<std::optional<Step>> step_of(const TypedAssignment& typed, const Paramete
     if (!is_step) return std::nullopt;
     if (unit == percent) return tl::unexpected(of_value_or_unit(parameter, typed.value));
     const Decimal amount = hundredths->sign() == Sign::minus ? hundredths->negated() : *hundredths;
-    return Step{.sign = hundredths->sign(), .amount = amount, .is_percent = true};
+    return ValueStep{.sign = hundredths->sign(), .amount = amount, .is_percent = true};
   }
   if (!is_number) {
     return tl::unexpected(bad_step(parameter, "it is no single number, so nothing can be added",
@@ -134,13 +134,13 @@ Result<std::optional<Step>> step_of(const TypedAssignment& typed, const Paramete
   }
   if (hundredths && !has_sign(typed.value)) {
     if (unit == percent) return tl::unexpected(of_value_or_unit(parameter, typed.value));
-    return Step{.sign = *typed.sign, .amount = *hundredths, .is_percent = true};
+    return ValueStep{.sign = *typed.sign, .amount = *hundredths, .is_percent = true};
   }
   TRY_LET(const auto amount, amount_of(typed.value, parameter, unit));
-  return Step{.sign = *typed.sign, .amount = amount};
+  return ValueStep{.sign = *typed.sign, .amount = amount};
 }
 
-Result<Decimal> stepped(const catalogue::Value& before, const Step& step) {
+Result<Decimal> stepped(const catalogue::Value& before, const ValueStep& step) {
   if (!before.is_number()) {
     return tl::unexpected(Error{
         .code = Errc::bad_value,
@@ -162,7 +162,8 @@ Result<Decimal> stepped(const catalogue::Value& before, const Step& step) {
                               .hint = "write the new value behind ="});
 }
 
-std::string step_in_words(const catalogue::Value& before, const Step& step, const Decimal& result) {
+std::string step_in_words(const catalogue::Value& before, const ValueStep& step,
+                          const Decimal& result) {
   return fmt::format("{} {} {}{} is {}", before.number.to_string(),
                      step.sign == Sign::plus ? "+" : "-", step.amount.to_string(),
                      step.is_percent ? " %" : "", result.to_string());

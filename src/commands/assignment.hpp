@@ -14,7 +14,7 @@
 namespace spindle::commands {
 
 /// A change against what the tool holds: "NAME+=0.1", "NAME-=5%", "NAME=+5%".
-struct Step {
+struct ValueStep {
   Sign sign = Sign::plus;
   Decimal amount = {};      ///< in the unit of the parameter, or so many hundredths of the value
   bool is_percent = false;  ///< hundredths
@@ -41,15 +41,17 @@ Result<std::vector<catalogue::Parameter>> parameters_to_set(const std::string& n
 /// value is one as it stands. What was a value before there were steps is none: a sign alone makes
 /// no step, and labels and texts are what they are. Error `bad_value` where the step cannot be
 /// made, or "5%" may be of the value or of the unit.
-Result<std::optional<Step>> step_of(const TypedAssignment& typed,
-                                    const catalogue::Parameter& parameter, const std::string& unit);
+Result<std::optional<ValueStep>> step_of(const TypedAssignment& typed,
+                                         const catalogue::Parameter& parameter,
+                                         const std::string& unit);
 
 /// What the tool holds with the step, exactly. Error `bad_value` where that is no number, or has
 /// too many digits.
-Result<Decimal> stepped(const catalogue::Value& before, const Step& step);
+Result<Decimal> stepped(const catalogue::Value& before, const ValueStep& step);
 
 /// "2.71 + 5 % is 2.8455".
-std::string step_in_words(const catalogue::Value& before, const Step& step, const Decimal& result);
+std::string step_in_words(const catalogue::Value& before, const ValueStep& step,
+                          const Decimal& result);
 
 /// One assignment with where it stands; no place: on the command line.
 struct PlacedText {

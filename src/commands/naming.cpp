@@ -82,6 +82,11 @@ Result<SortedWords> sort_words(const TypedWords& typed, OtherWords kind, std::st
                                Context& context) {
   SortedWords sorted;
   const auto& words = typed.words;
+  // As behind a variable of a script that is not set: no tool is named, and the default is not
+  // meant.
+  const bool is_unset =
+      std::any_of(words.begin(), words.end(), [](const std::string& word) { return word.empty(); });
+  if (is_unset) return tl::unexpected(no_target(command));
   for (std::size_t index = 0; index < words.size(); ++index) {
     const bool may_be_target = index + typed.behind_dashes < words.size();
     const bool is_tool =

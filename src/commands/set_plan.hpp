@@ -18,7 +18,7 @@ struct Assignment {
   catalogue::Value value;
   std::string text;            ///< as typed: names of bits may mean others once the tool was read
   std::string converted = {};  ///< "1.5 kW is 1500 W"; empty: it was typed in its unit
-  std::optional<Step> step = std::nullopt;  ///< it has no value until the tool was read
+  std::optional<ValueStep> step = std::nullopt;  ///< it has no value until the tool was read
 };
 
 /// One assignment with what the tool holds now.

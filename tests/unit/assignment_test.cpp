@@ -14,7 +14,7 @@ namespace {
 
 /// "+0.1", "-5%", "value", or what is wrong.
 std::string step(const std::string& text, const std::string& unit = "N.m") {
-  const catalogue::Profile profile = test::product("doga-bm");
+  const catalogue::Profile profile = test::product("doga-bm").profile;
   const auto typed = take_apart(text, profile);
   if (!typed) return describe(typed.error());
   const auto parameters = parameters_to_set(typed->name, profile);
@@ -22,14 +22,14 @@ std::string step(const std::string& text, const std::string& unit = "N.m") {
   const auto found = step_of(*typed, parameters->front(), unit);
   if (!found) return message_of(found.error());
   if (!*found) return "value " + typed->value;
-  const Step& made = **found;
+  const ValueStep& made = **found;
   return (made.sign == Sign::plus ? "+" : "-") + made.amount.to_string() +
          (made.is_percent ? "%" : "");
 }
 
 catalogue::Value holds(const char* number) { return {.number = Decimal::parse(number).value()}; }
 
-std::string result(const char* before, const Step& change) {
+std::string result(const char* before, const ValueStep& change) {
   const auto made = stepped(holds(before), change);
   return made ? made->to_string() : message_of(made.error());
 }
@@ -83,7 +83,7 @@ TEST_CASE("steps are exact") {
 }
 
 TEST_CASE("a pattern means named parameters, and never numbered ones") {
-  const catalogue::Profile profile = test::product("doga-bm");
+  const catalogue::Profile profile = test::product("doga-bm").profile;
   CHECK(parameters_to_set("preset.*.speed", profile)->size() > 10);
   CHECK_FALSE(parameters_to_set("p2*", profile).has_value());
   CHECK(parameters_to_set("p2", profile)->front().name == "p2");

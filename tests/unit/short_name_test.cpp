@@ -13,12 +13,12 @@ using namespace spindle::catalogue;
 namespace {
 
 std::string read(std::string_view typed) {
-  const auto meant = meant_by(typed, test::product("doga-bm"));
+  const auto meant = meant_by(typed, test::product("doga-bm").profile);
   return meant ? *meant : "! " + message_of(meant.error());
 }
 
 std::string written(std::string_view typed) {
-  const auto meant = one_meant_by(typed, test::product("doga-bm"));
+  const auto meant = one_meant_by(typed, test::product("doga-bm").profile);
   return meant ? *meant : "! " + message_of(meant.error());
 }
 
@@ -37,7 +37,7 @@ TEST_CASE("the beginning of names is all of them for what reads, and refused for
 
 TEST_CASE(
     "an ending of several names is an error with all of them, and a command that shows them") {
-  const auto meant = meant_by("target-torque", test::product("doga-bm"));
+  const auto meant = meant_by("target-torque", test::product("doga-bm").profile);
   REQUIRE_FALSE(meant.has_value());
   const Error& error = meant.error();
   CHECK(error.code == Errc::unknown_name);
@@ -58,7 +58,7 @@ TEST_CASE("whole names, patterns, numbers, registers and unknown names are what 
 }
 
 TEST_CASE("whether a word means any parameter") {
-  const Profile profile = test::product("doga-bm");
+  const Profile profile = test::product("doga-bm").profile;
   CHECK(is_meant("speed", profile));
   CHECK(is_meant("p2", profile));
   CHECK_FALSE(is_meant("station3", profile));
