@@ -108,7 +108,7 @@ class UsageTest(unittest.TestCase):
         self.assertEqual(len(lines), 1, finished)
         self.assertTrue(lines[0].startswith("spindle: "), finished)
         self.assertIn(named, lines[0], finished)
-        self.assertIn(suggested, lines[0], finished)
+        self.assertIn(suggested, " ".join(finished.stderr.split()), finished)
 
     def test_wrong_requests(self):
         with hostile_server.HostileServer({}) as server:
