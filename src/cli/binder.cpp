@@ -37,6 +37,19 @@ Result<Duration> to_duration(std::string_view option, const std::string& text) {
       bad_option(option, fmt::format("'{}' {}", text, why), "write it like 500ms, 2.5s or 5min"));
 }
 
+Result<std::vector<std::string>> to_columns(std::string_view option, const std::string& text) {
+  std::vector<std::string> columns;
+  for (const std::string_view word : split(text, ',')) {
+    if (word.empty()) {
+      return tl::unexpected(bad_option(option,
+                                       fmt::format("'{}' has a column without a name", text),
+                                       "write it like name,value,unit"));
+    }
+    columns.emplace_back(word);
+  }
+  return columns;
+}
+
 Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text) {
   constexpr std::uint64_t last_unit = 247;  // Modbus over Serial Line 1.02, 2.2
   std::vector<modbus::UnitId> units;

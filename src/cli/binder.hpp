@@ -37,6 +37,9 @@ Result<Duration> to_duration(std::string_view option, const std::string& text);
 /// "1-3,7": units of a serial line, each once, in the order given.
 Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text);
 
+/// "name,value,unit": words between commas.
+Result<std::vector<std::string>> to_columns(std::string_view option, const std::string& text);
+
 /// "0..999", "0x0..0x3E7" or one register; both ends count.
 struct RegisterBounds {
   std::uint16_t from = 0;

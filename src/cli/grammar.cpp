@@ -125,6 +125,7 @@ struct ParseState {
   /// Instead of what the command's words say.
   std::optional<Invocation::ToolsFile> tools_file = std::nullopt;
   std::string only_as_text = {};  ///< why neither JSON nor CSV can be had; empty: they can
+  bool has_columns = false;       ///< whether the command shows a list and changes nothing
 };
 
 constexpr std::string_view end_of_options = "--";
@@ -146,7 +147,8 @@ void add_common_options(CLI::App& app, ParseState& draft) {
   work::CommonOptions& common = invocation.common;
   commands::UserOptions& user = invocation.user;
   bind.option("-o,--output", "FORMAT", invocation.format, one_of(format_words),
-              "table, json (JSON Lines) or csv; results --curve also has svg");
+              "table, wide (all columns), value (only values), json (JSON Lines), yaml, csv; "
+              "results --curve also svg");
   bind.flag(
       "--json", [] {}, "the same as -o json");  // see with_one_output_option()
   bind.option("--profile", "NAME|FILE", common.profile, "what the tool's registers mean");
@@ -235,6 +237,13 @@ void add_command(CLI::App& parent, ParseState& draft, const Words& words, Option
 
 constexpr std::string_view target_words = "tool name, @group or URL";
 
+/// For lists of what changes nothing: a wrong column is told before it is too late.
+void bind_columns(Binder& bind, ParseState& draft) {
+  draft.has_columns = true;
+  bind.option("--columns", "LIST", draft.invocation.columns, to_columns,
+              "which columns, as in name,value,unit");
+}
+
 void bind_jobs(Binder& bind, std::size_t& jobs) {
   bind.option("--jobs", "N", jobs, NumberFrom{1, 10'000}, "how many tools at a time (default 64)");
 }
@@ -246,8 +255,9 @@ void add_identify(CLI::App& app, ParseState& draft) {
                            "spindle identify tcp://192.168.10.23:5000\n"
                            "spindle identify station3 station4 --json"};
   add_command(app, draft, words, draft.options.identify, commands::identify,
-              [](Binder& bind, commands::IdentifyOptions& options) {
+              [&draft](Binder& bind, commands::IdentifyOptions& options) {
                 bind.required("TARGET", options.targets, target_words);
+                bind_columns(bind, draft);
                 bind_jobs(bind, options.jobs);
               });
 }
@@ -259,9 +269,10 @@ void add_list(CLI::App& app, ParseState& draft) {
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
   add_command(app, draft, words, draft.options.list, commands::list,
-              [](Binder& bind, commands::ListOptions& options) {
+              [&draft](Binder& bind, commands::ListOptions& options) {
                 bind.argument("PATTERN", options.arguments,
-                              "names or patterns; a tool name or URL may stand before them");
+                              "names or patterns; a tool, URL or profile may stand before them");
+                bind_columns(bind, draft);
               });
 }
 
@@ -275,9 +286,10 @@ void add_get(CLI::App& app, ParseState& draft) {
       "spindle get @line1 'preset.1.*' --json\n"
       "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:0..31"};
   add_command(app, draft, words, draft.options.get, commands::get,
-              [](Binder& bind, commands::GetOptions& options) {
+              [&draft](Binder& bind, commands::GetOptions& options) {
                 bind.required("TARGET", options.target, target_words);
                 bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
+                bind_columns(bind, draft);
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
                 bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
@@ -347,7 +359,8 @@ void add_ping(CLI::App& app, ParseState& draft) {
                            "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
   add_command(app, draft, words, draft.options.ping, commands::ping,
-              [](Binder& bind, commands::PingOptions& options) {
+              [&draft](Binder& bind, commands::PingOptions& options) {
+                bind_columns(bind, draft);
                 bind.required("TARGET", options.target, target_words);
                 bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000},
                             "how many requests (default 4)");
@@ -426,7 +439,11 @@ void add_scan(CLI::App& app, ParseState& draft) {
     options.registers = arguments.registers.span();
     return commands::scan(options, context);
   };
-  add_command(app, draft, words, draft.options.scan, run, bind_scan);
+  add_command(app, draft, words, draft.options.scan, run,
+              [&draft](Binder& bind, ScanArguments& arguments) {
+                bind_scan(bind, arguments);
+                bind_columns(bind, draft);
+              });
 }
 
 std::string trouble_words() {
@@ -497,7 +514,11 @@ void add_watch(CLI::App& app, ParseState& draft) {
                            "spindle watch station3\n"
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
-  add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
+  add_command(app, draft, words, draft.options.watch, run_watch,
+              [&draft](Binder& bind, WatchArguments& watch) {
+                bind_watch(bind, watch);
+                bind_columns(bind, draft);
+              });
 }
 
 std::string record_words() {
@@ -792,7 +813,8 @@ void add_alarms(CLI::App& app, ParseState& draft) {
                            "spindle alarms @line1\n"
                            "spindle alarms station3 --reset"};
   add_command(app, draft, words, draft.options.alarms, commands::alarms,
-              [](Binder& bind, commands::AlarmsOptions& options) {
+              [&draft](Binder& bind, commands::AlarmsOptions& options) {
+                bind_columns(bind, draft);
                 bind.required("TARGET", options.target, target_words);
                 bind.flag("--reset", options.reset, commands::AlarmReset::yes,
                           "also reset the present alarm");
@@ -887,7 +909,8 @@ void add_diff(CLI::App& app, ParseState& draft) {
       "spindle diff station3 dump.yaml\n"
       "spindle diff @line1 --dir backups"};
   add_command(app, draft, words, draft.options.diff, commands::diff,
-              [](Binder& bind, commands::DiffOptions& options) {
+              [&draft](Binder& bind, commands::DiffOptions& options) {
+                bind_columns(bind, draft);
                 bind.required("A", options.a,
                               "tool, backup or dump file, or 'defaults'; with --dir also @group");
                 bind.argument("B", options.b, "tool, backup or dump file, or 'defaults'");
@@ -1044,7 +1067,8 @@ void add_profile_commands(CLI::App& profile, ParseState& draft) {
   };
   add_command(profile, draft,
               {"list", "", "all profiles that can be named", "spindle profile list"},
-              draft.options.profile_list, list, [](Binder&, Options&) {});
+              draft.options.profile_list, list,
+              [&draft](Binder& bind, Options&) { bind_columns(bind, draft); });
   add_command(profile, draft,
               {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
               draft.options.profile_show, commands::profile_show, bind_name);
@@ -1097,6 +1121,7 @@ void add_tools(CLI::App& app, ParseState& draft) {
                   draft.tools_file = Invocation::ToolsFile::only_found;
                 };
                 bind.flag("--check", check_file, "every fault of the file, with its place");
+                bind_columns(bind, draft);
               });
 }
 
@@ -1182,7 +1207,11 @@ void add_results(CLI::App& app, ParseState& draft) {
                            "spindle results station3 --qdas quality\n"
                            "spindle results --curve 2401190042/0/1962 -o svg > curve.svg",
                            results_words};
-  add_command(app, draft, words, draft.options.results, commands::results, bind_results);
+  add_command(app, draft, words, draft.options.results, commands::results,
+              [&draft](Binder& bind, commands::ResultsOptions& options) {
+                bind_results(bind, options);
+                bind_columns(bind, draft);
+              });
 }
 
 void add_store_commands(CLI::App& store, ParseState& draft) {
@@ -1266,7 +1295,8 @@ void add_log(CLI::App& app, ParseState& draft) {
                            "spindle log station3 --since 7d\n"
                            "spindle log '*.target-torque' --json"};
   add_command(app, draft, words, draft.options.log, commands::log,
-              [](Binder& bind, commands::LogOptions& options) {
+              [&draft](Binder& bind, commands::LogOptions& options) {
+                bind_columns(bind, draft);
                 bind.argument("TARGET", options.arguments,
                               "tools, groups, serial numbers, names or patterns of parameters");
                 bind.option("--since", "TIME", options.since, "from this time on");
@@ -1498,6 +1528,23 @@ Invocation telling(std::string text) {
   return help;
 }
 
+/// Where columns cannot be chosen, and where they have to be.
+std::optional<Error> check_columns(const ParseState& draft) {
+  using report::Format;
+  const Format format = draft.invocation.format;
+  const bool has_all = format == Format::json || format == Format::yaml || format == Format::svg;
+  if (has_all && !draft.invocation.columns.empty()) {
+    return usage("--columns is about tables, CSV and -o value", "JSON and YAML have every key");
+  }
+  const bool resets = draft.options.alarms.reset == commands::AlarmReset::yes;
+  if (resets && (format == Format::value || !draft.invocation.columns.empty())) {
+    return usage("--columns and -o value do not go with --reset", "leave one of them out");
+  }
+  if (format != Format::value || draft.has_columns || draft.chosen == nullptr) return std::nullopt;
+  return usage(fmt::format("{} has no list of values", path_of(draft.chosen)),
+               "-o value is for 'spindle get' and other lists; --json has every key");
+}
+
 Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   const auto extra = first_extra(app);
   // Where a command is misspelt, the program's help would hide it.
@@ -1516,7 +1563,8 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
     invocation.asks = Invocation::Asks::version;
     return std::move(invocation);
   }
-  if (!draft.only_as_text.empty() && invocation.format != report::Format::table) {
+  if (!draft.only_as_text.empty() && invocation.format != report::Format::table &&
+      invocation.format != report::Format::wide) {
     return tl::unexpected(
         usage(draft.only_as_text, "leave out --json and --output, or name a file"));
   }
@@ -1524,6 +1572,7 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
     return tl::unexpected(usage("only 'spindle results --curve' draws",
                                 "choose another --output: table, json or csv"));
   }
+  if (auto fault = check_columns(draft)) return tl::unexpected(std::move(*fault));
   if (is_chosen(draft, help_command)) return help_of(app, draft).map(telling);
   if (draft.chosen == nullptr) {
     return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));

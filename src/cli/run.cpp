@@ -19,6 +19,8 @@ namespace {
 /// Not a command for people: the completion scripts of the shells use it.
 constexpr std::string_view completion_command = "__complete";
 
+using Texts = std::vector<std::string>;
+
 int exit_status(ExitStatus status) { return static_cast<int>(status); }
 
 std::string variable(const World& world, std::string_view name) {
@@ -170,7 +172,9 @@ Result<void> tell_version(const World& world, report::Format format, report::Ren
   const std::string& library = world.installation.modbus_library;
   const std::string plain = fmt::format("spindle {}\nlibmodbus {}\nprofile format {}", version,
                                         library, files::profile_format);
-  if (format != report::Format::json) return world.io.out(plain + "\n");
+  if (format != report::Format::json && format != report::Format::yaml) {
+    return world.io.out(plain + "\n");
+  }
   report::Texts profiles;
   for (const auto& entry : profile_store(world).list()) {
     profiles.push_back(entry.id);
@@ -195,7 +199,12 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
       invocation ? invocation->user.verbosity : report::Verbosity::normal;
   if (invocation) world.io.color = color_of(world, invocation->color);
   if (invocation && is_dumb(world)) invocation->user.progress = report::Showing::unwanted;
-  const auto renderer = report::make_renderer(format, world.io, verbosity);
+  const auto renderer =
+      report::make_renderer({.format = format,
+                             .verbosity = verbosity,
+                             .columns = invocation ? invocation->columns : Texts(),
+                             .clock = &world.clock},
+                            world.io);
   if (!invocation) return tell(invocation.error(), world, *renderer);
   if (invocation->asks == Invocation::Asks::version) {
     const auto told = tell_version(world, format, *renderer);

@@ -21,11 +21,12 @@ using catalogue::Selection;
 using report::Align;
 using report::Column;
 
-const std::array<Column, 5> columns = {{{"NAME", "name"},
-                                        {"REGISTER", "register", Align::right},
-                                        {"A", "a", Align::right},
-                                        {"B", "b", Align::right},
-                                        {"UNIT", "unit"}}};
+const std::array<Column, 5> columns = {
+    {{"NAME", "name"},
+     {"REGISTER", "register", Align::right, 0, report::left_out(1)},
+     {"A", "a", Align::right},
+     {"B", "b", Align::right},
+     {"UNIT", "unit"}}};
 
 Error nothing_left() {
   return {.code = Errc::usage,
@@ -61,13 +62,17 @@ report::Field side_field(std::string key, const std::optional<catalogue::Value>&
 
 report::Record difference_record(const Difference& difference, const std::string& target,
                                  const Clock& clock) {
+  const auto toned = [](report::Field field, report::Tone tone) {
+    field.tone = tone;
+    return field;
+  };
   return {.type = "diff",
           .target = target,
           .time = clock.wall(),
           .fields = {{"name", difference.parameter.name},
                      {"register", number(difference.parameter.address.value)},
-                     side_field("a", difference.a, difference),
-                     side_field("b", difference.b, difference),
+                     toned(side_field("a", difference.a, difference), report::Tone::bad),
+                     toned(side_field("b", difference.b, difference), report::Tone::good),
                      {"unit", text_or_null(units_in_words(difference))},
                      {"unit_a", text_or_null(difference.unit_a)},
                      {"unit_b", text_or_null(difference.unit_b)}}};

@@ -19,11 +19,12 @@ namespace {
 using report::Cell;
 using report::Column;
 
-const std::array<Column, 5> columns = {{{"MODEL", "tool_model"},
-                                        {"SERIAL", "serial"},
-                                        {"FIRMWARE", "firmware"},
-                                        {"PROFILE", "profile"},
-                                        {"ROUND TRIP", "round_trip_ms"}}};
+const std::array<Column, 5> columns = {
+    {{"MODEL", "tool_model"},
+     {"SERIAL", "serial"},
+     {"FIRMWARE", "firmware", report::Align::left, 0, report::left_out(2)},
+     {"PROFILE", "profile"},
+     {"ROUND TRIP", "round_trip_ms", report::Align::left, 0, report::left_out(1)}}};
 
 /// One tool's answer, or why there is none.
 struct Identified {

@@ -16,15 +16,16 @@ namespace {
 
 using report::Align;
 
-const std::array<report::Column, 9> columns = {{{"ID", "id"},
-                                                {"TIME", "changed"},
-                                                {"TARGET", "target"},
-                                                {"NAME", "name"},
-                                                {"OLD", "old", Align::right},
-                                                {"NEW", "new", Align::right},
-                                                {"RESULT", "result"},
-                                                {"COMMAND", "command"},
-                                                {"USER", "user"}}};
+const std::array<report::Column, 9> columns = {
+    {{"ID", "id"},
+     {"TIME", "changed", Align::left, 0, report::wrapped(14)},
+     {"TARGET", "target"},
+     {"NAME", "name"},
+     {"OLD", "old", Align::right},
+     {"NEW", "new", Align::right},
+     {"RESULT", "result"},
+     {"COMMAND", "command", Align::left, 0, report::left_out(2)},
+     {"USER", "user", Align::left, 0, report::left_out(1)}}};
 
 /// Which changes are meant; what is empty means all.
 struct Wanted {

@@ -17,6 +17,8 @@ using report::Align;
 using report::Cell;
 using report::Column;
 using report::Field;
+using report::left_out;
+using report::wrapped;
 
 Cell number_or_null(const std::optional<Decimal>& value) {
   return value ? Cell(*value) : Cell(std::monostate());
@@ -182,12 +184,17 @@ report::Record value_record(const device::Reading& reading, const Target& target
 }
 
 std::span<const Column> value_columns(device::Limits limits) {
-  static const std::array<Column, 5> columns = {{{"NAME", "name"},
+  using report::only_wide;
+  static const std::array<Column, 9> columns = {{{"TIME", "time", Align::left, 0, only_wide()},
+                                                 {"TARGET", "target", Align::left, 0, only_wide()},
+                                                 {"NAME", "name"},
                                                  {"VALUE", "value", Align::right},
                                                  {"UNIT", "unit"},
+                                                 {"RAW", "raw", Align::right, 0, only_wide()},
+                                                 {"LABEL", "label", Align::left, 0, only_wide()},
                                                  {"MINIMUM", "minimum", Align::right},
                                                  {"MAXIMUM", "maximum", Align::right}}};
-  return std::span(columns).first(limits == device::Limits::read ? 5 : 3);
+  return std::span(columns).first(limits == device::Limits::read ? 9 : 7);
 }
 
 report::Record parameter_record(const Parameter& parameter, const std::string& target,
@@ -232,18 +239,19 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
 
 std::vector<Column> parameter_columns(std::span<const Parameter> parameters) {
   std::vector<Column> columns = {{{"NAME", "name"},
-                                  {"TABLE", "table"},
-                                  {"REGISTER", "register", Align::right},
-                                  {"TYPE", "encoding"},
+                                  {"TABLE", "table", Align::left, 0, left_out(1)},
+                                  {"REGISTER", "register", Align::right, 0, left_out(4)},
+                                  {"TYPE", "encoding", Align::left, 0, left_out(3)},
                                   {"MINIMUM", "minimum", Align::right},
                                   {"MAXIMUM", "maximum", Align::right},
                                   {"UNIT", "unit"},
-                                  {"ACCESS", "access"},
-                                  {"EVIDENCE", "evidence"},
-                                  {"MEANING", "title"}}};
+                                  {"ACCESS", "access", Align::left, 0, left_out(5)},
+                                  {"EVIDENCE", "evidence", Align::left, 0, left_out(2)},
+                                  {"MEANING", "title", Align::left, 0, wrapped(24)}}};
   const bool any = std::any_of(parameters.begin(), parameters.end(),
                                [](const Parameter& one) { return one.effect.has_value(); });
-  if (any) columns.insert(columns.end() - 1, {"TAKES EFFECT", "effect"});
+  if (any)
+    columns.insert(columns.end() - 1, {"TAKES EFFECT", "effect", Align::left, 0, left_out(6)});
   return columns;
 }
 
@@ -266,13 +274,14 @@ report::Record action_record(const catalogue::Action& action, const std::string&
 }
 
 std::span<const Column> action_columns() {
-  static const std::array<Column, 7> columns = {{{"ACTION", "action"},
-                                                 {"REGISTER", "register", Align::right},
-                                                 {"VALUES", "values"},
-                                                 {"HAZARD", "hazard"},
-                                                 {"EVIDENCE", "evidence"},
-                                                 {"SOURCE", "source"},
-                                                 {"MEANING", "title"}}};
+  static const std::array<Column, 7> columns = {
+      {{"ACTION", "action"},
+       {"REGISTER", "register", Align::right, 0, left_out(2)},
+       {"VALUES", "values", Align::left, 0, wrapped(16)},
+       {"HAZARD", "hazard"},
+       {"EVIDENCE", "evidence", Align::left, 0, left_out(3)},
+       {"SOURCE", "source", Align::left, 0, left_out(1)},
+       {"MEANING", "title", Align::left, 0, wrapped(24)}}};
   return columns;
 }
 

@@ -73,7 +73,7 @@ Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
     auto written = write_page(assessed, zone, options, reader, context);
     if (!written) return written;
   }
-  if (context.user.format == report::Format::table) {
+  if (report::is_table(context.user.format)) {
     if (!options.file.empty()) return {};
     for (const std::string& line : report_lines(assessed, zone)) {
       auto told = context.renderer.line({}, line);

@@ -21,7 +21,7 @@ constexpr Duration follow_every = std::chrono::milliseconds(200);
 std::optional<std::size_t> newest_wanted(const ResultsOptions& options, const Selection& selection,
                                          store::Reader& reader, const Context& context) {
   if (options.count) return options.count;
-  const bool is_screen = context.io.out_is_terminal && context.user.format == report::Format::table;
+  const bool is_screen = context.io.out_is_terminal && report::is_table(context.user.format);
   if (!is_screen || !selection.is_whole || options.told == Told::gaps) return std::nullopt;
   const auto newest = reader.newest();
   if (!newest || *newest <= static_cast<store::RowId>(newest_on_terminal)) return std::nullopt;

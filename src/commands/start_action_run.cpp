@@ -70,7 +70,9 @@ class StartActionRun final : public ToolRun {
   }
 
   [[nodiscard]] std::vector<report::Column> columns() const override {
-    return news_columns(Tools::one, {tool().profile.get()});
+    const catalogue::Profile* const profile = tool().profile.get();
+    if (context().user.format == report::Format::csv) return exchange_columns({profile});
+    return news_columns({Tools::one, {profile}, {tool().target.torque_unit}});
   }
   [[nodiscard]] work::LoggedChange start_change() const override {
     return {.name = plan_->start.name,

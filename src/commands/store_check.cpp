@@ -18,21 +18,22 @@ namespace {
 using report::Align;
 using report::Record;
 
-const std::array<report::Column, 9> coverage_columns = {{{"TARGET", "target"},
-                                                         {"SERIAL", "serial"},
-                                                         {"EPOCH", "epoch", Align::right},
-                                                         {"FIRST", "first", Align::right},
-                                                         {"LAST", "last", Align::right},
-                                                         {"ROWS", "rows", Align::right},
-                                                         {"IN GAPS", "in_gaps", Align::right},
-                                                         {"HOLES", "holes", Align::right},
-                                                         {"NUMBERS", "verdict"}}};
+const std::array<report::Column, 9> coverage_columns = {
+    {{"TARGET", "target"},
+     {"SERIAL", "serial"},
+     {"EPOCH", "epoch", Align::right, 0, report::left_out(1)},
+     {"FIRST", "first", Align::right},
+     {"LAST", "last", Align::right},
+     {"ROWS", "rows", Align::right},
+     {"IN GAPS", "in_gaps", Align::right},
+     {"HOLES", "holes", Align::right},
+     {"NUMBERS", "verdict"}}};
 
 const std::array<report::Column, 7> odometer_columns = {
     {{"TARGET", "target"},
      {"SERIAL", "serial"},
-     {"SINCE", "since"},
-     {"UNTIL", "until"},
+     {"SINCE", "since", Align::left, 0, report::wrapped(14)},
+     {"UNTIL", "until", Align::left, 0, report::wrapped(14)},
      {"COUNTED BY TOOL", "counted", Align::right},
      {"STORED", "stored", Align::right},
      {"FASTENINGS", "verdict"}}};

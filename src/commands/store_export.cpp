@@ -131,7 +131,7 @@ Result<void> add_all(store::Reader& reader, StoredRecords& records, LineSink& si
 }  // namespace
 
 Result<Outcome> export_store(const CopyOptions& options, Context& context) {
-  if (context.user.format == report::Format::csv) {
+  if (context.user.format == report::Format::csv || context.user.format == report::Format::yaml) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "an export is JSON Lines",
                                 .hint = "'spindle results -o csv' writes a table of the results"});

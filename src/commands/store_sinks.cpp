@@ -19,12 +19,13 @@ namespace {
 
 using report::Align;
 
-const std::array<report::Column, 6> columns = {{{"SINK", "sink"},
-                                                {"EVENT", "event", Align::right},
-                                                {"WAITING", "waiting", Align::right},
-                                                {"OLDEST", "oldest"},
-                                                {"MOVED", "moved"},
-                                                {"URL", "url"}}};
+const std::array<report::Column, 6> columns = {
+    {{"SINK", "sink"},
+     {"EVENT", "event", Align::right},
+     {"WAITING", "waiting", Align::right},
+     {"OLDEST", "oldest", Align::left, 0, report::wrapped(14)},
+     {"MOVED", "moved", Align::left, 0, report::wrapped(14, 1)},
+     {"URL", "url", Align::left, 0, report::wrapped(20, 2)}}};
 
 report::Record sink_record(const store::SinkRow& sink, const store::Backlog& backlog,
                            const Clock& clock) {

@@ -17,12 +17,13 @@ namespace {
 using report::Column;
 using report::Record;
 
-const std::array<Column, 6> tool_columns = {{{"NAME", "name"},
-                                             {"URL", "endpoint"},
-                                             {"PROFILE", "profile"},
-                                             {"TORQUE UNIT", "torque_unit"},
-                                             {"GROUPS", "groups"},
-                                             {"VERIFIED", "verified"}}};
+const std::array<Column, 6> tool_columns = {
+    {{"NAME", "name"},
+     {"URL", "endpoint", report::Align::left, 0, report::wrapped(24)},
+     {"PROFILE", "profile"},
+     {"TORQUE UNIT", "torque_unit", report::Align::left, 0, report::left_out(2)},
+     {"GROUPS", "groups", report::Align::left, 0, report::wrapped(12)},
+     {"VERIFIED", "verified", report::Align::left, 0, report::wrapped(12, 1)}}};
 
 std::vector<std::string> groups_of(const files::Tool& tool, const files::Tools& tools) {
   std::vector<std::string> groups;

@@ -133,7 +133,10 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   TRY_LET(auto memory, Memory::open(options, context));
   std::vector<Target> targets;
   for (const WatchedTool& tool : tools) targets.push_back(tool.target());
-  WatchStream stream(options, tools.size(), columns_for(tools, shelf, options, context), context);
+  std::vector<std::string> names;
+  for (const Target& target : targets) names.push_back(target.shown);
+  WatchStream stream(options, names, columns_for(tools, shelf, options, context), context);
+  if (!stream.is_open()) return stream.finish();
   const auto note = [&](const std::string& sentence) { stream.note(sentence); };
   OwnedLines lines(targets, context, note);
   TRY(let_others_ask(lines, options.gateway, note));

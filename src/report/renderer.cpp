@@ -5,17 +5,26 @@
 
 namespace spindle::report {
 
-std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity) {
-  switch (format) {
+std::unique_ptr<Renderer> make_renderer(const Look& look, Streams& streams) {
+  switch (look.format) {
     case Format::json:
-      return make_json_renderer(streams, verbosity);
+      return make_json_renderer(streams, look.verbosity);
+    case Format::yaml:
+      return make_yaml_renderer(streams, look.verbosity);
     case Format::csv:
-      return make_csv_renderer(streams, verbosity);
+      return make_csv_renderer(streams, look);
+    case Format::value:
+      return make_value_renderer(streams, look);
     case Format::table:
+    case Format::wide:
     case Format::svg:
       break;
   }
-  return make_table_renderer(streams, verbosity);
+  return make_table_renderer(streams, look);
+}
+
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity) {
+  return make_renderer({.format = format, .verbosity = verbosity}, streams);
 }
 
 Record error_record(const Error& error, WallTime time) {

@@ -106,7 +106,7 @@ TEST_CASE("lines for programs begin on a line of their own behind one that was c
     Format format;
     std::string_view first;
   };
-  for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\nf\r\n"}}) {
+  for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\ntarget,f\r\n"}}) {
     Caught caught;
     caught.streams.out_ends_within_line = [] { return true; };
     const auto renderer = make_renderer(row.format, caught.streams, Verbosity::normal);
@@ -361,8 +361,8 @@ TEST_CASE("CSV: RFC 4180 with the columns' keys as header") {
   CHECK(rendered(Format::csv, value_columns,
                  {value_record("a", Decimal(271, -2)),
                   value_record("b", Decimal(100), std::string("%"))}) ==
-        "name,value,unit\r\na,2.71,\r\nb,100,%\r\n");
-  CHECK(rendered(Format::csv, value_columns, {}) == "name,value,unit\r\n");
+        "target,name,value,unit\r\nsim:doga-bm,a,2.71,\r\nsim:doga-bm,b,100,%\r\n");
+  CHECK(rendered(Format::csv, value_columns, {}) == "target,name,value,unit\r\n");
 }
 
 TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is shown") {
@@ -381,7 +381,7 @@ TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is sh
       {"21.5 °C \xff", "21.5 °C \uFFFD"},
       {"", ""},
   };
-  for (const Row& row : rows) CHECK(csv_cell(row.text) == "f\r\n" + row.field + "\r\n");
+  for (const Row& row : rows) CHECK(csv_cell(row.text) == "target,f\r\n," + row.field + "\r\n");
 }
 
 TEST_CASE("CSV: cells as they are, the target, and a header only when the columns change") {
@@ -396,8 +396,8 @@ TEST_CASE("CSV: cells as they are, the target, and a header only when the column
     REQUIRE(renderer->record(record));
     REQUIRE(renderer->end());
   }
-  REQUIRE(renderer->begin(std::vector<Column>{{"F", "f"}}));
-  CHECK(caught.out() == "target,f\r\nstation3,0.1\r\nstation3,0.1\r\nf\r\n");
+  REQUIRE(renderer->begin(std::vector<Column>{{"G", "g"}}));
+  CHECK(caught.out() == "target,f\r\nstation3,0.1\r\nstation3,0.1\r\ntarget,g\r\n");
 }
 
 TEST_CASE("a line stands for itself at once, a note is for people only") {

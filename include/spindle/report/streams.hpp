@@ -31,6 +31,10 @@ struct Streams {
   std::function<bool()> err_is_ready = {};
   /// Cells of a row of the terminal behind err(); 0, or an empty function: not known.
   std::function<std::size_t()> err_columns = {};
+  /// Rows of the same terminal; 0, or an empty function: not known.
+  std::function<std::size_t()> err_rows = {};
+  /// Cells of a row of the terminal behind out(); 0, or an empty function: not known.
+  std::function<std::size_t()> out_columns = {};
   /// Whether out() writes to a file that ends within a line; may be empty, which means no.
   std::function<bool()> out_ends_within_line = {};
   /// Writes what is taken of the text within this time, and returns how many bytes; fails as out()
