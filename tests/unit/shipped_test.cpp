@@ -187,9 +187,9 @@ TEST_CASE("without any file the program knows its profiles, and their bases are 
     CHECK(entry.path == files::built_in);
     ids.push_back(entry.id);
   }
-  CHECK(ids == std::vector<std::string>{"doga-bm", "doga-bmt", "eastron-sdm72d-m", "huanyang-fc01",
-                                        "kolver-kducer", "orientalmotor-blh", "orientalmotor-blv",
-                                        "orientalmotor-blvr"});
+  CHECK(ids == std::vector<std::string>{"doga-bm", "doga-bmt", "doga-gen2", "eastron-sdm72d-m",
+                                        "huanyang-fc01", "kolver-kducer", "orientalmotor-blh",
+                                        "orientalmotor-blv", "orientalmotor-blvr"});
   CHECK(store.load("doga-bm").value().id == "doga-bm");
   CHECK(store.load_code_tables(store.load("doga-bm").value().path).value().error.size() > 10);
   CHECK(store.load("doga-common").error().code == Errc::bad_file);
