@@ -170,10 +170,7 @@ TEST_CASE("curve: a channel comes with its samples, and one that no product has 
   CHECK(first->channels[0].channel == 0);
   CHECK(catalogue::to_samples(first->channels[0].samples) == first_curve());
   for (const std::uint16_t channel : std::vector<std::uint16_t>{0, 3, 0xFFFF}) {
-    CHECK(!frames.decode(
-        {.function = 0x64,
-         .data = Bytes(long_frame(0x64, curve_data(channel, 4, first_curve())).begin() + 8,
-                       long_frame(0x64, curve_data(channel, 4, first_curve())).end())}));
+    CHECK(!frames.decode(pdu_of(long_frame(0x64, curve_data(channel, 4, first_curve())))));
   }
 }
 
