@@ -29,8 +29,9 @@ namespace {
 
 const fs::path root = SPINDLE_SOURCE_DIR;
 const fs::path manual = root / "man";
-const std::vector<std::string> pages = {"spindle.1",        "spindle-profile.5", "spindle-tools.5",
-                                        "spindle-backup.5", "spindle-json.7",    "spindle-plant.7"};
+const std::vector<std::string> pages = {"spindle.1",         "spindle-profile.5", "spindle-tools.5",
+                                        "spindle-backup.5",  "spindle-json.7",    "spindle-plant.7",
+                                        "spindle-tutorial.7"};
 
 std::string read(const fs::path& path) {
   std::ifstream file(path);
@@ -56,6 +57,7 @@ std::vector<test::Placeholder> all_placeholders() {
     placeholders.push_back(std::move(placeholder));
   placeholders.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
   placeholders.push_back(example("EXAMPLE_PLANT", "plant.yaml"));
+  placeholders.push_back(example("EXAMPLE_LINE1", "line1.yaml"));
   placeholders.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
   placeholders.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
   placeholders.push_back(example("EXAMPLE_ENCODINGS", "any-device.yaml"));
