@@ -141,9 +141,12 @@ TEST_CASE("curve: an event says the same whichever of its forms brings it") {
     CHECK(block.size() == 107);
     CHECK(layout.number_of(block) == 1962);
     CHECK(layout.kind_of(block) == catalogue::EventKind::fastening_ok);
-    CHECK(layout.torque_unit_of(block) == "N.m");
+    CHECK(layout.torque_unit_of(block, "lbf.in") == "N.m");
     CHECK(layout.key_of(block) == layout.key_of(blocks.front()));
   }
+  Registers of_unknown_unit = blocks.front();
+  of_unknown_unit[layout.find("event.torque-unit")->at] = 9;
+  CHECK(layout.torque_unit_of(of_unknown_unit, "lbf.in").empty());
   REQUIRE(whole->channels.size() == 2);
   CHECK(catalogue::to_samples(whole->channels[0].samples) == first_curve());
   CHECK(catalogue::to_samples(whole->channels[1].samples) == second_curve());
@@ -167,10 +170,7 @@ TEST_CASE("curve: a channel comes with its samples, and one that no product has 
   CHECK(first->channels[0].channel == 0);
   CHECK(catalogue::to_samples(first->channels[0].samples) == first_curve());
   for (const std::uint16_t channel : std::vector<std::uint16_t>{0, 3, 0xFFFF}) {
-    CHECK(!frames.decode(
-        {.function = 0x64,
-         .data = Bytes(long_frame(0x64, curve_data(channel, 4, first_curve())).begin() + 8,
-                       long_frame(0x64, curve_data(channel, 4, first_curve())).end())}));
+    CHECK(!frames.decode(pdu_of(long_frame(0x64, curve_data(channel, 4, first_curve())))));
   }
 }
 

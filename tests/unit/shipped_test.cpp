@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/catalogue/fields.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/posix/disk.hpp"
@@ -195,6 +197,23 @@ TEST_CASE("without any file the program knows its profiles, and their bases are 
   CHECK(store.load("doga-common").error().code == Errc::bad_file);
   CHECK(store.load("doga-b").error().hint.find("doga-bm") != std::string::npos);
   CHECK(store.check("doga-bm").value().empty());
+}
+
+TEST_CASE("no register of an event has a key that its record has beside the registers") {
+  const std::set<std::string> taken = {"schema", "type",        "time",      "target", "serial",
+                                       "epoch",  "id",          "kind",      "source", "raw",
+                                       "text",   "torque_unit", "error_text"};
+  const ProfileStore store({}, posix::source_disk(), shipped::profiles());
+  for (const auto& entry : store.list()) {
+    CAPTURE(entry.id);
+    const auto profile = store.load(entry.id).value();
+    if (!profile.events) continue;
+    const catalogue::EventLayout layout(profile);
+    for (const auto& field : layout.fields()) {
+      CAPTURE(field.key);
+      CHECK(!taken.contains(field.key));
+    }
+  }
 }
 
 TEST_CASE("a user's profile extends one of the program as it extends its file") {
