@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import pathlib
+import re
 import shutil
 import sqlite3
 import tempfile
@@ -96,6 +97,27 @@ class UpgradeTest(unittest.TestCase):
             restored = self.run_well("restore", url, backup, "--profile", "orientalmotor-blv", "--yes")
             self.assertIn("2 written", restored.stderr)
             self.run_well("diff", backup, *tool)
+
+    # ---- what is newer ----
+
+    def test_a_newer_file_is_refused(self):
+        """With status 3, and nothing of it is read."""
+        for name, arguments in (("backup-bm.yaml", ("diff", "{}", "sim:doga-bm")),
+                                ("dump.yaml", ("diff", "{}", "sim:doga-bm")),
+                                ("my-driver.yaml", ("profile", "check", "{}"))):
+            with self.subTest(name):
+                file = self.copy(name)
+                text = file.read_text()
+                self.assertEqual(len(re.findall(r"(?m)^format: 1$", text)), 1)
+                file.write_text(re.sub(r"(?m)^format: 1$", "format: 2", text))
+                finished = self.run_well(*(word.format(file) for word in arguments), status=3)
+                self.assertIn("format", finished.stderr + finished.stdout)
+        store = self.copy("store.db")
+        with contextlib.closing(sqlite3.connect(store)) as opened:
+            opened.execute(f"PRAGMA user_version = {NEWEST + 1}")
+        for arguments in (("results",), ("record", "sim:doga-bm")):
+            finished = self.run_well(*arguments, "--store", store, status=3)
+            self.assertIn(f"is a store of version {NEWEST + 1}", finished.stderr)
 
     # ---- what users write, and the record of changes ----
 

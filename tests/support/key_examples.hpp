@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "files/known_keys.hpp"
 #include "files/yaml_reader.hpp"
 
 /// Examples of keys, out of files that the program itself takes.
@@ -63,10 +64,23 @@ class FlowText {
 
 using Nodes = std::vector<const files::YamlNode*>;
 
-/// The maps that a value is, or has as a list.
+/// The maps that a value is, or has as a list, also those of a group in it.
 inline void add_maps(const files::YamlNode& value, Nodes& maps) {
   if (value.kind == files::YamlNode::Kind::map) maps.push_back(&value);
   for (const files::YamlNode& item : value.items) add_maps(item, maps);
+  if (const files::YamlNode* fields = value.find("fields")) add_maps(*fields, maps);
+}
+
+/// Those of a value that have one of these keys: itself, or what it has by numbers or names.
+inline void add_maps_with(const std::vector<files::Key>& keys, const files::YamlNode& value,
+                          Nodes& maps) {
+  for (const files::YamlNode& item : value.items) add_maps_with(keys, item, maps);
+  const bool has_one = std::any_of(keys.begin(), keys.end(), [&](const files::Key& key) {
+    return value.find(key.name) != nullptr;
+  });
+  if (has_one) maps.push_back(&value);
+  for (const files::YamlEntry& entry : value.entries)
+    if (!has_one) add_maps_with(keys, entry.value, maps);
 }
 
 /// Profiles, to look examples up in.
@@ -105,6 +119,9 @@ class KeyExamples {
       const files::YamlNode* value = map->find(key);
       if (value == nullptr) continue;
       std::string text = fmt::format("{}: {}", key, FlowText::of(*value));
+      const bool is_told = value->kind != files::YamlNode::Kind::scalar || !value->text.empty();
+      const bool is_ascii = std::all_of(text.begin(), text.end(), [](char c) { return c >= ' '; });
+      if (!is_told || !is_ascii) continue;
       const bool is_cut = text.find("...") != std::string::npos;
       const bool best_is_cut = best.find("...") != std::string::npos;
       const auto rank = std::pair(is_cut, text.size());

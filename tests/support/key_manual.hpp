@@ -47,7 +47,8 @@ inline std::string literal(const std::string& text) {
 
 /// A row for each key with an example; below one that has a map the keys of that map.
 inline std::string key_rows(const std::vector<files::Key>& keys, const Nodes& maps,
-                            std::vector<std::string>& without, std::string_view indent = {}) {
+                            std::vector<std::string>& without, const std::string& path,
+                            std::string_view indent = {}) {
   constexpr std::string_view step = "\\ \\ ";
   std::string rows;
   for (const files::Key& key : keys) {
@@ -55,14 +56,19 @@ inline std::string key_rows(const std::vector<files::Key>& keys, const Nodes& ma
     rows += fmt::format(".It {}{}Ic {} Ta {}{}Ta\n", indent, space, mdoc_argument(key.name),
                         need_of(key), need_of(key).empty() ? "" : " ");
     const std::string example = KeyExamples::example(maps, key.name);
-    if (example.empty()) without.emplace_back(key.name);
-    Nodes inside;
-    for (const files::YamlNode* map : maps)
-      if (const files::YamlNode* value = map->find(key.name)) add_maps(*value, inside);
-    rows += mdoc_prose(value_of(key) + (example.empty() || key.inner != nullptr ? "" : ","));
+    if (example.empty()) without.push_back(fmt::format("{}.{}", path, key.name));
+    rows +=
+        mdoc_prose(value_of(key) + (example.empty() || key.inner != nullptr ? "" : ", such as"));
     if (key.inner == nullptr && !example.empty()) rows += fmt::format(".Li {}\n", literal(example));
-    if (key.inner != nullptr)
-      rows += key_rows(key.inner(), inside, without, fmt::format("{}{}", indent, step));
+    if (key.inner != nullptr) {
+      const std::vector<files::Key> keys_inside = key.inner();
+      Nodes inside;
+      for (const files::YamlNode* map : maps)
+        if (const files::YamlNode* value = map->find(key.name))
+          add_maps_with(keys_inside, *value, inside);
+      rows += key_rows(keys_inside, inside, without, fmt::format("{}.{}", path, key.name),
+                       fmt::format("{}{}", indent, step));
+    }
   }
   return rows;
 }
@@ -81,8 +87,8 @@ inline std::string key_list(const files::KeyList& list, const KeyExamples& examp
   return fmt::format(
       ".Pp\nKeys of\n.Ic {} :\n"
       ".Bl -column \"controller\\-model\" \"here or in a base\" \"decimal number\"\n"
-      ".It Sy Key Ta Sy Needed Ta Sy Value, such as\n{}.El\n",
-      mdoc_argument(list.map), key_rows(list.keys, examples.maps(list.map), without));
+      ".It Sy Key Ta Sy Needed Ta Sy Value, with an example\n{}.El\n",
+      mdoc_argument(list.map), key_rows(list.keys, examples.maps(list.map), without, list.map));
 }
 
 /// What a group of parameters may say for all of them.
