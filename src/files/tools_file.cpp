@@ -128,6 +128,7 @@ constexpr Field<Tool> tool_fields[] = {
     custom("retries", Need::optional, "number 0..100", read_retries),
     word<modbus::transaction_words, &Tool::transactions>("transaction"),
     custom("verified", Need::optional, "list of text", read_verified),
+    field<&Tool::serial>("serial"),
     custom("limits", Need::optional, "map of preset to text", read_limits),
 };
 
@@ -169,6 +170,7 @@ void read_group(const YamlEntry& entry, Tools& tools, Diagnostics& findings) {
 }
 
 void read_tool_map(const YamlNode& node, Tools& tools, const Asked& asked) {
+  if (node.kind == YamlNode::Kind::nothing) return;  // all of them may be comments
   expect(node, YamlNode::Kind::map, asked.findings);
   for (const YamlEntry& entry : node.entries) {
     tools.tools.push_back(read_tool(entry, asked.findings));
@@ -302,8 +304,7 @@ std::string entry_at(const YamlNode& document, const Position& place) {
 }
 
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
-  TRY_LET(const auto text, disk.read_trusted(path));
+Tools read_tools(std::string_view text, const std::string& path, Diagnostics& findings) {
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(text, file, Documents::all, findings);
   Tools tools;
@@ -323,6 +324,11 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
     tools.faults.try_emplace(entry, Error{.code = Errc::bad_file, .message = finding.to_string()});
   }
   return tools;
+}
+
+Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
+  TRY_LET(const auto text, disk.read_trusted(path));
+  return read_tools(text, path, findings);
 }
 
 /// What is said of a file that has these faults.
@@ -359,16 +365,29 @@ Result<Tools> load_tools(const std::string& path, const Disk& disk) {
 }
 
 Result<Tools> usable_tools(const std::string& path, const Disk& disk) {
+  TRY_LET(const auto text, disk.read_trusted(path));
+  return parse_tools(text, path);
+}
+
+Result<Tools> parse_tools(std::string_view text, const std::string& path) {
   Diagnostics findings;
-  auto tools = read_tools_file(path, disk, findings);
-  const bool is_of_the_whole = tools && tools->faults.contains("");
-  if (is_of_the_whole) return tl::unexpected(refusal_of(findings));
+  Tools tools = read_tools(text, path, findings);
+  if (tools.faults.contains("")) return tl::unexpected(refusal_of(findings));
   return tools;
 }
 
 Result<Tools> without_faults(Tools tools) {
   if (tools.faults.empty()) return tools;
   return tl::unexpected(tools.faults.begin()->second);
+}
+
+Result<Sink> usable_sink(const Sink& sink, const Tools& tools) {
+  const auto fault = tools.faults.find("sink " + sink.name);
+  if (fault == tools.faults.end()) return sink;
+  Error error = fault->second;
+  error.name = sink.name;
+  error.hint = "until it is mended, this entry is not used";
+  return tl::unexpected(std::move(error));
 }
 
 Tools salvage_tools(const std::string& path, const Disk& disk) {
