@@ -10,6 +10,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/files/change_log.hpp"
+#include "time_field.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -18,7 +19,7 @@ using report::Align;
 
 const std::array<report::Column, 9> columns = {
     {{"ID", "id"},
-     {"TIME", "changed", Align::left, 0, report::wrapped(14)},
+     {"TIME", "changed", Align::left, 0, report::wrapped(10)},
      {"TARGET", "target"},
      {"NAME", "name"},
      {"OLD", "old", Align::right},
@@ -65,21 +66,23 @@ Result<Wanted> wanted_by(const LogOptions& options, const ChangeHistory& history
   return wanted;
 }
 
-report::Record change_record(const PastChange& change, const Clock& clock) {
+report::Record change_record(const PastChange& change, const Context& context) {
+  const auto time = parse_time(change.time, context.clock);
   const bool is_open = change.result == files::begun;
   return {.type = "changed",
           .target = change.target,
-          .time = clock.wall(),
-          .fields = {{"id", text_or_null(change.id)},
-                     {"changed", change.time},
-                     {"user", change.user},
-                     {"command", change.command},
-                     {"serial", text_or_null(change.serial)},
-                     {"name", change.name},
-                     {"register", change.register_address},
-                     {"old", change.before},
-                     {"new", change.after},
-                     {"result", change.result, is_open ? "unknown: spindle was ended" : ""}}};
+          .time = context.clock.wall(),
+          .fields = {
+              {"id", text_or_null(change.id)},
+              time ? time_field("changed", *time, context) : report::Field{"changed", change.time},
+              {"user", change.user},
+              {"command", change.command},
+              {"serial", text_or_null(change.serial)},
+              {"name", change.name},
+              {"register", change.register_address},
+              {"old", change.before},
+              {"new", change.after},
+              {"result", change.result, is_open ? "unknown: spindle was ended" : ""}}};
 }
 
 }  // namespace
@@ -94,7 +97,7 @@ Result<Outcome> log(const LogOptions& options, Context& context) {
   const std::size_t shown = std::min(options.count.value_or(chosen.size()), chosen.size());
   Listing listing(context, columns);
   for (std::size_t at = chosen.size() - shown; at < chosen.size(); ++at) {
-    listing.add(change_record(*chosen[at], context.clock));
+    listing.add(change_record(*chosen[at], context));
   }
   if (history.unreadable > 0) {
     context.renderer.note(fmt::format("{} of the record of changes cannot be read",

@@ -64,8 +64,11 @@ class Screen:
 
     def wrapped(self):
         """Lines that were too wide for the screen, so that the terminal broke them."""
-        rows = [line.rstrip() for line in self.lines("-S", "-")]
-        return [line.rstrip() for line in self.lines("-S", "-", "-J") if line.rstrip() not in rows]
+        mark = "=" * 9  # both pictures are of one moment
+        both = self._tmux("capture-pane", "-p", "-S", "-", ";", "display-message", "-p", mark, ";",
+                          "capture-pane", "-p", "-J", "-S", "-")
+        rows, joined = ([line.rstrip() for line in part.split("\n")] for part in both.split(mark + "\n"))
+        return [line for line in joined if line not in rows]
 
     def wait(self, condition, what):
         """What stands there once it is as it should be."""
