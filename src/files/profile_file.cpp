@@ -327,6 +327,14 @@ constexpr Field<catalogue::CurveSpec> curve_fields[] = {
     field<&catalogue::CurveSpec::step_types>("step-types"),
 };
 
+constexpr Field<catalogue::BlockSearch> search_fields[] = {
+    field<&catalogue::BlockSearch::name>("name", Need::inherited),
+    field<&catalogue::BlockSearch::title>("title"),
+    field<&catalogue::BlockSearch::count>("count", Need::inherited),
+    range<&catalogue::BlockSearch::from, &catalogue::BlockSearch::to>("registers", Need::inherited),
+    field<&catalogue::BlockSearch::step>("step", Need::inherited),
+};
+
 constexpr Field<EventSpec> event_fields[] = {
     word<source_words, &EventSpec::model>("source", Need::optional, "source of events"),
     map_of<arm_fields, &EventSpec::arm>("arm"),
@@ -347,6 +355,46 @@ constexpr Field<EventSpec> event_fields[] = {
     field<&EventSpec::identity>("told-apart-by"),
     field<&EventSpec::torque_unit>("torque-unit"),
     map_of<curve_fields, &EventSpec::curves>("curves"),
+    map_of<search_fields, &EventSpec::search>("search"),
+};
+
+// ---- how tools are found, and what they can show ----
+
+constexpr Field<catalogue::DiscoverySpec> discovery_fields[] = {
+    field<&catalogue::DiscoverySpec::group>("group", Need::inherited),
+    field<&catalogue::DiscoverySpec::port>("port", Need::inherited),
+    field<&catalogue::DiscoverySpec::ask>("ask", Need::inherited),
+    field<&catalogue::DiscoverySpec::answer>("answer", Need::inherited),
+    field<&catalogue::DiscoverySpec::bytes>("bytes", Need::inherited),
+    field<&catalogue::DiscoverySpec::every>("every"),
+    field<&catalogue::DiscoverySpec::serial>("serial"),
+    field<&catalogue::DiscoverySpec::model>("model"),
+    field<&catalogue::DiscoverySpec::address>("address"),
+    field<&catalogue::DiscoverySpec::tool_port>("tool-port"),
+    field<&catalogue::DiscoverySpec::mac>("mac"),
+    field<&catalogue::DiscoverySpec::firmware>("firmware"),
+    field<&catalogue::DiscoverySpec::in_use>("in-use"),
+    field<&catalogue::DiscoverySpec::kind>("kind"),
+    field<&catalogue::DiscoverySpec::kinds>("kinds"),
+};
+
+constexpr Field<catalogue::LearnedAction> learned_action_fields[] = {
+    field<&catalogue::LearnedAction::name>("name", Need::required),
+    field<&catalogue::LearnedAction::title>("title", Need::required),
+    field<&catalogue::LearnedAction::follows>("follows", Need::required),
+    word<catalogue::learned_by_words, &catalogue::LearnedAction::by>("by", Need::optional,
+                                                                     "way to show itself"),
+    field<&catalogue::LearnedAction::deed>("deed", Need::required),
+    range<&catalogue::LearnedAction::minimum, &catalogue::LearnedAction::maximum>("range"),
+    field<&catalogue::LearnedAction::labels>("labels"),
+    word<catalogue::hazard_words, &catalogue::LearnedAction::hazard>("hazard", Need::required),
+    field<&catalogue::LearnedAction::check>("check", Need::required),
+};
+
+constexpr Field<catalogue::LearnSpec> learn_fields[] = {
+    word<modbus::table_words, &catalogue::LearnSpec::table>("table"),
+    range<&catalogue::LearnSpec::from, &catalogue::LearnSpec::to>("registers", Need::inherited),
+    list_of<learned_action_fields, &catalogue::LearnSpec::actions>("actions", Need::inherited),
 };
 
 constexpr Field<catalogue::LimitSpec> limit_fields[] = {
@@ -506,6 +554,8 @@ constexpr Section sections[] = {
     section<&Profile::torque_unit_from>(
         field<&ProfileDraft::profile, &Profile::torque_unit_from>("torque-unit"),
         &ProfileDraft::torque_unit),
+    map_section<&Profile::discovery, discovery_fields>("discovery", &ProfileDraft::discovery),
+    map_section<&Profile::learn, learn_fields>("learn", &ProfileDraft::learn),
 };
 
 /// Reads a section where it is there, and remembers where it stands.

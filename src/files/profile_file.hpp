@@ -49,6 +49,8 @@ struct ProfileDraft {
   Origin alarm_reset = {};
   Origin unlock = {};
   Origin torque_unit = {};
+  Origin discovery = {};
+  Origin learn = {};
   // Of the layer that is read now.
   Numbering numbering = Numbering::address;
   std::vector<std::string> dropped = {};

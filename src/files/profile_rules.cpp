@@ -1089,6 +1089,7 @@ void check_rules(const ProfileDraft& draft, Diagnostics& findings) {
   for (const Rule rule : rules) rule(draft, findings);
   check_drive_rules(draft, findings);
   check_run_rules(draft, findings);
+  check_finding_rules(draft, findings);
 }
 
 }  // namespace spindle::files

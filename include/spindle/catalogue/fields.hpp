@@ -155,11 +155,35 @@ inline auto fields(const CurveSpec& v) {
   return std::tie(channels, types, sampling, most, steps, first_step, step_types);
 }
 
+inline auto fields(const BlockSearch& v) {
+  const auto& [name, title, count, from, to, step] = v;
+  return std::tie(name, title, count, from, to, step);
+}
+
+inline auto fields(const LearnedAction& v) {
+  const auto& [name, title, follows, by, deed, minimum, maximum, labels, hazard, check] = v;
+  return std::tie(name, title, follows, by, deed, minimum, maximum, labels, hazard, check);
+}
+
+inline auto fields(const LearnSpec& v) {
+  const auto& [table, from, to, actions] = v;
+  return std::tie(table, from, to, actions);
+}
+
+inline auto fields(const DiscoverySpec& v) {
+  const auto& [group, port, ask, answer, bytes, every, serial, model, address, tool_port, mac,
+               firmware, in_use, kind, kinds] = v;
+  return std::tie(group, port, ask, answer, bytes, every, serial, model, address, tool_port, mac,
+                  firmware, in_use, kind, kinds);
+}
+
 inline auto fields(const EventSpec& v) {
   const auto& [model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-               interval, preset, settings, longer, frames, identity, unit, curves, members] = v;
+               interval, preset, settings, longer, frames, identity, unit, curves, members,
+               search] = v;
   return std::tie(model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-                  interval, preset, settings, longer, frames, identity, unit, curves, members);
+                  interval, preset, settings, longer, frames, identity, unit, curves, members,
+                  search);
 }
 
 inline auto fields(const LimitSpec& v) {
@@ -294,10 +318,10 @@ inline auto fields(const UnlockSpec& v) {
 inline auto fields(const Profile& v) {
   const auto& [id, title, maker, series, path, bases, link, identity, events, limits, numbered,
                parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
-               unlock, writes, torque_unit_from] = v;
+               unlock, writes, torque_unit_from, discovery, learn] = v;
   return std::tie(id, title, maker, series, path, bases, link, identity, events, limits, numbered,
                   parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
-                  unlock, writes, torque_unit_from);
+                  unlock, writes, torque_unit_from, discovery, learn);
 }
 
 template <typename T>

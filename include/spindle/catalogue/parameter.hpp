@@ -16,9 +16,11 @@
 
 namespace spindle::catalogue {
 
-/// Where a fact comes from, strongest first (contract, section 5, Evidence).
-enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
-inline constexpr auto evidence_words = enum_table<Evidence>({{"manual", Evidence::manual},
+/// Where a fact comes from, strongest first (contract, section 5, Evidence). `verified` is what was
+/// seen on a user's own tool: only profiles of users have it.
+enum class Evidence : std::uint8_t { verified, manual, transcribed, sibling, inferred };
+inline constexpr auto evidence_words = enum_table<Evidence>({{"verified", Evidence::verified},
+                                                             {"manual", Evidence::manual},
                                                              {"transcribed", Evidence::transcribed},
                                                              {"sibling", Evidence::sibling},
                                                              {"inferred", Evidence::inferred}});

@@ -9,7 +9,9 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
+#include "spindle/catalogue/discovery.hpp"
 #include "spindle/catalogue/identity.hpp"
+#include "spindle/catalogue/learning.hpp"
 #include "spindle/catalogue/parameter.hpp"
 #include "spindle/catalogue/run_facts.hpp"
 #include "spindle/modbus/adu.hpp"
@@ -258,6 +260,8 @@ struct EventSpec {
   std::optional<CurveSpec> curves = std::nullopt;
   /// Where the block has no known place: its parameters, whose registers count from its first one.
   List<Parameter> fields = {};
+  /// How the place of the block can be found on a tool; empty: it is not known how.
+  std::optional<BlockSearch> search = std::nullopt;
 
   /// Whether a block of so many registers is one of its forms.
   [[nodiscard]] bool has_form(std::size_t registers) const;
@@ -455,6 +459,8 @@ class Profile {
   std::optional<UnlockSpec> unlock = std::nullopt;
   Writes writes = Writes::any;
   Text torque_unit_from = {};  ///< parameter whose labels are units of torque; may be empty
+  std::optional<DiscoverySpec> discovery = std::nullopt;  ///< how such tools are found
+  std::optional<LearnSpec> learn = std::nullopt;          ///< what a tool can show itself
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; those
