@@ -275,7 +275,7 @@ class Completer {
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
     if (slot.name == "PROFILE") offer_profiles();
     if (slot.name == "PATTERN" || slot.name.starts_with("NAME") ||
-        slot.name.starts_with("ACTION")) {
+        slot.name.starts_with("ACTION") || slot.name == "WHAT") {
       offer_of_profile(slot, word);
     }
   }
@@ -289,6 +289,7 @@ class Completer {
     const auto profile = profile_of_target();
     if (!profile) return;
     if (slot.name.starts_with("ACTION")) return offer_actions(*profile, word);
+    if (slot.name == "WHAT") return offer_learned(*profile);
     if (slot.name == "NAME=VALUE") return offer_assignments(*profile, word);
     offer_names(names_of(*profile), word);
   }
@@ -328,6 +329,10 @@ class Completer {
 
   void offer_actions(const Profile& profile, const std::string& word) {
     const std::size_t equals = word.find('=');
+    const auto& events = profile.events;
+    if (events && events->search) {
+      add(events->search->name.to_string(), events->search->title.to_string());
+    }
     for (const catalogue::Action& action : profile.actions) {
       const bool takes_value = !action.value;
       if (equals == std::string::npos) {
@@ -335,6 +340,14 @@ class Completer {
       } else if (action.name == word.substr(0, equals)) {
         offer_labels(action.labels, word.substr(0, equals + 1));
       }
+    }
+  }
+
+  /// What a tool of this profile can show itself.
+  void offer_learned(const Profile& profile) {
+    if (!profile.learn) return;
+    for (const catalogue::LearnedAction& action : profile.learn->actions) {
+      add(action.name.to_string(), action.title.to_string());
     }
   }
 

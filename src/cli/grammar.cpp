@@ -67,6 +67,12 @@ struct ScanArguments {
   bool has_pause = false;
 };
 
+struct DiscoverArguments {
+  commands::DiscoverOptions options;
+  std::vector<std::string> of_groups = {};   ///< options that were given and go without a subnet
+  std::vector<std::string> of_subnets = {};  ///< the same of those that go with one
+};
+
 /// The options of every command, where the parser writes them.
 struct AllOptions {
   commands::IdentifyOptions identify;
@@ -76,6 +82,8 @@ struct AllOptions {
   commands::DoOptions perform;
   commands::PingOptions ping;
   ScanArguments scan;
+  DiscoverArguments discover;
+  commands::LearnOptions learn;
   WatchArguments watch;
   commands::RecordOptions record;
   commands::ForwardOptions forward;
@@ -427,6 +435,129 @@ void add_scan(CLI::App& app, ParseState& draft) {
     return commands::scan(options, context);
   };
   add_command(app, draft, words, draft.options.scan, run, bind_scan);
+}
+
+std::string discover_words() {
+  return "Without SUBNET, tools are asked as a group (UDP multicast), as the profiles say that "
+         "they\n"
+         "can be, and each that answers is told once. That works inside of one network only, and "
+         "not\n"
+         "where an access point keeps its clients apart. What a tool says of itself there is not\n"
+         "proven: 'spindle identify' asks it.\n"
+         "\n"
+         "With SUBNET, every address is tried, and what takes a connection is asked who it is "
+         "(FC 11h).\n"
+         "Nothing else is sent, and nothing is ever written. A tool that serves one client at a "
+         "time\n"
+         "is busy for that moment: do not sweep a line that is at work. At most a /16 is asked.\n"
+         "\n"
+         "--write adds what is new to the tools file, behind its last tool; it asks first, and\n"
+         "changes no entry that is there.\n";
+}
+
+/// Some options are about a group of tools, others about addresses that are tried.
+std::optional<Error> check_discover(const DiscoverArguments& arguments) {
+  const bool has_subnet = !arguments.options.subnet.empty();
+  const auto& misplaced = has_subnet ? arguments.of_groups : arguments.of_subnets;
+  if (misplaced.empty()) return std::nullopt;
+  if (has_subnet) {
+    return usage(fmt::format("{} goes without SUBNET", misplaced.front()), "leave one of them out");
+  }
+  return usage(fmt::format("{} goes with SUBNET", misplaced.front()),
+               "name the network of the tools, such as 192.168.10.0/24");
+}
+
+/// "5000,502": TCP ports, each once, in the order given.
+Result<std::vector<std::uint16_t>> to_ports(std::string_view option, const std::string& text) {
+  constexpr std::uint64_t last_port = 0xFFFF;
+  std::vector<std::uint16_t> ports;
+  for (const std::string_view each : split(text, ',')) {
+    const auto port = parse_unsigned(each, last_port);
+    if (!port || *port == 0) {
+      return tl::unexpected(bad_option(option, fmt::format("'{}' does not fit", text),
+                                       "it takes ports from 1 to 65535, such as 5000,502"));
+    }
+    const auto number = static_cast<std::uint16_t>(*port);
+    if (std::find(ports.begin(), ports.end(), number) == ports.end()) ports.push_back(number);
+  }
+  return ports;
+}
+
+void bind_discover(Binder& bind, DiscoverArguments& arguments) {
+  commands::DiscoverOptions& options = arguments.options;
+  const auto note_in = [](std::vector<std::string>& list, const char* name) {
+    return [&list, name](const std::string&) { list.emplace_back(name); };
+  };
+  bind.argument("SUBNET", options.subnet,
+                "network whose addresses are tried, such as 192.168.10.0/24");
+  bind.repeatable("--interface", "NAME|ADDRESS", options.interfaces,
+                  "where to ask, also several times (default: all that are up)")
+      ->each(note_in(arguments.of_groups, "--interface"));
+  bind.option("--for", "DURATION", options.duration, to_duration, "how long to listen (default 3s)")
+      ->each(note_in(arguments.of_groups, "--for"));
+  bind.option("--port", "LIST", options.ports, to_ports,
+              "with SUBNET: which ports to try (default 5000,502)")
+      ->each(note_in(arguments.of_subnets, "--port"));
+  bind.option("--units", "LIST", options.units, to_units,
+              "with SUBNET: which units to ask behind each, such as 1-5")
+      ->each(note_in(arguments.of_subnets, "--units"));
+  bind.option("--rate", "N", options.rate, NumberFrom{1, 10'000},
+              "with SUBNET: connections begun in a second, at most (default 50)")
+      ->each(note_in(arguments.of_subnets, "--rate"));
+  bind.flag("--write", options.write, commands::WriteTools::yes,
+            "add what is found to the tools file; asks");
+  bind.check([&arguments] { return check_discover(arguments); });
+}
+
+void add_discover(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"discover",
+                           "[SUBNET]",
+                           "find tools in the network",
+                           "spindle discover\n"
+                           "spindle discover --interface eth0 --for 10s --json\n"
+                           "spindle discover --write\n"
+                           "spindle discover 192.168.10.0/24\n"
+                           "spindle discover 192.168.10.31/32 --port 502 --units 1-5",
+                           discover_words,
+                           Invocation::ToolsFile::all_tools};
+  const auto run = [](const DiscoverArguments& arguments, Context& context) {
+    return commands::discover(arguments.options, context);
+  };
+  add_command(app, draft, words, draft.options.discover, run, bind_discover);
+}
+
+std::string learn_words() {
+  return "WHAT is an action whose register no source of the profile says: select-preset, lock or\n"
+         "alarm-reset of a tool with firmware 4000 and later. Registers that the profile names "
+         "for it\n"
+         "are read again and again while you do on the tool what is asked for, and those that do "
+         "not\n"
+         "follow are left out, until one is left. Nothing is written to the tool.\n"
+         "\n"
+         "With -f, a profile of your own is written that has the action, with evidence "
+         "'verified'. That\n"
+         "says that the register was seen to follow, not that a write to it acts: try it as its\n"
+         "'check' says.\n";
+}
+
+void add_learn(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"learn", "TARGET WHAT [-f FILE]",
+                           "find out on your own tool which register an action has",
+                           "spindle learn station3 select-preset\n"
+                           "spindle learn station3 lock -f ./my-bmt.yaml\n"
+                           "spindle learn station3 alarm-reset --changes 2",
+                           learn_words};
+  add_command(app, draft, words, draft.options.learn, commands::learn,
+              [](Binder& bind, commands::LearnOptions& options) {
+                bind.required("TARGET", options.target, "tool name or URL");
+                bind.required("WHAT", options.what, "the action to learn");
+                bind.option("-f,--file", "FILE", options.file,
+                            "profile to write; never one that is there");
+                bind.option("--changes", "N", options.changes, NumberFrom{2, 100},
+                            "how many changes on the tool have to be followed (default 3)");
+                bind.option("--idle-timeout", "DURATION", options.idle_timeout, to_duration,
+                            "give up when nothing changed for so long (default 2min)");
+              });
 }
 
 std::string trouble_words() {
@@ -1325,8 +1456,8 @@ void build(CLI::App& app, ParseState& draft) {
        {add_identify,     add_list,        add_get,    add_set,      add_do,      add_watch,
         add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
         add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
-        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools,
-        add_log,          add_undo,        add_help,   add_version}) {
+        add_restore,      add_ping,        add_scan,   add_discover, add_learn,   add_simulate,
+        add_profile,      add_tools,       add_log,    add_undo,     add_help,    add_version}) {
     add(app, draft);
   }
 }
@@ -1479,6 +1610,7 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   constexpr std::array<std::string_view, 6> targets = {"TARGET", "BUS",     "A",
                                                        "B",      "PATTERN", "SINK"};
   bool takes_words = false;
+  bool takes_targets = false;
   bool has_words = false;
   for (const CLI::Option* known : command.get_options()) {
     if (!known->get_positional()) continue;
@@ -1486,10 +1618,12 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
     has_words = has_words || !known->results().empty();
     const std::string name = known->get_name(true);
     if (std::find(targets.begin(), targets.end(), name) == targets.end()) continue;
+    takes_targets = true;
     const auto& words = known->results();
     if (std::any_of(words.begin(), words.end(), files::may_name_tools)) return true;
   }
-  return !takes_words || (use == Invocation::ToolsFile::all_tools && !has_words);
+  const bool is_about_all = !has_words || !takes_targets;
+  return !takes_words || (use == Invocation::ToolsFile::all_tools && is_about_all);
 }
 
 Invocation telling(std::string text) {

@@ -5,6 +5,7 @@
 
 #include "actions.hpp"
 #include "change_log.hpp"
+#include "find_block.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
@@ -64,6 +65,8 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
     listing.add(action_record(action, target.shown, context.clock));
     outcome.succeed();
   }
+  const std::string search = search_in_words(profile, target);
+  if (!search.empty()) context.renderer.note(search);
   return finish(listing, outcome, listed(outcome, target.shown), context);
 }
 
@@ -162,6 +165,7 @@ Result<Outcome> perform(const DoOptions& options, Context& context) {
   return resolve_one_or_group(options.target, options.addressing, context)
       .and_then([&](const Targets& targets) {
         if (options.actions.empty()) return list_all_actions(targets, options, context);
+        if (wants_search(options, targets, context)) return find_block(options, targets, context);
         return run_verb(Do(options, targets.is_group), targets, options.jobs, context);
       });
 }

@@ -90,6 +90,9 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
       {{"do", "@line1", "dir"}, {"direction="}},
       {{"get", "@single", "event.num"}, {}},
       {{"get", "@elsewhere", "event.num"}, {}},
+      {{"learn", "sim:doga-gen2", "sel"}, {"select-preset"}},
+      {{"learn", "sim:doga-bm", ""}, {}},
+      {{"do", "sim:doga-gen2", "find"}, {"find-event-block"}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.words.back());
@@ -118,7 +121,7 @@ TEST_CASE("complete: a group is offered where several tools make sense") {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@line1", "@single"});
   }
-  for (const char* command : {"list", "remote-start", "scan", "dump"}) {
+  for (const char* command : {"list", "remote-start", "scan", "dump", "learn"}) {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@single"});
   }

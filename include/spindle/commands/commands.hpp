@@ -96,6 +96,31 @@ Result<Outcome> scan(const ScanOptions& options, Context& context);
 /// Which registers of a tool can be read. Requires `registers`.
 Result<Outcome> scan_registers(const ScanOptions& options, Context& context);
 
+/// Whether what is found is added to the tools file.
+enum class WriteTools : std::uint8_t { no, yes };
+
+struct DiscoverOptions {
+  std::string subnet = {};                         ///< empty: tools are asked as a group
+  std::vector<std::string> interfaces = {};        ///< names or addresses; none: all that can
+  Duration duration = std::chrono::seconds(3);     ///< of listening
+  std::vector<std::uint16_t> ports = {5000, 502};  ///< of a subnet's addresses
+  std::vector<modbus::UnitId> units = {};          ///< behind each port; none: as a tool is asked
+  unsigned rate = 50;                              ///< connections begun in a second
+  WriteTools write = WriteTools::no;
+};
+/// Which tools are in the network: those that answer to a group, or at the addresses of a subnet.
+Result<Outcome> discover(const DiscoverOptions& options, Context& context);
+
+struct LearnOptions {
+  std::string target;
+  std::string what;       ///< an action of the profile's section `learn`
+  std::string file = {};  ///< of the profile that is written; empty: none
+  unsigned changes = 3;   ///< on the tool, that have to be followed
+  Duration idle_timeout = std::chrono::minutes(2);
+};
+/// Which register an action has, by what the user does on the tool. Reads only.
+Result<Outcome> learn(const LearnOptions& options, Context& context);
+
 /// Whether other programs than spindle can ask, too.
 struct GatewayOptions {
   std::string listen = {};  ///< "PORT" or "ADDRESS:PORT", as typed; empty: they cannot
