@@ -68,6 +68,8 @@ class Gen2Device:
         self.noise = None  # bytes to send before each answer, by its number
         self.pieces = None  # most bytes of one segment, and the pause behind it
         self.rescales = False  # whether another torque unit changes the numbers along
+        self.event_places = []  # first input registers of blocks that hold the last event; no document knows any
+        self.longest_read = 125
         self.firmware, self.product = firmware, product
         self.armed = False
         self.runs_down_until = 0.0
@@ -151,9 +153,8 @@ class Gen2Device:
         serial = bytes((42, 0, self.product, 1, 24))
         return struct.pack(">HHHH", 1, 1, 6, self.firmware) + serial + struct.pack(">I", 12345)
 
-    @staticmethod
-    def _read(table, first, count):
-        if not 1 <= count <= 125:
+    def _read(self, table, first, count):
+        if not 1 <= count <= self.longest_read:
             raise Refused(3)
         if any(first + at not in table for at in range(count)):
             raise Refused(2)
@@ -300,6 +301,25 @@ class Gen2Device:
                         time.sleep(random.uniform(0.010, 0.030))
             except OSError:
                 pass
+
+
+    def happen(self, block, form=0x65, places=None):
+        """An event: it stands at its places (or some of them), and is pushed where a client armed that."""
+        with self.lock:
+            for place in self.event_places if places is None else places:
+                for at, word in enumerate(struct.unpack(f">{EVENT_WORDS}H", block)):
+                    self.input[place + at] = word
+                self.input.setdefault(place + EVENT_WORDS, 0)
+            armed = self.armed
+        if armed:
+            self.push(pushed(form, block))
+
+    def show(self, register, word, *mirrors):
+        """The user does something on the tool: its status says it, and so do holding registers."""
+        with self.lock:
+            self.input[register] = word
+            for mirror in mirrors:
+                self.holding[mirror] = word
 
 
 # ---- frames that come unasked ----

@@ -13,6 +13,9 @@
 //                         motor drivers on one serial line, alive as long as the transcript
 //   %alarm URL UNIT CODE  an alarm occurs on one of them; %warning the same; %power URL UNIT
 //                         switches one off and on; %setter URL UNIT DURATION keeps it busy
+//   %interface NAME ADDRESS   this computer has such a network interface, which can send to groups
+//   %datagram HEX         what comes back for each question to a group, with the question's number
+//                         in its first two bytes
 //   %wait DURATION        time passes
 //   %later DURATION URL UNIT REGISTER VALUE
 //                         so long from now another master writes a register
@@ -130,6 +133,35 @@ struct Tool {
   std::uint32_t connections = 0;
 };
 
+/// A group in which every question has the same answers, at once.
+class FakeGroup final : public link::Datagrams {
+ public:
+  FakeGroup(std::vector<Bytes> answers, std::string interface, Clock& clock)
+      : answers_(std::move(answers)), interface_(std::move(interface)), clock_(&clock) {}
+
+  std::vector<Error> send(ByteView question) override {
+    for (Bytes answer : answers_) {
+      std::copy_n(question.begin(), std::min<std::size_t>(2, answer.size()), answer.begin());
+      waiting_.push_back({std::move(answer), "192.168.10.100", interface_});
+    }
+    return {};
+  }
+  Result<std::optional<link::Datagram>> receive(TimePoint deadline) override {
+    if (waiting_.empty()) {
+      return clock_->sleep_until(deadline).map([] { return std::optional<link::Datagram>(); });
+    }
+    link::Datagram next = std::move(waiting_.front());
+    waiting_.erase(waiting_.begin());
+    return next;
+  }
+
+ private:
+  std::vector<Bytes> answers_;
+  std::string interface_;
+  Clock* clock_;
+  std::vector<link::Datagram> waiting_ = {};
+};
+
 class Stage {
  public:
   Stage() : profiles_({std::string(SPINDLE_SOURCE_DIR) + "/profiles"}, posix::source_disk()) {}
@@ -189,6 +221,18 @@ class Stage {
                      : test::make_sample_store(words.at(1), profiles_);
   }
   void hide_progress() { hides_progress_ = true; }
+
+  void add_interface(const std::vector<std::string>& words) {
+    interfaces_.push_back(
+        {.name = words.at(1), .address = words.at(2), .is_up = true, .is_multicast = true});
+  }
+  void add_datagram(const std::string& hex) {
+    Bytes bytes;
+    for (std::size_t at = 0; at + 1 < hex.size(); at += 2) {
+      bytes.push_back(static_cast<std::uint8_t>(std::stoul(hex.substr(at, 2), nullptr, 16)));
+    }
+    datagrams_.push_back(std::move(bytes));
+  }
 
   /// Motor drivers on one line; what happens to them is told by happen().
   void add_bus(const std::vector<std::string>& words) {
@@ -292,7 +336,8 @@ class Stage {
         },
         .disk = disk_.functions(),
         .installation = {SPINDLE_SOURCE_DIR, "3.1.6"},
-        .shipped = shipped::profiles()};
+        .shipped = shipped::profiles(),
+        .network = network()};
     status_ = cli::run(arguments, world);
     Lines lines;
     std::istringstream stream(without_source_folder(std::move(shown)));
@@ -308,6 +353,16 @@ class Stage {
  private:
   static std::string address(const std::string& host, std::uint16_t port) {
     return fmt::format("{}:{}", host, port);
+  }
+
+  link::Network network() {
+    return {.interfaces = [this]() -> Result<std::vector<link::NetworkInterface>> {
+              return interfaces_;
+            },
+            .open = [this](const auto& interfaces, const auto&, auto,
+                           auto&) -> Result<std::unique_ptr<link::Datagrams>> {
+              return std::make_unique<FakeGroup>(datagrams_, interfaces.front().name, clock_);
+            }};
   }
 
   template <typename Show>
@@ -344,6 +399,8 @@ class Stage {
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
   test::MemoryDisk disk_;
+  std::vector<link::NetworkInterface> interfaces_;
+  std::vector<Bytes> datagrams_;
   bool hides_progress_ = false;
   int status_ = 0;
 };
@@ -413,6 +470,8 @@ class Player {
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
     if (words.at(0) == "profile") copy_profile(words.at(1));
     if (words.at(0) == "hide") stage_.hide_progress();
+    if (words.at(0) == "interface") stage_.add_interface(words);
+    if (words.at(0) == "datagram") stage_.add_datagram(words.at(1));
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
   }
 
