@@ -51,8 +51,8 @@ struct Ended {
   std::optional<Error> error = std::nullopt;
 };
 
-Result<Ended> scan_network(const DiscoverOptions& options, Finds& finds, Context& context) {
-  TRY_LET(const auto interfaces, work::choose_interfaces(options.interfaces, context.network));
+Ended scan_network(const std::vector<link::NetworkInterface>& interfaces,
+                   const DiscoverOptions& options, Finds& finds, Context& context) {
   Ended ended;
   std::size_t strange = 0;
   for (const auto& spec : work::discovery_specs(context.profiles)) {
@@ -118,16 +118,13 @@ Result<Ended> sweep(const DiscoverOptions& options, Finds& finds, Context& conte
   return ended;
 }
 
-}  // namespace
-
-Result<Outcome> discover(const DiscoverOptions& options, Context& context) {
-  Finds finds(options, context);
-  const bool sweeps = !options.subnet.empty();
-  TRY_LET(auto ended,
-          sweeps ? sweep(options, finds, context) : scan_network(options, finds, context));
+/// Tells how it ended, and adds what was found to the tools file where that is wanted.
+Result<Outcome> conclude(Ended ended, const DiscoverOptions& options, Finds& finds,
+                         Context& context) {
   Outcome outcome;
   if (ended.error) {
     outcome.fail(*ended.error);
+    ended.sentence += "; it ended early";
     if (!work::is_interruption(*ended.error)) finds.listing().add(*ended.error);
   } else if (ended.found == 0) {
     outcome.negate();
@@ -135,12 +132,11 @@ Result<Outcome> discover(const DiscoverOptions& options, Context& context) {
   } else {
     outcome.succeed();
   }
-  if (options.write == WriteTools::yes && !ended.error && ended.found > 0) {
+  if (options.write == WriteTools::yes && outcome.succeeded() > 0) {
     TRY(finds.listing().end());
-    const auto added = add_to_tools_file(finds.kept(), context);
-    if (!added) return tl::unexpected(added.error());
-    ended.counts.push_back({"added", *added});
-    if (!added->empty()) ended.sentence += fmt::format("; {} added", added->size());
+    TRY_LET(const auto added, add_to_tools_file(finds.kept(), context));
+    ended.counts.push_back({"added", added});
+    if (!added.empty()) ended.sentence += fmt::format("; {} added", added.size());
     return tell({.counts = std::move(ended.counts), .sentence = std::move(ended.sentence)}, outcome,
                 context)
         .map([&] { return outcome; });
@@ -148,6 +144,19 @@ Result<Outcome> discover(const DiscoverOptions& options, Context& context) {
   return finish(finds.listing(), outcome,
                 {.counts = std::move(ended.counts), .sentence = std::move(ended.sentence)},
                 context);
+}
+
+}  // namespace
+
+Result<Outcome> discover(const DiscoverOptions& options, Context& context) {
+  if (!options.subnet.empty()) {
+    TRY_LET(const auto network, work::parse_sweep(options.subnet));
+    Finds finds(options, context);
+    return conclude(sweep(network, options, finds, context), options, finds, context);
+  }
+  TRY_LET(const auto interfaces, work::choose_interfaces(options.interfaces, context.network));
+  Finds finds(options, context);
+  return conclude(scan_network(interfaces, options, finds, context), options, finds, context);
 }
 
 }  // namespace spindle::commands

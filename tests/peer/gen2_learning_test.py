@@ -15,15 +15,15 @@ from support import SPINDLE, spindle
 
 OUTPUT, PRESET, ALARM, LOCK = 5350, 105, 111, 118
 # 5000, 5001 and 5350 are known; the rest of the block is there, and nothing in it is named.
-COMMANDS = range(5000, 5060)
+COMMANDS = range(5000, 5400)
 
 
 class Person(threading.Thread):
-    """Does one thing after the other on the tool, with pauses, until told to end."""
+    """Does one thing after the other on the tool, with pauses, once the program is ready, until told to end."""
 
-    def __init__(self, deeds, pause=1.2):
+    def __init__(self, deeds, pause=1.2, is_ready=lambda: True):
         super().__init__(daemon=True)
-        self._deeds, self._pause = deeds, pause
+        self._deeds, self._pause, self._is_ready = deeds, pause, is_ready
         self._ended = threading.Event()
 
     def __enter__(self):
@@ -35,6 +35,9 @@ class Person(threading.Thread):
         self.join()
 
     def run(self):
+        while not self._is_ready():
+            if self._ended.wait(0.05):
+                return
         for deed in self._deeds:
             if self._ended.wait(self._pause):
                 return
@@ -143,8 +146,13 @@ class FindEventBlock(LearningTest):
 
 
 class Learn(LearningTest):
+    def is_watched(self):
+        """Whether a single register of the status was read, as it is while registers are followed."""
+        with self.device.lock:
+            return any(function == 4 and data[2:] == b"\0\x01" for function, data in self.device.requests)
+
     def learn(self, what, deeds, *arguments, status=0, pause=2.0):
-        with Person(deeds, pause):
+        with Person(deeds, pause, self.is_watched):
             outcome = spindle("learn", self.url, what, *arguments)
         self.assert_ends(outcome, status)
         return outcome
