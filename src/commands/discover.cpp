@@ -91,8 +91,8 @@ Ended scan_network(const std::vector<link::NetworkInterface>& interfaces,
   return ended;
 }
 
-Result<Ended> sweep(const DiscoverOptions& options, Finds& finds, Context& context) {
-  TRY_LET(const auto network, work::parse_sweep(options.subnet));
+Ended sweep(const Ipv4Network& network, const DiscoverOptions& options, Finds& finds,
+            Context& context) {
   const work::SweepPlan plan{
       .network = network, .ports = options.ports, .units = options.units, .rate = options.rate};
   ProgressLine progress(context);
