@@ -104,7 +104,8 @@ Ended sweep(const Ipv4Network& network, const DiscoverOptions& options, Finds& f
                   {"asked", count(swept.asked)},
                   {"addresses", count(swept.addresses)},
                   {"open", count(swept.open)}};
-  ended.sentence = fmt::format("{} asked, {} found", counted(swept.asked, "address"), swept.found);
+  ended.sentence = fmt::format("{} {} asked, {} found", swept.asked,
+                               swept.asked == 1 ? "address" : "addresses", swept.found);
   if (swept.open > 0) {
     ended.sentence += fmt::format("; {} that {} no Modbus", counted(swept.open, "open port"),
                                   swept.open == 1 ? "speaks" : "speak");
