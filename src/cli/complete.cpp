@@ -274,6 +274,7 @@ class Completer {
     if (is_side) add("defaults", "what the profile says");
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
     if (slot.name == "PROFILE") offer_profiles();
+    if (typed_.command->name == "tools add") return;  // a name that is not there yet
     if (slot.name == "PATTERN" || slot.name.starts_with("NAME") ||
         slot.name.starts_with("ACTION")) {
       offer_of_profile(slot, word);
@@ -294,7 +295,9 @@ class Completer {
   }
 
   void offer_tools(const std::string& word) {
-    for (const files::Tool& tool : nameable_->tools.tools) add(tool.name, tool.url);
+    for (const files::Tool& tool : nameable_->tools.tools) {
+      if (!nameable_->tools.faults.contains(tool.name)) add(tool.name, tool.url);
+    }
     if (!word.starts_with("sim:")) return add("sim:", "a simulated tool");
     for (const Candidate& profile : profiles()) add("sim:" + profile.text, "a simulated tool");
   }
@@ -305,6 +308,7 @@ class Completer {
   void offer_groups(Groups taken) {
     for (const auto& [group, members] : nameable_->tools.groups) {
       if (taken == Groups::of_one && members.size() > 1) continue;
+      if (nameable_->tools.faults.contains("@" + group)) continue;
       add("@" + group, counted(members.size(), "tool"));
     }
   }
@@ -409,7 +413,11 @@ class Completer {
                                    [&](const files::Tool& one) { return one.name == name; });
     if (tool != tools.end() && !tool->profile.empty()) return tool->profile;
     const auto endpoint = link::parse_endpoint(tool == tools.end() ? name : tool->url);
-    return endpoint ? endpoint->profile : std::string();
+    if (!endpoint || !endpoint->profile.empty() || nameable_->memory == nullptr) {
+      return endpoint ? endpoint->profile : std::string();
+    }
+    const auto seen = nameable_->memory->recall(*endpoint);
+    return seen && *seen ? (*seen)->profile : std::string();
   }
 
   /// By --profile, else that of the first tool which has one.

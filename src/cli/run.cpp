@@ -11,6 +11,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/show_frames.hpp"
 #include "spindle/files/capture.hpp"
+#include "spindle/work/tool_memory.hpp"
 #include "version.hpp"
 
 namespace spindle::cli {
@@ -39,6 +40,12 @@ std::string state_folder(const World& world) {
   return folder.empty() ? folder : folder + "/spindle";
 }
 
+/// Where spindle keeps what it can do without; empty when it is not said.
+std::string cache_folder(const World& world) {
+  const std::string folder = xdg_folder(world, "XDG_CACHE_HOME", ".cache");
+  return folder.empty() ? folder : folder + "/spindle";
+}
+
 /// The user's own profiles first, then the installed ones, then those of the build tree.
 std::vector<std::string> profile_folders(const World& world) {
   std::vector<std::string> folders;
@@ -60,13 +67,18 @@ files::ProfileStore profile_store(const World& world) {
   return files::ProfileStore(profile_folders(world), world.disk, world.shipped);
 }
 
+/// Where a tools file is made when there is none; empty when no folder for it is known.
+std::string usual_tools_file(const World& world) {
+  const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
+  return config.empty() ? std::string() : config + "/spindle/tools.yaml";
+}
+
 /// The tools file that counts; empty when there is none.
 std::string find_tools_file(const World& world, const Invocation& invocation) {
   if (!invocation.common.tools_file.empty()) return invocation.common.tools_file;
   if (std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) return named;
   std::vector<std::string> places = {"./spindle.yaml"};
-  const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
-  if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
+  if (std::string own = usual_tools_file(world); !own.empty()) places.push_back(std::move(own));
   places.emplace_back("/etc/spindle/tools.yaml");
   for (std::string& place : places) {
     if (!world.disk.absent(place)) return std::move(place);
@@ -130,13 +142,15 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                              .tools = tools,
                              .show_frames = show_frames,
                              .common = invocation.common,
-                             .make_doors = world.make_doors},
+                             .make_doors = world.make_doors,
+                             .cache_folder = cache_folder(world)},
                             {.io = world.io,
                              .serve = world.serve,
                              .end_waits = world.end_waits,
                              .companions = world.companions,
                              .user = invocation.user,
-                             .supervision = world.supervision},
+                             .supervision = world.supervision,
+                             .new_tools_file = usual_tools_file(world)},
                             {.renderer = renderer}};
   // A file that is read again while a command runs is taken whole, or not at all.
   context.supervision.load_tools = [&] {
@@ -160,8 +174,9 @@ int run_completion(const std::vector<std::string>& words, World& world) {
   const auto tools = find_tools(world, typed.value_or(Invocation()));
   const files::Tools none;
   const files::ProfileStore profiles = profile_store(world);
+  const work::ToolMemory memory(world.disk, cache_folder(world));
   const Completion completion =
-      complete(words, describe_grammar(), {tools ? *tools : none, profiles});
+      complete(words, describe_grammar(), {tools ? *tools : none, profiles, &memory});
   const auto written = world.io.out(to_text(completion));
   return exit_status(written ? ExitStatus::ok : written.error().status());
 }

@@ -116,6 +116,18 @@ Summary summary_of(const Assessed& assessed, const ReportOptions& options) {
           .sentence = std::move(sentence)};
 }
 
+/// Limits of joints that are not known, as their tool's entry has a fault.
+void tell_faults(const Context& context) {
+  for (const files::Tool& tool : context.tools.tools) {
+    const auto fault = context.tools.faults.find(tool.name);
+    if (fault == context.tools.faults.end()) continue;
+    context.renderer.note(
+        fmt::format("warning: {}: limits of joints in the tools file are not used, as its entry "
+                    "has a fault: {}",
+                    tool.name, fault->second.message));
+  }
+}
+
 }  // namespace
 
 Result<Outcome> report(const ReportOptions& options, Context& context) {
@@ -133,6 +145,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   if (!reader) return tl::unexpected(std::move(reader.error()));
   const auto selection = select_for_report(options, **reader, context);
   if (!selection) return tl::unexpected(selection.error());
+  tell_faults(context);
 
   work::Study study(selection->facts, *study_options, std::move(*exclusions));
   auto read = (*reader)->events(selection->filter, [&](const store::EventView& event) {

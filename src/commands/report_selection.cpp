@@ -24,6 +24,10 @@ Result<void> add_targets(const ReportOptions& options, const std::vector<Place>&
   for (const Place& place : places) known.insert(place.name);
   for (const auto& [group, members] : context.tools.groups) known.insert("@" + group);
   for (const std::string& text : options.targets) {
+    const auto fault = context.tools.faults.find(text);
+    if (names_group(text) && fault != context.tools.faults.end()) {
+      return tl::unexpected(fault->second);
+    }
     const auto group = context.tools.groups.find(text.substr(1));
     if (!names_group(text)) {
       names.push_back(text);
@@ -143,6 +147,7 @@ Result<work::StudyOptions> study_options_of(const ReportOptions& options,
                            .include_not_completed = options.include_not_completed,
                            .preset = options.preset};
   for (const files::Tool& tool : tools.tools) {
+    if (tools.faults.contains(tool.name)) continue;  // told by the report
     for (const auto& [preset, limits] : tool.limits) study.joints[{tool.name, preset}] = limits;
   }
   const auto add = [&](std::string_view option, const std::string& text,

@@ -183,7 +183,8 @@ auto VerbRun<V>::prepare(const std::vector<Target>& tools) const -> Result<Prefl
         return begin_turn(target, own).and_then([&] { return plan_one(target, own); });
       });
   Preflight<Plan> preflight;
-  for (auto& result : results) {
+  for (std::size_t index = 0; index < results.size(); ++index) {
+    auto& result = results[index];
     if (result) {
       preflight.planned.push_back(std::move(*result));
     } else if (work::is_interruption(result.error())) {
@@ -191,8 +192,8 @@ auto VerbRun<V>::prepare(const std::vector<Target>& tools) const -> Result<Prefl
       error.message = "interrupted, nothing was changed";
       return tl::unexpected(std::move(error));
     } else {
-      (rejects_all(result.error()) ? preflight.rejected : preflight.unavailable)
-          .fail(result.error());
+      const bool is_unfit = tools[index].fault.empty() && rejects_all(result.error());
+      (is_unfit ? preflight.rejected : preflight.unavailable).fail(result.error());
     }
   }
   return output.end().map([&] { return std::move(preflight); });
@@ -256,7 +257,7 @@ Result<Outcome> VerbRun<V>::all_together(const std::vector<Target>& tools) const
 template <typename V>
 Result<void> VerbRun<V>::check_all_fit(const std::vector<Target>& tools) const {
   for (const Target& target : tools) {
-    if (target.profile.empty()) continue;
+    if (target.profile.empty()) continue;  // asked later, or its entry has a fault
     const auto profile = load_profile(target, *context_);
     if (!profile) return tl::unexpected(with_target(profile.error(), target));
     const auto plan = verb_->plan(*profile, target);
@@ -271,6 +272,7 @@ template <typename V>
 Result<void> VerbRun<V>::check_one_fits(const std::vector<Target>& tools) const {
   Result<void> checked;
   for (const Target& target : tools) {
+    if (!target.fault.empty()) continue;
     if (target.profile.empty()) return {};
     const auto profile = load_profile(target, *context_);
     if (!profile) return {};  // told as one of this tool

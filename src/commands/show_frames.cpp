@@ -21,7 +21,8 @@ constexpr auto decision_words =
                                 {"asking again", link::Decision::retry},
                                 {"resync", link::Decision::resync},
                                 {"doubt", link::Decision::doubt},
-                                {"proving the answer", link::Decision::proof}});
+                                {"proving the answer", link::Decision::proof},
+                                {"remembered", link::Decision::memory}});
 
 link::Trace frames_as_lines(const std::string& target, const report::Streams& io,
                             const Clock& clock) {

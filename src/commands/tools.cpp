@@ -27,6 +27,7 @@ const std::array<Column, 6> tool_columns = {{{"NAME", "name"},
 std::vector<std::string> groups_of(const files::Tool& tool, const files::Tools& tools) {
   std::vector<std::string> groups;
   for (const auto& [group, members] : tools.groups) {
+    if (tools.faults.contains("@" + group)) continue;
     const bool is_member = std::find(members.begin(), members.end(), tool.name) != members.end();
     if (is_member) groups.push_back(group);
   }
@@ -42,7 +43,8 @@ Record tool_record(const files::Tool& tool, const files::Tools& tools, const Clo
                      {"profile", text_or_null(tool.profile)},
                      {"torque_unit", text_or_null(tool.torque_unit)},
                      {"groups", groups_of(tool, tools)},
-                     {"verified", tool.verified}}};
+                     {"verified", tool.verified},
+                     {"serial", text_or_null(tool.serial)}}};
 }
 
 /// Collects what the file's own rules cannot see: whether URLs, profiles and actions exist.
@@ -101,7 +103,9 @@ Result<Outcome> tools(Context& context) {
   }
   for (const auto& [entry, fault] : context.tools.faults) {
     outcome.fail(fault);
-    listing.add(fault);
+    Error told = fault;
+    if (files::may_name_tools(entry)) told.target = entry;  // else it is a sink's
+    listing.add(told);
   }
   return finish(listing, outcome);
 }

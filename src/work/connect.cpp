@@ -10,6 +10,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/work/identification.hpp"
 #include "spindle/work/simulated_tool.hpp"
+#include "spindle/work/tool_memory.hpp"
 #include "spindle/work/trace.hpp"
 
 namespace spindle::work {
@@ -174,7 +175,12 @@ Result<void> take_torque_unit(OpenTool& tool) {
 }
 
 /// The port that was tried was not chosen when neither URL nor profile names one.
-std::string other_port_hint(const Environment& environment) {
+std::string other_port_hint(const Target& target, const Environment& environment) {
+  const auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
+  if (seen && *seen) {
+    return fmt::format("no port is named, and serial number {} was seen at port {}: add :{}",
+                       (*seen)->serial, (*seen)->port, (*seen)->port);
+  }
   for (const files::ProfileEntry& entry : environment.profiles.list()) {
     const auto profile = environment.profiles.load(entry.id);
     if (!profile || profile->link.port == catalogue::LinkSpec().port) continue;
@@ -191,6 +197,7 @@ bool is_wrong_port(const Error& error) {
 }  // namespace
 
 Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment) {
+  if (!target.fault.empty()) return tl::unexpected(fault_of(target));
   if (target.profile.empty()) return catalogue::Profile();
   auto profile = environment.profiles.load(target.profile);
   if (!profile) profile.error().asked_of = target.shown;
@@ -233,6 +240,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
                                       const Environment& environment,
                                       SimulatedOperator simulated_operator,
                                       link::SessionOptions::LateAnswers late_answers) {
+  if (!target.fault.empty()) return tl::unexpected(fault_of(target));
   TRY(check_addressing(target, profile));
   TRY(check_transactions(target, profile));
   device::LinkOptions options = link_options(target, profile, environment);
@@ -242,7 +250,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
       with_simulated_tools(environment, simulated_options(simulated_operator)), environment.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {
-    device.error().hint = other_port_hint(environment);
+    device.error().hint = other_port_hint(target, environment);
   }
   return device;
 }
@@ -256,8 +264,10 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
   return OpenTool{std::move(resolved), std::move(kept), std::move(device)};
 }
 
-Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
-                           const Environment& environment) {
+namespace {
+
+Result<OpenTool> open_as_named(const Target& target, catalogue::Profile profile, Need need,
+                               const Environment& environment) {
   auto tool = connect(target, std::move(profile), environment);
   if (!tool || need == Need::raw_registers) return tool;
   if (need == Need::raw_secrets) {
@@ -271,6 +281,89 @@ Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Nee
   }();
   if (known && need != Need::stop) known = take_torque_unit(*tool);
   if (!known) return tl::unexpected(std::move(known.error()));
+  return tool;
+}
+
+/// For people who ask for every decision.
+void tell_memory(const Target& target, const std::string& sentence,
+                 const Environment& environment) {
+  if (!environment.show_frames) return;
+  const link::Trace trace = environment.show_frames(target.shown);
+  if (trace.decision) trace.decision(link::Decision::memory, sentence);
+}
+
+/// What was last seen behind a host whose port is not named. It only says where to ask.
+std::optional<SeenTool> recall_place(const Target& target, Need need,
+                                     const Environment& environment) {
+  const bool is_proven = need == Need::named_registers || need == Need::stop;
+  const bool is_open = target.endpoint.medium == link::Medium::tcp && !target.endpoint.port &&
+                       target.profile.empty() && target.fault.empty();
+  if (!is_proven || !is_open) return std::nullopt;
+  auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
+  if (seen) return std::move(*seen);
+  tell_memory(target, fmt::format("nothing: {}", describe(seen.error())), environment);
+  return std::nullopt;
+}
+
+/// The tool where it was seen, if it is the same one still; empty: another one answers there.
+Result<std::optional<OpenTool>> open_where_seen(const Target& target, const SeenTool& seen,
+                                                Need need, const Environment& environment) {
+  const ToolMemory memory(environment.disk, environment.cache_folder);
+  Target there = target;
+  there.endpoint.port = seen.port;
+  there.endpoint.text = link::to_url(there.endpoint);
+  auto tool = open_as_named(there, catalogue::Profile(), need, environment);
+  if (!tool && tool.error().status() != ExitStatus::mismatch) {
+    tool.error().hint =
+        fmt::format("serial number {} was seen there before ({}); name a port to ask elsewhere",
+                    seen.serial, memory.path());
+    return tl::unexpected(with_target(std::move(tool.error()), there));
+  }
+  const auto serial = tool && tool->device.identity() ? tool->device.identity()->serial : "";
+  if (serial == seen.serial) {
+    tell_memory(target,
+                fmt::format("port {}, profile {} and serial number {}, from {}; the tool says the "
+                            "same",
+                            seen.port, seen.profile, seen.serial, memory.path()),
+                environment);
+    return std::optional(std::move(*tool));
+  }
+  tell_memory(target,
+              fmt::format("serial number {} at port {}, from {}; another one answers, so this is "
+                          "forgotten",
+                          seen.serial, seen.port, memory.path()),
+              environment);
+  static_cast<void>(memory.forget(seen));  // it is a cache
+  return std::nullopt;
+}
+
+}  // namespace
+
+void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
+                   const std::string& profile, const Environment& environment) {
+  const link::Endpoint& endpoint = tool.target.endpoint;
+  const bool is_by_file = tool.target.profile == profile && environment.common.profile.empty();
+  if (endpoint.medium != link::Medium::tcp || !endpoint.port || is_by_file) return;
+  if (profile.empty() || files::names_profile_file(profile)) return;
+  SeenTool seen{
+      .host = endpoint.host, .port = *endpoint.port, .profile = profile, .serial = identity.serial};
+  if (endpoint.unit) seen.unit = endpoint.unit->value;
+  const auto kept = ToolMemory(environment.disk, environment.cache_folder).remember(seen);
+  if (!kept) {
+    tell_memory(tool.target, fmt::format("nothing: {}", describe(kept.error())), environment);
+  }
+}
+
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Environment& environment) {
+  if (const auto seen = recall_place(target, need, environment)) {
+    TRY_LET(auto tool, open_where_seen(target, *seen, need, environment));
+    if (tool) return std::move(*tool);
+  }
+  auto tool = open_as_named(target, std::move(profile), need, environment);
+  if (tool && need == Need::named_registers && tool->device.identity()) {
+    remember_tool(*tool, *tool->device.identity(), tool->profile->id, environment);
+  }
   return tool;
 }
 

@@ -61,16 +61,13 @@ Result<Target> target_of_tool(const files::Tool& tool, const Environment& enviro
   return target;
 }
 
-/// The tools of this name, or that of this URL. Only a file with faults can have a name twice.
+/// The tools of this name, or that of this URL; a target with a fault where the entry has one. Only
+/// a file with faults can have a name twice.
 std::vector<Result<Target>> named_targets(const std::string& name, const Environment& environment) {
   std::vector<Result<Target>> found;
   if (const auto fault = environment.tools.faults.find(name);
       fault != environment.tools.faults.end()) {
-    Error error = fault->second;
-    error.target = name;
-    error.hint =
-        "until it is mended, this entry is not used; 'spindle tools --check' lists all faults";
-    found.emplace_back(tl::unexpected(std::move(error)));
+    found.emplace_back(Target{.shown = name, .fault = fault->second.message});
     return found;
   }
   for (const files::Tool& tool : environment.tools.tools) {
@@ -138,6 +135,24 @@ void share_gateways(std::vector<Target>& targets, const Environment& environment
 
 }  // namespace
 
+Error fault_of(const Target& target) {
+  return {
+      .code = Errc::bad_file,
+      .message = target.fault,
+      .hint =
+          "until it is mended, this entry is not used; 'spindle tools --check' lists all faults",
+      .target = target.shown};
+}
+
+std::vector<Error> take_out_faulty(std::vector<Target>& targets) {
+  std::vector<Error> faults;
+  for (const Target& target : targets) {
+    if (!target.fault.empty()) faults.push_back(fault_of(target));
+  }
+  std::erase_if(targets, [](const Target& target) { return !target.fault.empty(); });
+  return faults;
+}
+
 Error with_target(Error error, const Target& target) {
   if (!error.target.empty()) return error;
   error.target = target.shown;
@@ -190,8 +205,10 @@ bool is_target(std::string_view text, const Environment& environment) {
   return names_group(text) && environment.tools.groups.contains(std::string(text.substr(1)));
 }
 
-Resolution resolve_each_target(const std::vector<std::string>& texts,
-                               const Environment& environment) {
+namespace {
+
+/// With the faulty ones among the targets.
+Resolution resolve_all(const std::vector<std::string>& texts, const Environment& environment) {
   Resolution resolution;
   for (const std::string& text : texts) {
     const auto group = names_group(text) ? environment.tools.groups.find(text.substr(1))
@@ -215,10 +232,26 @@ Resolution resolve_each_target(const std::vector<std::string>& texts,
   return resolution;
 }
 
+}  // namespace
+
+Resolution resolve_each_target(const std::vector<std::string>& texts,
+                               const Environment& environment) {
+  Resolution resolution = resolve_all(texts, environment);
+  for (Error& fault : take_out_faulty(resolution.targets)) {
+    resolution.faults.push_back(std::move(fault));
+  }
+  return resolution;
+}
+
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Environment& environment) {
-  Resolution resolution = resolve_each_target(texts, environment);
+  Resolution resolution = resolve_all(texts, environment);
   if (!resolution.faults.empty()) return tl::unexpected(std::move(resolution.faults.front()));
+  const auto& targets = resolution.targets;
+  const auto usable = [](const Target& target) { return target.fault.empty(); };
+  if (!targets.empty() && std::none_of(targets.begin(), targets.end(), usable)) {
+    return tl::unexpected(fault_of(targets.front()));
+  }
   return std::move(resolution.targets);
 }
 

@@ -8,6 +8,7 @@
 
 #include "cli/grammar.hpp"
 #include "spindle/posix/disk.hpp"
+#include "support/memory_disk.hpp"
 
 using namespace spindle;
 using cli::Completion;
@@ -147,4 +148,44 @@ TEST_CASE("complete: files where files are meant") {
   CHECK(offered({"get", ""}).paths == Paths::none);
   CHECK(cli::to_text(offered({"get", "--tools", ""})) == "files\n");
   CHECK(cli::to_text(offered({"get", "sta"})) == "none\nstation3\ttcp://10.0.0.3\n");
+}
+
+TEST_CASE("complete: an entry with a fault is not offered") {
+  const files::Tools tools{.path = "spindle.yaml",
+                           .tools = {{.name = "station3", .url = "tcp://10.0.0.3"},
+                                     {.name = "station4", .url = "tcp://10.0.0.4"}},
+                           .groups = {{"line1", {"station3"}}, {"line2", {"station3"}}},
+                           .faults = {{"station4", Error{}}, {"@line2", Error{}}}};
+  const auto offered_of = [&](const Words& words) {
+    Words all;
+    for (const auto& one :
+         cli::complete(words, cli::describe_grammar(), {tools, shipped()}).candidates) {
+      all.push_back(one.text);
+    }
+    return all;
+  };
+  CHECK(offered_of({"get", "sta"}) == Words{"station3"});
+  CHECK(offered_of({"get", "@"}) == Words{"@line1"});
+  CHECK(offered_of({"tools", "test", "sta"}) == Words{"station3"});
+  CHECK(offered_of({"tools", "add", "--profile", "doga-bm", "pre"}).empty());
+}
+
+TEST_CASE("complete: names of a tool that was seen") {
+  test::MemoryDisk files;
+  const Disk disk = files.functions();
+  const work::ToolMemory memory(disk, "/cache");
+  REQUIRE(memory.remember(
+      {.host = "10.0.0.4", .port = 5000, .profile = "doga-bm", .serial = "1021100042"}));
+  const files::Tools tools{.path = "spindle.yaml",
+                           .tools = {{.name = "bare", .url = "tcp://10.0.0.4"}}};
+  for (const char* target : {"bare", "tcp://10.0.0.4:5000", "10.0.0.4"}) {
+    CAPTURE(target);
+    const auto found = cli::complete({"get", target, "event.num"}, cli::describe_grammar(),
+                                     {tools, shipped(), &memory});
+    REQUIRE(found.candidates.size() == 1);
+    CHECK(found.candidates.front().text == "event.number");
+  }
+  CHECK(cli::complete({"get", "tcp://10.0.0.5", "event.num"}, cli::describe_grammar(),
+                      {tools, shipped(), &memory})
+            .candidates.empty());
 }

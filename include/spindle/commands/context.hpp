@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 
 #include "spindle/commands/companions.hpp"
 #include "spindle/commands/supervision.hpp"
@@ -46,6 +47,7 @@ struct Surroundings {
   const Companions& companions;
   UserOptions user = {};
   Supervision supervision = {};
+  std::string new_tools_file = {};  ///< where one is made if there is none; empty: nowhere is known
 };
 
 /// The part of a context that differs from one tool of a group to the next.

@@ -28,7 +28,8 @@ enum class Need : std::uint8_t {
   stop,             ///< the same as of named registers, and nothing else is asked before it is sent
 };
 
-/// The target's profile, or an empty one where none is known before connecting.
+/// The target's profile, or an empty one where none is known before connecting. Error `bad_file`
+/// where the target has a fault.
 Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment);
 
 /// Whether an operator works with a tool of sim:, so that there is something to watch.
@@ -51,9 +52,15 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 /// that can say over TCP what it is; another one is left as it is. For raw secrets a tool that says
 /// over TCP what it is goes on with the profile that fits, where that has secrets. A torque unit
 /// that the profile says where to read is read; error `mismatch` where the tools file says another
-/// one.
+/// one. A tool whose port and profile are not named is asked where it was last seen, and goes on
+/// there if it says the serial number that it had.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Environment& environment);
+
+/// Keeps in the user's cache where a tool over TCP was that said this of itself, unless its profile
+/// is from the tools file. What cannot be kept is told to those who ask for every decision only.
+void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
+                   const std::string& profile, const Environment& environment);
 
 /// What was found, with what the tool says of itself in registers where the profile that fits says
 /// in which; the tool goes on with that profile then.

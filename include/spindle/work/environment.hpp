@@ -58,6 +58,7 @@ struct Environment {
   const ShowFrames& show_frames;  ///< may be empty
   CommonOptions common = {};
   link::MakeDoors make_doors = {};  ///< lets other programs ask; empty: none can
+  std::string cache_folder = {};    ///< spindle's own; empty: nothing is remembered there
 };
 
 /// The same environment with a clock and lines that signals do not end.
