@@ -90,6 +90,9 @@ struct AllOptions {
   commands::RestoreOptions restore;
   commands::SimulateOptions simulate;
   bool check_tools = false;
+  commands::ToolAddOptions tools_add;
+  commands::ToolsInitOptions tools_init;
+  commands::ToolsTestOptions tools_test;
   commands::ResultsOptions results;
   commands::LogOptions log;
   commands::UndoOptions undo;
@@ -1081,11 +1084,52 @@ void add_profile(CLI::App& app, ParseState& draft) {
               [&draft](Binder& bind, Options&) { add_profile_commands(bind.command(), draft); });
 }
 
+void add_tools_commands(CLI::App& tools, ParseState& draft) {
+  constexpr auto not_read = Invocation::ToolsFile::only_found;
+  constexpr std::string_view dry_run_words = "say what would be written, write nothing";
+  add_command(tools, draft,
+              {"add", "NAME URL", "add a tool to the tools file, and ask it who it is first",
+               "spindle tools add station3 tcp://192.168.10.23:5000\n"
+               "spindle tools add station4 192.168.10.24 --profile doga-bmt --torque-unit N.m\n"
+               "spindle tools add conveyor1 '/dev/ttyUSB0?unit=3' --profile orientalmotor-blv\n"
+               "spindle tools add station5 tcp://192.168.10.25:5000 --offline",
+               nullptr, not_read},
+              draft.options.tools_add, commands::add_tool,
+              [dry_run_words](Binder& bind, commands::ToolAddOptions& options) {
+                bind.required("NAME", options.name, "by which it is told about from now on");
+                bind.required("URL", options.url, "where it is: a URL, an address or a port");
+                bind.option("--torque-unit", "UNIT", options.torque_unit,
+                            "the unit that is set on the tool, such as N.m");
+                bind.flag("--offline", options.asking, commands::Asking::offline,
+                          "ask nothing; for a tool that is not there yet");
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          dry_run_words);
+              });
+  add_command(tools, draft,
+              {"init", "", "write a tools file to begin with",
+               "spindle tools init\nspindle tools init --tools ./spindle.yaml", nullptr, not_read},
+              draft.options.tools_init, commands::init_tools,
+              [dry_run_words](Binder& bind, commands::ToolsInitOptions& options) {
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          dry_run_words);
+              });
+  add_command(tools, draft,
+              {"test", "[TARGET...]", "ask every tool who it is, and compare with the tools file",
+               "spindle tools test\nspindle tools test @line1 --json", nullptr,
+               Invocation::ToolsFile::all_tools},
+              draft.options.tools_test, commands::test_tools,
+              [](Binder& bind, commands::ToolsTestOptions& options) {
+                bind.argument("TARGET", options.targets, "tools (default: all of the tools file)");
+                bind_jobs(bind, options.jobs);
+              });
+}
+
 void add_tools(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"tools", "[--check]",
-                           "the named tools of the tools file, with endpoints and profiles",
+  constexpr Words words = {"tools", "[--check|add|init|test]",
+                           "the named tools of the tools file: list, add, ask each of them",
                            "spindle tools\n"
-                           "spindle tools --json\n"
+                           "spindle tools add station3 tcp://192.168.10.23:5000\n"
+                           "spindle tools test\n"
                            "spindle tools --check --tools ./spindle.yaml"};
   const auto run = [](bool check, Context& context) {
     return check ? commands::check_tools(context) : commands::tools(context);
@@ -1097,6 +1141,7 @@ void add_tools(CLI::App& app, ParseState& draft) {
                   draft.tools_file = Invocation::ToolsFile::only_found;
                 };
                 bind.flag("--check", check_file, "every fault of the file, with its place");
+                add_tools_commands(bind.command(), draft);
               });
 }
 

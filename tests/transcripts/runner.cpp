@@ -24,6 +24,7 @@
 //   %report-store FILE    the store of tests/support/report_store.hpp: a shift of three tools
 //   %profile NAME         a file of tests/profiles/good, in the transcript's own folder
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
+//   %set NAME VALUE       a variable of the program's environment from here on
 //   %disk full|empty      whether it takes any more
 //   %hide progress        from here on the line that a terminal shows for a moment is left out
 //   %answer TEXT          what the user types at the next question
@@ -188,6 +189,7 @@ class Stage {
     words.size() > 2 ? test::make_damaged_store(words.at(1), profiles_)
                      : test::make_sample_store(words.at(1), profiles_);
   }
+  void set_variable(const std::string& name, const std::string& value) { variables_[name] = value; }
   void hide_progress() { hides_progress_ = true; }
 
   /// Motor drivers on one line; what happens to them is told by happen().
@@ -286,6 +288,7 @@ class Stage {
                     const sim::ServeOptions& options) { return options.listening(5000); },
         .end_waits = [this] { interrupt_->end_waits(); },
         .environment = [this](std::string_view name) -> std::optional<std::string> {
+          if (const auto set = variables_.find(name); set != variables_.end()) return set->second;
           if (name == "XDG_STATE_HOME") return "/state";
           if (name == "SPINDLE_PROFILE_PATH" && !own_profiles_.empty()) return own_profiles_;
           return std::nullopt;
@@ -345,6 +348,7 @@ class Stage {
   std::vector<std::string> answers_;
   test::MemoryDisk disk_;
   bool hides_progress_ = false;
+  std::map<std::string, std::string, std::less<>> variables_ = {};
   int status_ = 0;
 };
 
@@ -412,6 +416,7 @@ class Player {
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
     if (words.at(0) == "profile") copy_profile(words.at(1));
+    if (words.at(0) == "set") stage_.set_variable(words.at(1), words.at(2));
     if (words.at(0) == "hide") stage_.hide_progress();
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
   }

@@ -361,6 +361,33 @@ Result<Outcome> tools(Context& context);
 /// Every fault of the tools file; context.tools needs no more than its path.
 Result<Outcome> check_tools(Context& context);
 
+/// Whether a tool that is added is asked who it is.
+enum class Asking : std::uint8_t { ask, offline };
+
+struct ToolAddOptions {
+  std::string name;
+  std::string url;
+  std::string torque_unit = {};  ///< empty: unknown
+  Asking asking = Asking::ask;
+  Execution execution = Execution::real;
+};
+/// Adds a tool to the tools file, which is made where there is none; context.tools needs no more
+/// than its path.
+Result<Outcome> add_tool(const ToolAddOptions& options, Context& context);
+
+struct ToolsInitOptions {
+  Execution execution = Execution::real;
+};
+/// Writes a tools file to begin with, and never over one.
+Result<Outcome> init_tools(const ToolsInitOptions& options, Context& context);
+
+struct ToolsTestOptions {
+  std::vector<std::string> targets;  ///< empty: all of the tools file
+  std::size_t jobs = usual_jobs;
+};
+/// Asks every tool who it is, and compares that with the tools file.
+Result<Outcome> test_tools(const ToolsTestOptions& options, Context& context);
+
 struct ProfileNameOptions {
   std::string profile;  ///< id or file
 };
