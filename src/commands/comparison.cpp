@@ -73,6 +73,11 @@ report::Record difference_record(const Difference& difference, const std::string
                      {"unit_b", text_or_null(difference.unit_b)}}};
 }
 
+const char* state_of(const DiffResult& result) {
+  if (result.outcome.failed() > 0) return "failed";
+  return result.different > 0 ? "different" : "same";
+}
+
 }  // namespace
 
 Result<void> check_selection(const DiffOptions& options, const Profile& profile) {
@@ -86,13 +91,18 @@ Result<void> check_selection(const DiffOptions& options, const Profile& profile)
 }
 
 Summary diff_summary(const DiffResult& result, const std::string& target) {
-  return {.counts = {{"different", count(result.different)}, {"same", count(result.same)}},
+  return {.counts =
+              {
+                  {"different", count(result.different)},
+                  {"same", count(result.same)},
+              },
           .sentence = fmt::format("{} different, {} the same", result.different, result.same),
           .target = target};
 }
 
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, Lacking lacking,
-                           const std::string& target, Context& context) {
+                           const std::string& target, Context& context,
+                           const std::vector<report::Field>& more) {
   const auto& [a, b] = sides;
   TRY_LET(const auto selection, Selection::make(options.patterns, options.ignored, a.profile));
   const auto comparison = catalogue::compare(a.snapshot, b.snapshot, selection, lacking);
@@ -112,8 +122,12 @@ Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, L
       listing.add(error);
     }
   }
-  return finish(listing, result.outcome, diff_summary(result, target), context)
-      .map([&](const Outcome&) { return result; });
+  Summary summary = diff_summary(result, target);
+  summary.counts.push_back({"state", std::string(state_of(result))});
+  summary.counts.insert(summary.counts.end(), more.begin(), more.end());
+  return finish(listing, result.outcome, std::move(summary), context).map([&](const Outcome&) {
+    return result;
+  });
 }
 
 }  // namespace spindle::commands
