@@ -179,8 +179,7 @@ std::optional<Decimal> to_decimal(float sample) {
 CurveFacts curve_facts(const Profile& profile, const EventLayout& layout, RegisterView block,
                        std::string_view unit_of_tool) {
   const CurveSpec& curves = *profile.events->curves;
-  const std::string own = layout.torque_unit_of(block);
-  const std::string torque = own.empty() ? std::string(unit_of_tool) : own;
+  const std::string torque = layout.torque_unit_of(block, unit_of_tool);
   CurveFacts facts = {.sampling_ms = register_of(layout, curves.sampling, block)};
   for (const CurveChannel& channel : curves.channels) {
     facts.channels.push_back(channel_facts(curves, channel, layout, block, torque));

@@ -28,6 +28,7 @@ void name_keys(std::vector<EventLayout::Field>& fields) {
   for (std::size_t index = 0; index < fields.size(); ++index) {
     auto& field = fields[index];
     std::string key = words[index];
+    std::replace(key.begin(), key.end(), '-', '_');
     const bool is_reserved =
         std::find(reserved_keys.begin(), reserved_keys.end(), key) != reserved_keys.end();
     const bool is_number = key.find_first_not_of("0123456789") == std::string::npos;
@@ -111,8 +112,8 @@ Registers EventLayout::key_of(RegisterView block) const {
   return key;
 }
 
-std::string EventLayout::torque_unit_of(RegisterView block) const {
-  if (!torque_unit_) return {};
+std::string EventLayout::torque_unit_of(RegisterView block, std::string_view of_tool) const {
+  if (!torque_unit_) return std::string(of_tool);
   const Field& field = fields_[*torque_unit_];
   const auto& labels = field.parameter->labels;
   const auto label = std::find_if(labels.begin(), labels.end(),

@@ -131,9 +131,7 @@ Record NewsRecords::event(const device::ToolEvent& news, const Naming& naming) c
     record.fields.push_back({key + "_text", text_or_null(std::move(meaning))});
   }
   if (has_torque_) {
-    const std::string own = torque_unit_of(news.block);
-    record.fields.push_back(
-        {"torque_unit", text_or_null(own.empty() ? target_->torque_unit : own)});
+    record.fields.push_back({"torque_unit", text_or_null(torque_unit_of(news.block))});
   }
   add_steps(record, news.block);
   record.fields.push_back({"raw", news.block});
@@ -151,7 +149,7 @@ Record NewsRecords::event(const device::ToolEvent& news, const Naming& naming) c
 }
 
 std::string NewsRecords::torque_unit_of(const Registers& block) const {
-  return layout_->torque_unit_of(block);
+  return layout_->torque_unit_of(block, target_->torque_unit);
 }
 
 /// Where the steps of a rundown begin, in samples of its curves.

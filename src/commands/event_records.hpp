@@ -39,7 +39,7 @@ class NewsRecords {
   /// The same without the samples: what is stored beside them.
   [[nodiscard]] report::Record curve_header(const device::ToolCurve& news,
                                             const Naming& naming) const;
-  /// What a block says is the unit of its torques; empty: nothing.
+  /// The unit of the torques of a block; empty: it is not known.
   [[nodiscard]] std::string torque_unit_of(const Registers& block) const;
   [[nodiscard]] report::Record gap(const device::EventGap& news, WallTime time,
                                    const Naming& naming) const;

@@ -223,11 +223,11 @@ void RecordedTool::record(const device::ToolEvent& news) {
       });
 }
 
-/// An event that says the unit of its torques is of a place that has this unit. False where there
-/// is none and it cannot be made.
+/// An event is of a place whose torques have its unit. False where there is none and it cannot be
+/// made.
 bool RecordedTool::adopt_unit(const Registers& block) {
   const std::string unit = voice_.records->torque_unit_of(block);
-  if (unit.empty() || unit == place_row_.torque_unit) return true;
+  if (unit == place_row_.torque_unit) return true;
   store::Place other = place_row_;
   other.torque_unit = unit;
   other.since = now();

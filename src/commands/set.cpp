@@ -69,8 +69,6 @@ class Set final : public Verb<SetPlan, SetResult> {
     const std::string raw =
         options_->raw == RawWrites::ask ? raw_in_words(options_->assignments) : std::string();
     if (!raw.empty()) what.emplace_back(raw);
-    const std::string guarded = guarded_in_words(planned.front().plan.steps);
-    if (!guarded.empty()) what.emplace_back(guarded);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
                        context);
@@ -104,6 +102,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    TRY(ask_of_guarded(tool, plan, context));
     SetWriter writer(options_->undoing ? "undo" : "set", tool, options_->storing, context);
     if (!is_group_) tell_risks(plan.steps, tool.target, context);
     return options_->addressing == Addressing::broadcast ? writer.send(plan.steps)
@@ -163,6 +162,15 @@ class Set final : public Verb<SetPlan, SetResult> {
       }
     }
     return listing.end();
+  }
+
+  /// What is guarded is known only once the tool has said what it holds. Several tools were asked
+  /// about together.
+  Result<void> ask_of_guarded(OpenTool& tool, const Plan& plan, Context& context) const {
+    const std::string guarded = guarded_in_words(plan.steps);
+    if (guarded.empty() || is_group_ || options_->undoing) return {};
+    TRY(ask_away_from(tool, fmt::format("{} on {}", guarded, tool.target.shown), context));
+    return confirm_plan(plan, tool.device).map([](const Plan&) {});
   }
 
   /// The user sees first what the question is about.

@@ -448,7 +448,7 @@ constexpr Field<ProfileDraft> list_fields[] = {
     word<catalogue::writes_words, &ProfileDraft::profile, &Profile::writes>("writes"),
     field<&ProfileDraft::profile, &Profile::exceptions>("exceptions").with(code_list_keys),
     custom("parameters", Need::optional, "list of maps", read_parameters).with(parameter_keys),
-    custom("event-fields", Need::optional, "list of maps", read_event_fields).with(parameter_keys),
+    custom("event-fields", Need::optional, "list of maps", read_event_fields),
     custom("actions", Need::optional, "list of maps", read_actions).with(action_keys),
 };
 

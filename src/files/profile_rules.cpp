@@ -646,14 +646,17 @@ void unasked_frames_are_answers(const ProfileDraft& draft, Diagnostics& findings
   }
 }
 
+/// Whether an event block is the answer to a read of one of the two tables of registers.
+bool is_block_read(const catalogue::EventSpec& events) {
+  using modbus::FunctionCode;
+  return events.function == static_cast<std::uint8_t>(FunctionCode::read_holding_registers) ||
+         events.function == static_cast<std::uint8_t>(FunctionCode::read_input_registers);
+}
+
 void event_block_is_legal(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
   const catalogue::EventSpec& events = *draft.profile.events;
-  const auto is = [&](modbus::FunctionCode code) {
-    return events.function == static_cast<std::uint8_t>(code);
-  };
-  if (!is(modbus::FunctionCode::read_holding_registers) &&
-      !is(modbus::FunctionCode::read_input_registers)) {
+  if (!is_block_read(events)) {
     findings.add_once(draft.events.of("function"), "events come as answers to function 3 or 4");
   }
   if (events.count < 1 || events.count > modbus::max_read_count) {
@@ -799,7 +802,7 @@ void check_event_name(const ProfileDraft& draft, std::string_view key, const std
   }
   const Parameter* parameter = parameter_named(draft, name);
   if (draft.lacks(name)) add(no_such_parameter(draft, name));
-  if (parameter == nullptr) return;
+  if (parameter == nullptr || !is_block_read(events)) return;
   const Span span = span_of(*parameter, 0);
   const unsigned end = unsigned{*events.first} + events.count;
   if (span.table == catalogue::table_of(events) && span.first >= *events.first && span.last < end) {

@@ -4,6 +4,7 @@ frames (gen2_frames.txt), and from nothing of spindle's.
 As a program it prints the port that it listens on and serves until it is ended. Tests take the class, which
 remembers every request."""
 
+import contextlib
 import pathlib
 import random
 import socket
@@ -61,6 +62,7 @@ class Gen2Device:
 
     def __init__(self, firmware=4002, version=(4, 0, 2), product=19, model="BMT3216", serial="2401190042"):
         self.lock = threading.RLock()
+        self.sending = threading.Lock()  # a frame goes out whole, however many pieces it takes
         self.requests = []
         self.writes = []  # (register, words) as they came
         self.strange = []  # writes to registers that no document names
@@ -280,26 +282,23 @@ class Gen2Device:
         self._send(connection, noise + struct.pack(">HHHB", transaction, 0, len(pdu) + 1, 1) + pdu)
 
     def _send(self, connection, data):
-        if self.pieces is None:
-            connection.sendall(data)
-            return
-        size, pause = self.pieces
-        for at in range(0, len(data), size):
-            connection.sendall(data[at:at + size])
-            time.sleep(pause())
+        size, pause = self.pieces or (len(data), lambda: 0)
+        self._send_in_pieces(connection, data, size, pause)
+
+    def _send_in_pieces(self, connection, data, size, pause):
+        with self.sending:
+            for at in range(0, len(data), size):
+                connection.sendall(data[at:at + size])
+                time.sleep(pause())
 
     def push(self, data, size=None):
         """To all that are connected; in pieces with pauses where a size is given."""
         with self.lock:
             connections = list(self.connections)
         for connection in connections:
-            try:
-                for at in range(0, len(data), size or len(data)):
-                    connection.sendall(data[at:at + (size or len(data))])
-                    if size:
-                        time.sleep(random.uniform(0.010, 0.030))
-            except OSError:
-                pass
+            with contextlib.suppress(OSError):
+                pause = (lambda: random.uniform(0.010, 0.030)) if size else (lambda: 0)
+                self._send_in_pieces(connection, data, size or len(data), pause)
 
 
 # ---- frames that come unasked ----

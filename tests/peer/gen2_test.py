@@ -178,8 +178,8 @@ class Reading(Gen2Test):
 
     def test_no_read_looks_like_an_event(self):
         """107 input registers are asked for, by a raw range and with and without a profile."""
-        for profile in ((), ("--profile", "doga-gen2")):
-            outcome = spindle("get", self.url, "@input:0..106", *profile)
+        for url, profile in ((self.url + "?unit=1", ()), (self.url, ("--profile", "doga-gen2"))):
+            outcome = spindle("get", url, "@input:0..106", *profile)
             self.assertIn(len(outcome.of_type("value")), range(90, 108))
 
     def test_events_between_the_answers(self):
@@ -216,7 +216,7 @@ class Writing(Gen2Test):
     def test_the_tools_file_says_another_unit(self):
         folder = support.scratch_folder()
         tools = folder / "tools.yaml"
-        tools.write_text(f"tools:\n  - {{name: a, url: '{self.url}', torque-unit: kgf.cm}}\n", encoding="utf-8")
+        tools.write_text(f"tools:\n  a: {{url: '{self.url}', torque-unit: kgf.cm}}\n", encoding="utf-8")
         tools.chmod(0o600)
         outcome = spindle("set", "a", "preset.1.target-torque=2.75", "--tools", tools)
         self.assertNotEqual(outcome.status, 0, outcome)
@@ -227,7 +227,7 @@ class Writing(Gen2Test):
         self.device.put(3675, 0)
         gen2_device.LIMITS[3662] = (0, 100)
         self.addCleanup(gen2_device.LIMITS.pop, 3662)
-        outcome = self.ask("set", "control.torque-holding-time=101", status=5)
+        outcome = self.ask("set", "control.torque-holding-time=101", status=6)
         self.assertIn("0E", outcome.err + outcome.out)
         self.assertEqual(self.device.number(3662), 0)
 
@@ -388,7 +388,7 @@ class Backups(Gen2Test):
         self.backup()
         self.device.put(UNIT, 0)
         for arguments in ((), ("--force",)):
-            outcome = self.restore(*arguments, status=5)
+            outcome = self.restore(*arguments, status=8)
             self.assertIn("kgf.cm", outcome.err + outcome.out)
         self.assertEqual(self.written(), [])
 

@@ -141,9 +141,12 @@ TEST_CASE("curve: an event says the same whichever of its forms brings it") {
     CHECK(block.size() == 107);
     CHECK(layout.number_of(block) == 1962);
     CHECK(layout.kind_of(block) == catalogue::EventKind::fastening_ok);
-    CHECK(layout.torque_unit_of(block) == "N.m");
+    CHECK(layout.torque_unit_of(block, "lbf.in") == "N.m");
     CHECK(layout.key_of(block) == layout.key_of(blocks.front()));
   }
+  Registers of_unknown_unit = blocks.front();
+  of_unknown_unit[layout.find("event.torque-unit")->at] = 9;
+  CHECK(layout.torque_unit_of(of_unknown_unit, "lbf.in").empty());
   REQUIRE(whole->channels.size() == 2);
   CHECK(catalogue::to_samples(whole->channels[0].samples) == first_curve());
   CHECK(catalogue::to_samples(whole->channels[1].samples) == second_curve());
@@ -166,11 +169,8 @@ TEST_CASE("curve: a channel comes with its samples, and one that no product has 
   REQUIRE(first->channels.size() == 1);
   CHECK(first->channels[0].channel == 0);
   CHECK(catalogue::to_samples(first->channels[0].samples) == first_curve());
-  for (const std::uint16_t channel : {0, 3, 0xFFFF}) {
-    CHECK(!frames.decode(
-        {.function = 0x64,
-         .data = Bytes(long_frame(0x64, curve_data(channel, 4, first_curve())).begin() + 8,
-                       long_frame(0x64, curve_data(channel, 4, first_curve())).end())}));
+  for (const std::uint16_t channel : std::vector<std::uint16_t>{0, 3, 0xFFFF}) {
+    CHECK(!frames.decode(pdu_of(long_frame(0x64, curve_data(channel, 4, first_curve())))));
   }
 }
 
@@ -223,7 +223,7 @@ TEST_CASE("curve: lengths that lie never become a value") {
     CHECK(std::holds_alternative<modbus::Junk>(modbus::deframe(Framing::tcp, Role::client, large)));
   }
   // Counts against the data.
-  for (const std::uint16_t says : {0, 3, 5, 2001, 65'535}) {
+  for (const std::uint16_t says : std::vector<std::uint16_t>{0, 3, 5, 2001, 65'535}) {
     CHECK(!frames.decode(pdu_of(long_frame(0x64, curve_data(1, says, first_curve())))));
   }
   CHECK(!frames.decode(
@@ -245,7 +245,7 @@ TEST_CASE("curve: lengths that lie never become a value") {
 TEST_CASE("curve: a server takes no long frames, and a function of the standard is never long") {
   const Bytes large = long_frame(0x64, curve_data(1, 500, std::vector<float>(500, 1.0F)));
   CHECK(std::holds_alternative<modbus::Junk>(modbus::deframe(Framing::tcp, Role::server, large)));
-  for (const std::uint8_t function : {0x03, 0x04, 0x10, 0x11, 0x63, 0x6F, 0xE4}) {
+  for (const std::uint8_t function : Bytes{0x03, 0x04, 0x10, 0x11, 0x63, 0x6F, 0xE4}) {
     CHECK(std::holds_alternative<modbus::Junk>(
         modbus::deframe(Framing::tcp, Role::client, long_frame(function, Bytes(1000, 0)))));
   }

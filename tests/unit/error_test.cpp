@@ -50,10 +50,10 @@ TEST_CASE("exit statuses and their names are those of the contract") {
   }
 }
 
-TEST_CASE("the README's table of exit statuses is the table of the code") {
-  std::ifstream readme(SPINDLE_SOURCE_DIR "/README.md");
+TEST_CASE("the promised table of exit statuses is the table of the code") {
+  std::ifstream promises(SPINDLE_SOURCE_DIR "/docs/promises.md");
   std::vector<std::string> rows;
-  for (std::string line; std::getline(readme, line);) {
+  for (std::string line; std::getline(promises, line);) {
     const bool begins = line == "| status | name | meaning |";
     if (begins || (!rows.empty() && line.starts_with('|'))) rows.push_back(line);
     if (!rows.empty() && !line.starts_with('|')) break;

@@ -77,8 +77,8 @@ TEST_CASE("gen2: everything that has a name can be read, and no read looks like 
 TEST_CASE("gen2: what no document names is not written, and no request goes out") {
   Bench bench;
   REQUIRE(bench.device().require_known_registers());
-  for (const std::uint16_t address :
-       {0, 23, 931, 999, 1037, 2395, 3652, 3744, 4002, 4003, 4100, 4500, 5002, 5351}) {
+  for (const std::uint16_t address : std::vector<std::uint16_t>{
+           0, 23, 931, 999, 1037, 2395, 3652, 3744, 4002, 4003, 4100, 4500, 5002, 5351}) {
     CAPTURE(address);
     const auto written = bench.device().write_word({address}, 1);
     REQUIRE_FALSE(written.has_value());

@@ -22,6 +22,7 @@ constexpr std::uint16_t direction = 5001;
 constexpr std::uint16_t output = 5350;
 constexpr std::uint16_t event_select = 3682;
 constexpr std::uint16_t auto_output = 3718;
+constexpr std::size_t block_size = 214;
 constexpr ConnectionId client{99};  // whose requests a rig sends past the wire
 constexpr ConnectionId other{7};
 
@@ -56,10 +57,14 @@ struct Bench : test::DeviceRig {
   std::vector<Bytes> pushed(ConnectionId to = client) {
     std::vector<Bytes> blocks;
     for (const Push& push : tool->take_pushes(to)) {
-      REQUIRE(push.pdu.function == 4);
-      REQUIRE(push.pdu.data.size() == 215);
-      REQUIRE(push.pdu.data.front() == 214);
-      blocks.emplace_back(push.pdu.data.begin() + 1, push.pdu.data.end());
+      const Bytes& data = push.pdu.data;
+      const std::size_t length_bytes = push.pdu.function == 0x04 ? 1 : 2;
+      REQUIRE(data.size() >= length_bytes + 4);
+      if (push.pdu.function == 0x64) continue;  // a curve
+      REQUIRE(data.size() >= length_bytes + block_size);
+      CHECK((push.pdu.function == 0x66 || data.size() == length_bytes + block_size));
+      const auto begin = data.begin() + static_cast<std::ptrdiff_t>(length_bytes);
+      blocks.emplace_back(begin, begin + static_cast<std::ptrdiff_t>(block_size));
     }
     return blocks;
   }
@@ -136,13 +141,14 @@ TEST_CASE("gen2: the event of the facts has the bytes of the facts") {
 
 TEST_CASE("gen2: it answers as unit 1 whatever unit is asked") {
   Bench bench;
-  for (const std::uint8_t unit : Bytes{0, 1, 77}) CHECK(bench.tool->answering_unit({unit}).value == 1);
+  for (const std::uint8_t unit : Bytes{0, 1, 77})
+    CHECK(bench.tool->answering_unit({unit}).value == 1);
   // A screwdriver with older firmware repeats the unit that was asked.
   test::DeviceRig older(test::product("doga-bm"), DeviceOptions{});
   CHECK(older.tool->answering_unit({77}).value == 77);
 }
 
-TEST_CASE("gen2: a screw is told as one frame of 214 bytes to those who are armed") {
+TEST_CASE("gen2: a screw is told in one frame to those who are armed") {
   Bench bench;
   const Bytes block = bench.drive();
   CHECK(bench.pushed(other).empty());

@@ -83,7 +83,7 @@ TEST_CASE("pushed only: each form is one event with its curves, and nothing is r
 TEST_CASE("pushed only: what comes at once may be old, and is told as such") {
   Bench bench;
   REQUIRE(bench.attach());
-  bench.happen(1, EventKind::other);
+  bench.happen(1, EventKind::fastening_ng);
   REQUIRE(bench.events.size() == 1);
   CHECK(bench.events[0].standing == Standing::first);
 }
@@ -92,13 +92,13 @@ TEST_CASE("pushed only: what was missed while there was no connection shows by t
   Bench bench;
   REQUIRE(bench.attach());
   bench.wait(2s);
-  bench.happen(1, EventKind::other);
+  bench.happen(1, EventKind::fastening_ng);
   bench.device.reset();
-  bench.tool->happen(EventKind::other, bench.clock.now());
+  bench.tool->happen(EventKind::fastening_ng, bench.clock.now());
   bench.wait(5s);
   bench.device = std::make_unique<device::Device>(bench.open());
   REQUIRE(bench.attach(100ms));
-  bench.happen(1, EventKind::other);
+  bench.happen(1, EventKind::fastening_ng);
   CHECK(bench.numbers() == std::vector<std::uint16_t>{1, 3});
   REQUIRE(bench.gaps.size() == 1);
   CHECK(bench.gaps[0].after == 1);
@@ -109,9 +109,9 @@ TEST_CASE("pushed only: the last event of a record is not told again") {
   Bench bench;
   bench.source->recall(device::LastEvent{.number = 1, .block = std::nullopt, .unseen = 100ms});
   REQUIRE(bench.attach());
-  bench.happen(1, EventKind::other);
+  bench.happen(1, EventKind::fastening_ng);
   CHECK(bench.events.empty());
-  bench.happen(1, EventKind::other);
+  bench.happen(1, EventKind::fastening_ng);
   CHECK(bench.numbers() == std::vector<std::uint16_t>{2});
 }
 

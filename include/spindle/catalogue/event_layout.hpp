@@ -41,9 +41,9 @@ class EventLayout {
   /// but what says of curves.
   [[nodiscard]] Registers key_of(RegisterView block) const;
 
-  /// The unit of its torques as the block says it; empty: it does not, or the profile does not know
-  /// it.
-  [[nodiscard]] std::string torque_unit_of(RegisterView block) const;
+  /// The unit of its torques as the block says it, or that of the tool where no block says one.
+  /// Empty: it is not known; so is one that the block says and the profile does not name.
+  [[nodiscard]] std::string torque_unit_of(RegisterView block, std::string_view of_tool) const;
 
   /// The parameter of the block with this name; null: there is none.
   [[nodiscard]] const Field* find(std::string_view name) const;
