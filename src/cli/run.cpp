@@ -170,8 +170,9 @@ int tell(const Error& error, World& world, report::Renderer& renderer) {
 
 /// What the shells' completion scripts ask. A broken file must not make a shell noisy.
 int run_completion(const std::vector<std::string>& words, World& world) {
-  const auto typed = parse(words);
-  const auto tools = find_tools(world, typed.value_or(Invocation()));
+  auto typed = parse(words).value_or(Invocation());
+  typed.tools_use = Invocation::ToolsFile::loaded;  // also where no word is typed yet
+  const auto tools = find_tools(world, typed);
   const files::Tools none;
   const files::ProfileStore profiles = profile_store(world);
   const work::ToolMemory memory(world.disk, cache_folder(world));

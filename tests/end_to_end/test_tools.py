@@ -51,7 +51,7 @@ class AddTest(ToolsTest):
         added = support.run("tools", "add", "station3", url)
         self.assertEqual(added.status, 0, added)
         self.assertIn(str(made), added.stderr)
-        self.assertIn(f'station3: {{url: "{url}", profile: {BM}, serial: ', made.read_text("utf-8"))
+        self.assertIn(f'station3: {{url: "{url}", serial: ', made.read_text("utf-8"))
         self.assertEqual(support.run("get", "station3", "preset.1.speed").status, 0)
 
     def test_links_and_rights_stay(self):
@@ -107,6 +107,13 @@ class AddTest(ToolsTest):
         added = support.run("tools", "add", "b", "tcp://127.0.0.1:2", "--offline", "--tools", "elsewhere/line1.yaml")
         self.assertEqual(added.status, 74, added)
         self.assertEqual((folder / "line1.yaml").read_text("utf-8"), "tools: {}\n")
+
+    def test_an_entry_with_a_fault_is_not_completed(self):
+        self.file.write_text("tools:\n  good: {url: tcp://127.0.0.1:1}\n  bad: {urll: tcp://127.0.0.1:2}\n", "utf-8")
+        for words in (("get", ""), ("tools", "test", "")):
+            offered = [line.split("\t")[0] for line in support.run("__complete", *words).stdout.splitlines()]
+            self.assertIn("good", offered)
+            self.assertNotIn("bad", offered)
 
     def test_a_sink_with_a_fault_is_not_used(self):
         self.file.write_text(
