@@ -99,6 +99,12 @@ Result<Outcome> tools(Context& context) {
   Listing listing(context, tool_columns);
   for (const files::Tool& tool : context.tools.tools) {
     if (context.tools.faults.contains(tool.name)) continue;
+    const Resolution meant = resolve_each_target({tool.name}, context);
+    for (const Error& fault : meant.faults) {
+      outcome.fail(fault);
+      listing.add(fault);
+    }
+    if (!meant.faults.empty()) continue;
     listing.add(tool_record(tool, context.tools, context.clock));
   }
   for (const auto& [entry, fault] : context.tools.faults) {

@@ -42,23 +42,30 @@ Result<Target> target_of_url(const std::string& url, const Environment& environm
   return target;
 }
 
-Result<Target> target_of_tool(const files::Tool& tool, const Environment& environment) {
+/// A tool of which a part means nothing.
+Target faulty_target(const files::Tool& tool, const files::SourceLocation& at, const Error& error,
+                     const Environment& environment) {
+  return {.shown = tool.name,
+          .fault = fmt::format("{}:{}:{}: {}", environment.tools.path, at.line, at.column,
+                               describe(error))};
+}
+
+Target target_of_tool(const files::Tool& tool, const Environment& environment) {
   auto target = target_of_url(tool.url, environment);
-  if (!target) {
-    target.error().target = tool.name;
-    target.error().endpoint = tool.url;
-    target.error().code = Errc::bad_file;
-    return target;
-  }
+  if (!target) return faulty_target(tool, tool.url_at, target.error(), environment);
   target->shown = tool.name;
   if (tool.timeout) target->endpoint.timeout = tool.timeout;
   if (tool.gap) target->endpoint.gap = tool.gap;
   if (tool.retries) target->endpoint.retries = tool.retries;
   if (tool.transactions) target->endpoint.transactions = tool.transactions;
-  if (environment.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
+  if (environment.common.profile.empty() && !tool.profile.empty()) {
+    const auto profile = environment.profiles.load(tool.profile);
+    if (!profile) return faulty_target(tool, tool.profile_at, profile.error(), environment);
+    target->profile = tool.profile;
+  }
   target->torque_unit = tool.torque_unit;
   target->verified = tool.verified;
-  return target;
+  return std::move(*target);
 }
 
 /// The tools of this name, or that of this URL; a target with a fault where the entry has one. Only
