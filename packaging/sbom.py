@@ -6,6 +6,7 @@ Read from the build itself: which shared libraries the programs load (ldd), whic
 """
 
 import datetime
+import functools
 import hashlib
 import json
 import os
@@ -41,20 +42,24 @@ def shared_libraries(program):
 class Build:
     def __init__(self, folder):
         self.folder = folder
+        self._headers = self._headers_by_object()
 
     def _ninja(self, *words):
         return said_by("ninja", "-C", str(self.folder), "-t", *words)
 
+    def _headers_by_object(self):
+        found = {}
+        for line in self._ninja("deps").splitlines():
+            if line and not line.startswith(" "):
+                headers = found.setdefault(line.partition(":")[0], set())
+            elif line.startswith("    /usr/"):
+                headers.add(line.strip())
+        return found
+
     def headers(self, program):
         """Headers of the system that were compiled into it."""
-        wanted = {line for line in self._ninja("inputs", program).splitlines() if line.endswith(".o")}
-        found, counts = set(), False
-        for line in self._ninja("deps").splitlines():
-            if not line.startswith(" "):
-                counts = line.partition(":")[0] in wanted
-            elif counts and line.strip().startswith("/usr/"):
-                found.add(pathlib.Path(line.strip()))
-        return found
+        objects = self._ninja("inputs", program).splitlines()
+        return {pathlib.Path(header) for each in objects for header in self._headers.get(each, ())}
 
     def archives(self, program):
         """Archives of the system that were linked into it."""
@@ -74,25 +79,26 @@ class Packages:
     def __init__(self):
         self._owners = {}
 
-    def owners(self, paths):
-        found = set()
+    def learn(self, paths):
+        """Asks for all of them at once: every question reads all that dpkg knows."""
         asked = [path for path in paths if path not in self._owners]
         for path in asked:
             self._owners[path] = None
         # /lib and /usr/lib are one folder; dpkg knows a file by the name that its package has.
         names = {str(name): path for path in asked for name in (path, path.resolve(), *self._other_names(path))}
-        for start in range(0, len(names), 500):
-            done = subprocess.run(["dpkg-query", "-S", *list(names)[start:start + 500]], capture_output=True, text=True,
+        for start in range(0, len(names), 2000):
+            done = subprocess.run(["dpkg-query", "-S", *list(names)[start:start + 2000]], capture_output=True, text=True,
                                   check=False)
             for line in done.stdout.splitlines():
                 owner, _, name = line.partition(": ")
                 if name in names and not owner.startswith("diversion"):
                     self._owners[names[name]] = owner.split(",")[0]
-        for path in paths:
+        for path in asked:
             if self._owners[path] is None:
                 sys.exit(f"sbom: {path} belongs to no package")
-            found.add(self._owners[path])
-        return found
+
+    def owners(self, paths):
+        return {self._owners[path] for path in paths}
 
     @staticmethod
     def _other_names(path):
@@ -100,6 +106,7 @@ class Packages:
             yield name.removeprefix("/usr") if name.startswith("/usr/lib") else "/usr" + name
 
     @staticmethod
+    @functools.cache
     def describe(owner):
         fields = ("binary:Package", "Version", "Architecture", "source:Package", "source:Version")
         told = said_by("dpkg-query", "-W", "-f", "\t".join("${%s}" % field for field in fields), owner).split("\t")
@@ -171,16 +178,20 @@ def describe(folder):
     build, packages = Build(folder), Packages()
     programs = [folder / name for name in PROGRAMS if (folder / name).is_file()]
     document = Document(programs)
+    shared, archives, headers = ({path: read(path) for path in programs} for read in (
+        lambda path: set(shared_libraries(path)), lambda path: build.archives(path.name),
+        lambda path: build.headers(path.name)))
+    packages.learn(set().union(*shared.values(), *archives.values(), *headers.values()))
     for path in programs:
         program = document.add(path.name, version(), licenseDeclared="MIT", primaryPackagePurpose="APPLICATION",
                                supplier="NOASSERTION", checksums=[{"algorithm": "SHA256", "checksumValue": sha256(path)}])
         document.relate("SPDXRef-DOCUMENT", "DESCRIBES", program)
-        dynamic = packages.owners(set(shared_libraries(path)))
+        dynamic = packages.owners(shared[path])
         for owner in sorted(dynamic):
             document.relate(program, "DYNAMIC_LINK", document.add_debian(owner))
         sources = {Packages.describe(owner)["source"] for owner in dynamic}
-        static = packages.owners(build.archives(path.name))
-        for owner in sorted(static | packages.owners(build.headers(path.name))):
+        static = packages.owners(archives[path])
+        for owner in sorted(static | packages.owners(headers[path])):
             package = document.add_debian(owner)
             # Code of a library that is also loaded, or of the kernel's interface, is in its headers only.
             loaded = Packages.describe(owner)["source"] in sources | {"linux"}
