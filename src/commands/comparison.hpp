@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <string>
-#include <vector>
 
 #include "diff_side.hpp"
 #include "listing.hpp"
@@ -28,11 +27,9 @@ struct DiffResult {
 };
 
 /// Lists what differs, and what could not be read. `target` is the tool that it is told of; empty:
-/// none. `more` stands in the summary. Error `usage` where nothing could be compared, which proves
-/// nothing.
+/// none. Error `usage` where nothing could be compared, which proves nothing.
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options,
-                           catalogue::Lacking lacking, const std::string& target, Context& context,
-                           const std::vector<report::Field>& more = {});
+                           catalogue::Lacking lacking, const std::string& target, Context& context);
 
 Summary diff_summary(const DiffResult& result, const std::string& target);
 

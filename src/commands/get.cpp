@@ -3,7 +3,6 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
-#include "spindle/catalogue/short_name.hpp"
 #include "spindle/commands/commands.hpp"
 
 namespace spindle::commands {
@@ -11,43 +10,19 @@ namespace {
 
 bool is_raw(const std::string& name) { return name.starts_with('@'); }
 
-/// Whether one of these raw registers is a secret of some product: then the tool is asked first
-/// what it is.
-bool may_be_secret(const std::vector<std::string>& names, const Context& context) {
-  const auto wanted = catalogue::Profile().describe(names);
-  if (!wanted) return false;
-  for (const catalogue::Profile& profile : context.profiles.load_all()) {
-    for (const catalogue::Parameter& secret : profile.parameters) {
-      if (secret.secrecy == catalogue::Secrecy::open) continue;
-      const bool is_wanted = std::any_of(
-          wanted->begin(), wanted->end(),
-          [&](const catalogue::Parameter& raw) { return catalogue::share_registers(raw, secret); });
-      if (is_wanted) return true;
-    }
-  }
-  return false;
-}
-
 class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
  public:
-  Get(const GetOptions& options, const Context& context) : options_(&options) {
-    const auto& names = options.names;
-    const bool raw_only = !names.empty() && std::all_of(names.begin(), names.end(), is_raw);
-    if (!raw_only) return;
-    need_ = may_be_secret(names, context) ? Need::raw_secrets : Need::raw_registers;
-  }
+  explicit Get(const GetOptions& options) : options_(&options) {}
 
-  [[nodiscard]] Need need() const override { return need_; }
+  [[nodiscard]] Need need() const override {
+    const auto& names = options_->names;
+    const bool raw_only = !names.empty() && std::all_of(names.begin(), names.end(), is_raw);
+    return raw_only ? Need::raw_registers : Need::named_registers;
+  }
   [[nodiscard]] Fit fit() const override { return Fit::one; }
 
   Result<Plan> plan(const catalogue::Profile& profile, const Target& /*target*/) const override {
-    return catalogue::meant_by(options_->names, profile)
-        .and_then([&](const std::vector<std::string>& names) { return profile.select(names); });
-  }
-
-  [[nodiscard]] std::string_view otherwise(const std::string& word,
-                                           const catalogue::Profile& profile) const override {
-    return catalogue::is_meant(word, profile) ? "a parameter" : "";
+    return profile.select(options_->names);
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
@@ -57,7 +32,7 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
     for (const device::Reading& reading : readings) {
       if (reading.value) {
         outcome.succeed();
-        listing.add(value_record(reading, tool.target, context.clock, *options_));
+        listing.add(value_record(reading, tool.target, context.clock, options_->limits));
       } else {
         outcome.fail(reading.value.error());
         listing.add(reading.value.error());
@@ -68,16 +43,14 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
 
  private:
   const GetOptions* options_;
-  Need need_ = Need::named_registers;
 };
 
 }  // namespace
 
 Result<Outcome> get(const GetOptions& options, Context& context) {
-  return resolve_one_or_group(options.targets, Addressing::unicast, context)
+  return resolve_one_or_group(options.target, Addressing::unicast, context)
       .and_then([&](Targets targets) {
-        return run_verb(Get(options, context), reopening(std::move(targets)), options.jobs,
-                        context);
+        return run_verb(Get(options), reopening(std::move(targets)), options.jobs, context);
       });
 }
 

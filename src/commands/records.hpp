@@ -9,8 +9,6 @@
 
 namespace spindle::commands {
 
-struct GetOptions;
-
 using report::count;
 using report::number;
 using report::text_or_null;
@@ -21,9 +19,9 @@ report::Cell value_cell(const catalogue::Value& value);
 
 report::Cell milliseconds(Duration duration);
 
-/// The `value` record of a reading that succeeded; of a secret only where it was asked for.
+/// The `value` record of a reading that succeeded.
 report::Record value_record(const device::Reading& reading, const Target& target,
-                            const Clock& clock, const GetOptions& options);
+                            const Clock& clock, device::Limits limits);
 std::span<const report::Column> value_columns(device::Limits limits);
 
 report::Record parameter_record(const catalogue::Parameter& parameter, const std::string& target,

@@ -56,24 +56,22 @@ ReportZone zone_of(const Assessed& assessed, const Clock& clock) {
 }
 
 Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
-                        const ReportOptions& options, store::Reader& reader, Context& context) {
-  TRY_LET(const auto curves, load_curves(assessed, reader));
+                        const ReportOptions& options, Context& context) {
   const std::string page = report_page(assessed, {.zone = zone,
                                                   .made = context.clock.wall(),
                                                   .version = std::string(context.version),
-                                                  .options = options,
-                                                  .curves = curves});
+                                                  .options = options});
   if (options.file == standard_output) return context.io.out(page);
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
 Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
-                         const ReportOptions& options, store::Reader& reader, Context& context) {
+                         const ReportOptions& options, Context& context) {
   if (!options.file.empty()) {
-    auto written = write_page(assessed, zone, options, reader, context);
+    auto written = write_page(assessed, zone, options, context);
     if (!written) return written;
   }
-  if (report::is_table(context.user.format)) {
+  if (context.user.format == report::Format::table) {
     if (!options.file.empty()) return {};
     for (const std::string& line : report_lines(assessed, zone)) {
       auto told = context.renderer.line({}, line);
@@ -116,18 +114,6 @@ Summary summary_of(const Assessed& assessed, const ReportOptions& options) {
           .sentence = std::move(sentence)};
 }
 
-/// Limits of joints that are not known, as their tool's entry has a fault.
-void tell_faults(const Context& context) {
-  for (const files::Tool& tool : context.tools.tools) {
-    const auto fault = context.tools.faults.find(tool.name);
-    if (fault == context.tools.faults.end()) continue;
-    context.renderer.note(
-        fmt::format("warning: {}: limits of joints in the tools file are not used, as its entry "
-                    "has a fault: {}",
-                    tool.name, fault->second.message));
-  }
-}
-
 }  // namespace
 
 Result<Outcome> report(const ReportOptions& options, Context& context) {
@@ -145,7 +131,6 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   if (!reader) return tl::unexpected(std::move(reader.error()));
   const auto selection = select_for_report(options, **reader, context);
   if (!selection) return tl::unexpected(selection.error());
-  tell_faults(context);
 
   work::Study study(selection->facts, *study_options, std::move(*exclusions));
   auto read = (*reader)->events(selection->filter, [&](const store::EventView& event) {
@@ -164,7 +149,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   Outcome outcome;
   outcome.succeed();
   if (!assessed.unmet.empty()) outcome.negate();
-  return tell_report(assessed, zone, options, **reader, context)
+  return tell_report(assessed, zone, options, context)
       .and_then([&] { return tell(summary_of(assessed, options), outcome, context); })
       .map([&] { return outcome; });
 }

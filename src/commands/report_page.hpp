@@ -3,7 +3,6 @@
 #include <string>
 
 #include "report_assessment.hpp"
-#include "report_curves.hpp"
 #include "report_words.hpp"
 
 namespace spindle::commands {
@@ -13,7 +12,6 @@ struct PageFacts {
   WallTime made = {};
   std::string version = {};  ///< of spindle
   const ReportOptions& options;
-  const StoredCurves& curves;
 };
 
 /// The report as one page that needs nothing else: no script, no request.

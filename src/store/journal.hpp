@@ -28,7 +28,6 @@ class Journal {
   Stored store(const PresetSettings& settings);
   Stored store(const Happening& happening);
   Stored store(const Seen& seen);
-  Stored store(const NewCurve& entry);
 
  private:
   /// A row whose number an event has.
@@ -63,7 +62,6 @@ class Journal {
   Statement insert_settings_;
   Statement find_happening_;
   Statement insert_happening_;
-  Statement insert_curve_;
 };
 
 }  // namespace spindle::store

@@ -16,10 +16,7 @@ Environment with(const Environment& environment, Clock& clock, const Interrupt& 
           .tools = tools,
           .show_frames = environment.show_frames,
           .common = environment.common,
-          .make_doors = environment.make_doors,
-          .cache_folder = environment.cache_folder,
-          .network = environment.network,
-          .target_variable = environment.target_variable};
+          .make_doors = environment.make_doors};
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 
 #include "commands/exact_numbers.hpp"
 #include "commands/report_assessment.hpp"
-#include "commands/report_curves.hpp"
 #include "commands/report_page.hpp"
 #include "commands/report_selection.hpp"
 #include "commands/report_text.hpp"
@@ -30,7 +29,6 @@ bool contains(std::string_view text, std::string_view part) {
 struct Printed {
   Bench bench = {};
   ReportOptions options = {};
-  StoredCurves curves = {};
 
   /// Values that go around a mean, two hundredths up and down.
   void add(std::size_t count, std::int64_t mean = 271, std::int64_t begin = 1) {
@@ -58,11 +56,9 @@ struct Printed {
   }
   [[nodiscard]] std::string page() const {
     return with_report([&](const Assessed& assessed) {
-      return report_page(assessed, {.zone = zone,
-                                    .made = bench_second(9000),
-                                    .version = "9.9",
-                                    .options = options,
-                                    .curves = curves});
+      return report_page(
+          assessed,
+          {.zone = zone, .made = bench_second(9000), .version = "9.9", .options = options});
     });
   }
   /// Of the torque of the first stratum.

@@ -25,8 +25,7 @@ enum class Decision : std::uint8_t {
   retry,
   resync,
   doubt,
-  proof,
-  memory
+  proof
 };
 
 /// Hears all bytes and every decision of one connection, for --verbose and --trace. Bytes come as
