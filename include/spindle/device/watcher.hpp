@@ -179,7 +179,7 @@ class Watcher {
   TimePoint poll_due_ = {};
   TimePoint retry_at_ = {};
   TimePoint connected_at_ = {};
-  /// When the tool last said something; empty: it never did.
+  /// When the tool last said something, or before that was first connected to; empty: neither.
   std::optional<TimePoint> seen_at_ = std::nullopt;
   unsigned attempts_ = 0;     ///< that came to nothing since there was a link
   unsigned short_lived_ = 0;  ///< attempts and links one after the other that did not last
