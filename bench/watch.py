@@ -6,6 +6,7 @@ usage: watch.py SPINDLE latency [EVENTS]      from the event's sending to the li
        watch.py SPINDLE tools [COUNT...]      so many tools, one event per second each
        watch.py SPINDLE record [COUNT...]     the same, stored: from the event's sending until it is durable
        watch.py SPINDLE burst [EVENTS]        events of one tool all at once, stored
+       watch.py SPINDLE curves [COUNT...]     so many tools, one result per second each with two curves, stored
 
 The tools are one process of their own, so that only spindle is measured. The times of `latency` include
 this program's own part: those of a bare relay from a socket to a pipe, seen in the same run, are printed
@@ -76,11 +77,41 @@ class Tool:
         return event_frame(self.number)
 
 
+SAMPLES = 1000
+
+
+class CurveTool(Tool):
+    """One with firmware 4002, whose results have two channels of samples."""
+
+    def __init__(self, serial=0):
+        super().__init__(serial)
+        self.identity = bytes.fromhex("000100010006 0FA2") + bytes((42, serial % 100, 19, serial // 100 % 100, 24)) + bytes(4)
+        torques = struct.pack(f">{SAMPLES}f", *(2.5 * at / SAMPLES for at in range(SAMPLES)))
+        angles = struct.pack(f">{SAMPLES}f", *(1.5 * at for at in range(SAMPLES)))
+        self.samples = torques + angles
+
+    def respond(self, function, first, word):
+        if function == 17:
+            return bytes([17, len(self.identity)]) + self.identity
+        if function == 6:
+            self.armed = self.armed or (first == 5350 and word == 1)
+            return struct.pack(">BHH", 6, first, word)
+        return bytes([function, 2 * word]) + bytes(2 * word)
+
+    def happen(self):
+        self.number = (self.number + 1) % 0x10000
+        block = struct.pack(">BBHH6B7H", 0, 1, self.number, 2026, 5, 28, 14, 30, 45, 0, 1421, 1, 2, 3, 0, 0, 1)
+        block += struct.pack(">6f5H", 2.0, 2.0625, 0, 0, 0, 0, 235, 1058, 399, 1457, 0) + bytes(16)
+        block += b"WO-1234".ljust(64, b"\0") + struct.pack(">5H", 1, 4, SAMPLES, SAMPLES, 2)
+        data = block.ljust(214, b"\0") + self.samples
+        return struct.pack(">HHHBBH", 0, 0, 4 + len(data), 0, 0x66, len(data)) + data
+
+
 class Tools:
     """Listens for each tool on a port of its own and serves them all in one thread."""
 
-    def __init__(self, count):
-        self.tools = [Tool(serial) for serial in range(count)]
+    def __init__(self, count, kind=Tool):
+        self.tools = [kind(serial) for serial in range(count)]
         self.selector = selectors.DefaultSelector()
         self.ports = []
         for tool in self.tools:
@@ -277,6 +308,36 @@ def recorded(spindle, count, seconds=20):
     show("durable", times)
 
 
+def curves(spindle, count, seconds=20):
+    tools = Tools(count, CurveTool)
+    with tempfile.TemporaryDirectory() as folder:
+        store = os.path.join(folder, "events.db")
+        environment = dict(os.environ, SPINDLE_PROFILE_PATH=PROFILE)
+        process = subprocess.Popen([spindle, "record", *tools.urls(), "--profile", "doga-gen2", "--store", store],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
+        tools.settle()
+        settled = time.monotonic() + 2  # the settings of all presets are read at first
+        tools.serve_until(lambda: time.monotonic() > settled)
+        used, began = processor_seconds(process.pid), time.monotonic()
+        sent = 0
+        while (elapsed := time.monotonic() - began) < seconds:
+            while sent < elapsed * count:
+                tool = tools.tools[sent % count]
+                tool.client.sendall(tool.happen())
+                sent += 1
+            tools.serve(min(0.01, 1 / count))
+        used = processor_seconds(process.pid) - used
+        settled = time.monotonic() + 2
+        tools.serve_until(lambda: time.monotonic() > settled)
+        peak = memory_mib(process.pid)
+        process.terminate()
+        tools.serve_until(lambda: process.poll() is not None)
+        reader = sqlite3.connect(f"file:{store}?mode=ro", uri=True)
+        stored = reader.execute("SELECT count(*), sum(length(samples)) FROM curve").fetchone()
+    print(f"{count:4} tools: {100 * used / seconds:5.1f} % of a core, {peak:6.1f} MiB; "
+          f"{stored[0]} of {sent} curves stored, {stored[1] or 0} bytes of samples; status {process.returncode}")
+
+
 def burst(spindle, events=10_000):
     tools = Tools(1)
     tool = tools.tools[0]
@@ -355,6 +416,9 @@ def main():
     elif what == "record":
         for count in numbers or (50, 500):
             recorded(spindle, count)
+    elif what == "curves":
+        for count in numbers or (50,):
+            curves(spindle, count)
     elif what == "burst":
         burst(spindle, *numbers)
     else:

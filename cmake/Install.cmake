@@ -28,6 +28,7 @@ install(FILES completions/spindle.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish
 install(FILES packaging/copyright DESTINATION ${doc_folder})
 install(FILES packaging/copyright DESTINATION ${doc_folder}-gateway COMPONENT gateway)
 install(DIRECTORY man/examples DESTINATION ${doc_folder})
+install(FILES docs/promises.md DESTINATION ${doc_folder})
 install(FILES packaging/lintian-overrides
   DESTINATION ${CMAKE_INSTALL_DATADIR}/lintian/overrides RENAME spindle)
 install(FILES packaging/lintian-overrides-gateway

@@ -3,6 +3,7 @@
 #include "spindle/cli/run.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/posix/companion.hpp"
+#include "spindle/posix/datagrams.hpp"
 #include "spindle/posix/disk.hpp"
 #include "spindle/posix/doors.hpp"
 #include "spindle/posix/helper.hpp"
@@ -54,7 +55,8 @@ int run_program(int count, char** arguments, commands::Companions own) {
                    .make_doors = door_maker(clock, signals.interrupt()),
                    .shipped = shipped::profiles(),
                    .companions = with_programs(std::move(own), words),
-                   .supervision = supervision<commands::Supervision>(signals)};
+                   .supervision = supervision<commands::Supervision>(signals),
+                   .network = network(clock, signals.interrupt())};
   return cli::run(words, world);
 }
 

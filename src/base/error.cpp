@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "spindle/base/duration.hpp"
+#include "spindle/base/text.hpp"
 
 namespace spindle {
 namespace {
@@ -45,7 +47,7 @@ constexpr std::array errors = {
     ErrcInfo{Errc::bad_value, ExitStatus::usage, "the value does not fit its type", ""},
     ErrcInfo{Errc::out_of_range, ExitStatus::usage, "the value is outside the range", ""},
     ErrcInfo{Errc::read_only, ExitStatus::usage, "read-only, it cannot be written",
-             "'spindle list' shows what can be written"},
+             "'spindle list' shows what can be written", "spindle list TARGET"},
     ErrcInfo{Errc::not_confirmed, ExitStatus::usage, "not confirmed, nothing was changed",
              "answer 'y', or add --yes, when you are sure"},
     ErrcInfo{Errc::unverified, ExitStatus::usage,
@@ -65,7 +67,8 @@ constexpr std::array errors = {
     ErrcInfo{Errc::connect_timeout, ExitStatus::unreachable, "no connection within {waited}",
              "the tool may be asleep, switched off or out of Wi-Fi range"},
     ErrcInfo{Errc::port_missing, ExitStatus::unreachable, "there is no such serial port",
-             "is the adapter plugged in? 'ls /dev/serial/by-id' shows the ones that are"},
+             "is the adapter plugged in? 'ls /dev/serial/by-id' shows the ones that are",
+             "ls /dev/serial/by-id"},
     ErrcInfo{Errc::port_busy, ExitStatus::unreachable,
              "the serial port is in use by another program",
              "close the other program; 'fuser -v' and the port's path show which it is"},
@@ -148,7 +151,39 @@ std::string place_of(const Error& error) {
   return is_url ? error.endpoint : fmt::format("{} ({})", error.target, error.endpoint);
 }
 
+// Names and messages may quote foreign text; it must break neither the line nor the terminal.
+std::string on_one_line(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
+  return text;
+}
+
+// Whether `wrong` stands there alone, on one side of the first '=' or behind a ":"; then it is
+// replaced.
+bool replace_word(std::string& word, const Remedy& remedy) {
+  const auto& [wrong, right] = remedy;
+  const std::size_t equals = word.find('=');
+  if (word == wrong) {
+    word = right;
+  } else if (equals != std::string::npos && std::string_view(word).substr(0, equals) == wrong) {
+    word.replace(0, equals, right);
+  } else if (equals != std::string::npos && std::string_view(word).substr(equals + 1) == wrong) {
+    word.replace(equals + 1, std::string::npos, right);
+  } else if (word.ends_with(":" + wrong)) {  // sim:PROFILE
+    word.replace(word.size() - wrong.size(), wrong.size(), right);
+  } else {
+    return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+Remedy remedy_for(std::string_view word, const std::vector<std::string>& known,
+                  std::string command) {
+  if (auto meant = closest(word, known)) return {std::string(word), std::move(*meant)};
+  return {.right = std::move(command)};
+}
 
 std::span<const StatusInfo> status_table() { return statuses; }
 
@@ -169,19 +204,41 @@ std::string hint_of(const Error& error) {
   return error.hint.empty() ? std::string(info(error.code).hint) : error.hint;
 }
 
-std::string describe(const Error& error) {
+std::string cause_of(const Error& error) {
   std::string text;
   const std::string place = place_of(error);
   for (const std::string* part : {&place, &error.name}) {
     if (!part->empty()) text += *part + ": ";
   }
-  text += message_of(error);
+  return on_one_line(text + message_of(error));
+}
+
+std::string command_to_try(const Error& error, const std::vector<std::string>& typed) {
+  const Remedy& remedy = error.remedy;
+  constexpr std::string_view target = "TARGET";
+  const bool is_usual = remedy.right.empty() && error.hint.empty();
+  std::string command = is_usual ? std::string(info(error.code).command) : remedy.right;
+  if (command.empty()) return {};
+  if (remedy.wrong.empty()) {
+    if (command.find(target) == std::string::npos) return command;
+    const std::string& tool = error.target.empty() ? error.asked_of : error.target;
+    if (tool.empty()) return {};
+    replace(command, target, shell_word(tool));
+    return command;
+  }
+  command = "spindle";
+  bool is_replaced = false;
+  for (std::string word : typed) {
+    is_replaced = is_replaced || replace_word(word, remedy);
+    command += " " + shell_word(word);
+  }
+  return is_replaced ? command : std::string();
+}
+
+std::string describe(const Error& error) {
+  std::string text = cause_of(error);
   const std::string hint = hint_of(error);
-  if (!hint.empty()) text += "; " + hint;
-  // Names and messages may quote foreign text; it must break neither the line nor the terminal.
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }, ' ');
-  return text;
+  return hint.empty() ? text : on_one_line(text + "; " + hint);
 }
 
 }  // namespace spindle

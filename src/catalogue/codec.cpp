@@ -212,7 +212,25 @@ std::optional<Registers> text_registers(const Encoding& encoding, std::string_vi
   return words_of(encoding, bytes);
 }
 
+namespace {
+
+/// The year in a register of its own, the others in bytes behind it.
+std::optional<std::string> date_of_year_and_bytes(const Encoding& encoding,
+                                                  RegisterView registers) {
+  const Bytes bytes = bytes_of(encoding, registers.subspan(1));
+  DateParts parts = {registers.front()};
+  for (std::size_t i = 1; i < parts.size(); ++i) parts[i] = bytes[i - 1];
+  if (parts == DateParts()) return std::string();
+  if (parts[0] == 0 || !is_date(parts)) return std::nullopt;
+  return date_in_words(parts);
+}
+
+}  // namespace
+
 std::optional<std::string> date_of(const Encoding& encoding, RegisterView registers) {
+  if (encoding.date == DateLayout::year_and_bytes) {
+    return date_of_year_and_bytes(encoding, registers);
+  }
   if (std::all_of(registers.begin(), registers.end(), [](auto word) { return word == 0; })) {
     return std::string();
   }
@@ -239,10 +257,19 @@ std::optional<Registers> date_registers(const Encoding& encoding, std::string_vi
     if (count < 0 || count > std::numeric_limits<std::uint32_t>::max()) return std::nullopt;
     return to_registers(encoding, static_cast<std::uint64_t>(count));
   }
-  const bool is_long = encoding.date == DateLayout::long_year;
+  const bool is_mixed = encoding.date == DateLayout::year_and_bytes;
+  const bool is_long = is_mixed || encoding.date == DateLayout::long_year;
   const bool has_century = year >= century && year < century + years_in_century;
   if (!has_century && !is_long) return std::nullopt;
   const unsigned short_year = is_long ? year : year - century;
+  if (is_mixed) {
+    Registers mixed =
+        words_of(encoding, {static_cast<std::uint8_t>(month), static_cast<std::uint8_t>(day),
+                            static_cast<std::uint8_t>(hour), static_cast<std::uint8_t>(minute),
+                            static_cast<std::uint8_t>(second), 0});
+    mixed.insert(mixed.begin(), static_cast<std::uint16_t>(year));
+    return mixed;
+  }
   if (encoding.date != DateLayout::bytes) {
     return Registers{static_cast<std::uint16_t>(short_year), static_cast<std::uint16_t>(month),
                      static_cast<std::uint16_t>(day),        static_cast<std::uint16_t>(hour),

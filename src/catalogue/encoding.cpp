@@ -26,6 +26,8 @@ std::uint16_t registers_of_date(DateLayout layout) {
       return 6;
     case DateLayout::bytes:
       return 3;
+    case DateLayout::year_and_bytes:
+      return 4;
     case DateLayout::unix_time:
       break;
   }

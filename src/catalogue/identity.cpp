@@ -77,13 +77,19 @@ void read_serial(const IdentitySpec& facts, ByteView answer, Identity& identity)
 
 void read_model(const IdentitySpec& facts, ByteView answer, Identity& identity) {
   identity.tool_model_code = number_at(answer, facts.tool_model);
-  if (!identity.tool_model_code) return;
+  if (!identity.tool_model_code || facts.models.empty()) return;
   if (const Text* name = facts.models.find(*identity.tool_model_code)) {
     identity.tool_model = *name;
   } else {
     identity.notes.push_back(
         fmt::format("tool model code {} is not known", *identity.tool_model_code));
   }
+}
+
+/// By its model code where the profile has a table of them, else by its product code.
+bool is_product_known(const IdentitySpec& facts, const Identity& identity) {
+  if (facts.models.empty()) return !identity.product_profile.empty();
+  return identity.tool_model_code && facts.models.contains(*identity.tool_model_code);
 }
 
 }  // namespace
@@ -116,10 +122,18 @@ Generation generation_of(const IdentitySpec& facts, const Identity& identity) {
   const unsigned firmware = identity.firmware.value_or(0);
   if (firmware == 0) return Generation::unknown;
   if (facts.firmware_below != 0 && firmware >= facts.firmware_below) return Generation::later;
-  if (!identity.tool_model_code || !facts.models.contains(*identity.tool_model_code)) {
-    return Generation::unknown;
+  if (!is_product_known(facts, identity)) return Generation::unknown;
+  return firmware < facts.firmware_from ? Generation::earlier : Generation::known;
+}
+
+std::string caution_of(const IdentitySpec& facts, const Identity& identity) {
+  for (const FirmwareCaution& caution : facts.cautions) {
+    if (identity.firmware && *identity.firmware >= caution.from &&
+        *identity.firmware <= caution.to) {
+      return caution.text.to_string();
+    }
   }
-  return Generation::known;
+  return {};
 }
 
 }  // namespace spindle::catalogue

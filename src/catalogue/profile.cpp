@@ -62,6 +62,12 @@ std::optional<Parameter> find_numbered(const NumberedSpec& facts, std::string_vi
   return make_numbered(facts, static_cast<std::uint16_t>(*number));
 }
 
+/// The names that are near, or all of them.
+Remedy remedy_for_name(const Profile& profile, std::string_view name) {
+  if (all_digits(name)) return {std::string(name), fmt::format("@holding:{}", name)};
+  return remedy_for(name, names_of(profile.parameters), "spindle list TARGET");
+}
+
 /// "p900" deserves the numbers that exist rather than a similar name.
 std::string hint_for(const Profile& profile, std::string_view name) {
   if (profile.numbered && name.starts_with(profile.numbered->prefix) &&
@@ -94,7 +100,7 @@ Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
     raw->encoding.word_order = profile.link.word_order;
   }
   if (raw) raw->encoding.byte_order = profile.link.byte_order;
-  if (raw) raw = profile.with_secrecy(*std::move(raw));
+  if (raw) raw = profile.marked(*std::move(raw));
   if (raw && modbus::is_writable(raw->table) && every_register_writable(profile, *raw)) {
     raw->access = Access::read_write;
   }
@@ -104,7 +110,7 @@ Result<Parameter> find_raw(const Profile& profile, Result<Parameter> raw) {
 std::vector<Parameter> match_named(const Profile& profile, std::string_view pattern) {
   std::vector<Parameter> found;
   for (const Parameter& parameter : profile.parameters) {
-    if (glob_match(pattern, parameter.name)) found.push_back(profile.with_secrecy(parameter));
+    if (glob_match(pattern, parameter.name)) found.push_back(profile.marked(parameter));
   }
   return found;
 }
@@ -115,7 +121,7 @@ std::vector<Parameter> match_numbered(const Profile& profile, std::string_view p
   for (unsigned number = facts.from; number <= facts.to; ++number) {
     Parameter parameter = make_numbered(facts, static_cast<std::uint16_t>(number));
     if (!glob_match(pattern, parameter.name)) continue;
-    found.push_back(profile.with_secrecy(std::move(parameter)));
+    found.push_back(profile.marked(std::move(parameter)));
   }
   return found;
 }
@@ -197,22 +203,26 @@ enum class Purpose : std::uint8_t { reading, description };
 Result<Parameter> find_any(const Profile& profile, std::string_view name) {
   if (auto raw = parse_raw_register(name)) return find_raw(profile, std::move(*raw));
   for (const Parameter& parameter : profile.parameters) {
-    if (parameter.name == name) return profile.with_secrecy(parameter);
+    if (parameter.name == name) return profile.marked(parameter);
   }
   if (profile.numbered) {
     auto found = find_numbered(*profile.numbered, name);
-    if (found) return profile.with_secrecy(*std::move(found));
+    if (found) return profile.marked(*std::move(found));
   }
   if (auto bit = find_bit(profile, name)) {
-    return std::move(*bit).map(
-        [&](Parameter part) { return profile.with_secrecy(std::move(part)); });
+    return std::move(*bit).map([&](Parameter part) { return profile.marked(std::move(part)); });
   }
-  return tl::unexpected(unknown(name, fmt::format("no such parameter in profile {}", profile.id),
-                                hint_for(profile, name)));
+  Error error = unknown(name, fmt::format("no such parameter in profile {}", profile.id),
+                        hint_for(profile, name));
+  error.remedy = remedy_for_name(profile, name);
+  return tl::unexpected(std::move(error));
 }
 
-void leave_out_consumed(const Profile& profile, std::vector<Parameter>& parameters) {
-  std::erase_if(parameters, [&](const Parameter& one) { return profile.consumes(one); });
+void leave_out_unreadable(const Profile& profile, std::vector<Parameter>& parameters) {
+  std::erase_if(parameters, [&](const Parameter& one) {
+    const bool is_of_events = profile.events && profile.events->form_of(one) != nullptr;
+    return is_of_events || profile.consumes(one);
+  });
 }
 
 Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view name,
@@ -231,10 +241,11 @@ Result<std::vector<Parameter>> expand(const Profile& profile, std::string_view n
   }
   auto found = match_named(profile, name);
   if (found.empty() && profile.numbered) found = match_numbered(profile, name);
-  if (purpose == Purpose::reading) leave_out_consumed(profile, found);
+  if (purpose == Purpose::reading) leave_out_unreadable(profile, found);
   if (found.empty()) {
-    return tl::unexpected(
-        unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {}));
+    Error error = unknown(name, fmt::format("matches no parameter of profile {}", profile.id), {});
+    error.remedy.right = "spindle list TARGET";
+    return tl::unexpected(std::move(error));
   }
   return found;
 }
@@ -244,7 +255,7 @@ Result<std::vector<Parameter>> select_for(const Profile& profile,
   std::vector<Parameter> selected;
   if (names.empty()) {
     selected.assign(profile.parameters.begin(), profile.parameters.end());
-    if (purpose == Purpose::reading) leave_out_consumed(profile, selected);
+    if (purpose == Purpose::reading) leave_out_unreadable(profile, selected);
   }
   std::unordered_set<std::string> seen;
   for (const std::string& name : names) {
@@ -300,6 +311,31 @@ Result<Parameter> parse_raw(std::string_view text) {
                    .note = {}};
 }
 
+/// Whether a writable parameter, an action, or the arming of events has this register.
+bool is_listed(const Profile& profile, RegisterTable table, RegisterAddress address) {
+  const auto holds = [&](RegisterTable at, unsigned first, unsigned count) {
+    return at == table && address.value >= first && address.value < first + count;
+  };
+  const bool arms = profile.events && profile.events->arm &&
+                    holds(RegisterTable::holding, profile.events->arm->address, 1);
+  const auto acts = [&](const Action& action) {
+    const bool prepares =
+        action.prepare && holds(RegisterTable::holding, action.prepare->address.value, 1);
+    return prepares || holds(action.table, action.address.value, register_count(action.encoding));
+  };
+  const auto takes = [&](const Parameter& parameter) {
+    return parameter.access == Access::read_write &&
+           holds(parameter.table, parameter.written_at().value, register_count(parameter.encoding));
+  };
+  const auto& numbered = profile.numbered;
+  const bool has_number = numbered && numbered->table == table &&
+                          numbered->access == Access::read_write &&
+                          address.value >= numbered->from && address.value <= numbered->to;
+  return arms || has_number ||
+         std::any_of(profile.parameters.begin(), profile.parameters.end(), takes) ||
+         std::any_of(profile.actions.begin(), profile.actions.end(), acts);
+}
+
 }  // namespace
 
 std::optional<Duration> SerialSpec::gap_at(unsigned baud) const {
@@ -323,6 +359,29 @@ modbus::RegisterTable table_of(const EventSpec& events) {
   return events.function == input ? modbus::RegisterTable::input : modbus::RegisterTable::holding;
 }
 
+bool EventSpec::has_form(std::size_t registers) const {
+  return registers == count || std::any_of(longer.begin(), longer.end(), [&](const auto& form) {
+           return form.count == registers;
+         });
+}
+
+std::uint16_t EventSpec::count_for(unsigned firmware) const {
+  std::uint16_t most = count;
+  for (const EventForm& form : longer) {
+    if (form.firmware_from != 0 && firmware >= form.firmware_from)
+      most = std::max(most, form.count);
+  }
+  return most;
+}
+
+const EventForm* EventSpec::form_of(const Parameter& parameter) const {
+  if (parameter.table != table_of(*this)) return nullptr;
+  const auto* const form = std::find_if(longer.begin(), longer.end(), [&](const auto& each) {
+    return glob_match(each.parameters, parameter.name);
+  });
+  return form == longer.end() ? nullptr : &*form;
+}
+
 bool ExtendedErrorSpec::is_busy(std::int64_t code) const {
   return std::find(busy.begin(), busy.end(), code) != busy.end();
 }
@@ -334,6 +393,13 @@ Result<Parameter> Profile::find(std::string_view name) const {
 }
 
 Result<void> Profile::may_read(const Parameter& parameter) const {
+  if (events && events->form_of(parameter) != nullptr) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "where it stands differs from tool to tool, and only an event tells",
+              .hint = "'spindle watch' shows it with the event",
+              .name = parameter.name});
+  }
   for (const Parameter& named : parameters) {
     if (named.reading != Reading::consumes || !share_registers(named, parameter)) continue;
     if (events && events->flag == named.name) {
@@ -367,16 +433,40 @@ bool Profile::consumes(const Parameter& parameter) const {
 }
 
 Parameter Profile::numbered_parameter(std::uint16_t number) const {
-  return with_secrecy(make_numbered(*numbered, number));
+  return marked(make_numbered(*numbered, number));
 }
 
-Parameter Profile::with_secrecy(Parameter parameter) const {
-  const bool holds_secret =
-      std::any_of(parameters.begin(), parameters.end(), [&](const Parameter& named) {
-        return named.secrecy == Secrecy::secret && share_registers(named, parameter);
-      });
-  if (holds_secret) parameter.secrecy = Secrecy::secret;
+Parameter Profile::marked(Parameter parameter) const {
+  for (const Parameter& named : parameters) {
+    const bool is_mark = named.secrecy == Secrecy::secret || named.guarding == Guarding::alone;
+    if (!is_mark || !share_registers(named, parameter)) continue;
+    if (named.secrecy == Secrecy::secret) parameter.secrecy = Secrecy::secret;
+    if (named.guarding == Guarding::alone) parameter.guarding = Guarding::alone;
+  }
   return parameter;
+}
+
+bool Profile::has_guarded() const {
+  return std::any_of(parameters.begin(), parameters.end(), [](const Parameter& parameter) {
+    return parameter.guarding == Guarding::alone;
+  });
+}
+
+Result<void> Profile::may_write(RegisterTable table, RegisterAddress first,
+                                std::size_t count) const {
+  if (writes == Writes::any) return {};
+  for (std::size_t i = 0; i < count; ++i) {
+    const RegisterAddress address{static_cast<std::uint16_t>(first.value + i)};
+    if (is_listed(*this, table, address)) continue;
+    return tl::unexpected(
+        Error{.code = Errc::read_only,
+              .message = fmt::format("profile {} allows no write to {} {}: no public "
+                                     "documentation says what it does",
+                                     id, to_text(table), address.value),
+              .hint = "'spindle list' and 'spindle do' show what can be written",
+              .register_address = address.value});
+  }
+  return {};
 }
 
 Result<Action> Profile::find_action(std::string_view name) const {
@@ -385,8 +475,9 @@ Result<Action> Profile::find_action(std::string_view name) const {
   }
   std::string hint = suggestion(name, names_of(actions));
   if (hint.empty()) hint = "'spindle do TARGET' lists the actions";
-  return tl::unexpected(
-      unknown(name, fmt::format("no such action in profile {}", id), std::move(hint)));
+  Error error = unknown(name, fmt::format("no such action in profile {}", id), std::move(hint));
+  error.remedy = remedy_for(name, names_of(actions), "spindle do TARGET");
+  return tl::unexpected(std::move(error));
 }
 
 bool Profile::is_guarded_start(std::string_view action) const {
@@ -436,6 +527,8 @@ Judgement judge(const Profile& profile, const Identity& identity) {
   switch (generation_of(*profile.identity, identity)) {
     case Generation::unknown:
       return Judgement::unknown;
+    case Generation::earlier:
+      return Judgement::earlier;
     case Generation::later:
       return Judgement::later;
     case Generation::known:
@@ -458,6 +551,10 @@ std::string misfit(const Profile& profile, const Identity& identity) {
       return fmt::format("firmware {} has another register map than {} (below {})",
                          identity.firmware.value_or(0), profile.id,
                          profile.identity->firmware_below);
+    case Judgement::earlier:
+      return fmt::format("firmware {} has another register map than {} (from {})",
+                         identity.firmware.value_or(0), profile.id,
+                         profile.identity->firmware_from);
     case Judgement::other_product:
       return fmt::format("the serial number is that of a {}, not of a {}", identity.product_profile,
                          profile.id);

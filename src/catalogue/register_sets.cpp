@@ -33,7 +33,9 @@ Addresses secret_registers(const Profile& profile, modbus::RegisterTable table) 
 }
 
 Addresses known_registers(const Profile& profile, modbus::RegisterTable table) {
-  Addresses addresses = registers_of(profile, table, [](const Parameter&) { return true; });
+  Addresses addresses = registers_of(profile, table, [&](const Parameter& parameter) {
+    return !profile.events || profile.events->form_of(parameter) == nullptr;
+  });
   if (profile.numbered && profile.numbered->table == table) {
     add(addresses, profile.numbered->from, std::uint32_t{profile.numbered->to} + 1);
   }

@@ -74,7 +74,7 @@ std::vector<Parameter> numbered_space(const Profile& profile) {
   std::vector<Parameter> space;
   for (const Parameter& parameter : profile.parameters) {
     const bool stored = is_numbered(parameter, facts) || parameter.access == Access::read_write;
-    if (stored && claims.take(parameter)) space.push_back(profile.with_secrecy(parameter));
+    if (stored && claims.take(parameter)) space.push_back(profile.marked(parameter));
   }
   for (unsigned number = facts.from; number <= facts.to; ++number) {
     Parameter parameter = profile.numbered_parameter(static_cast<std::uint16_t>(number));
@@ -266,7 +266,7 @@ Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& prese
   return check_own_limits(parameter, number, present.minimum, present.maximum, profile);
 }
 
-/// As the profile says what has to be written before what.
+/// As the profile says what has to be written before what; what is guarded before all others.
 std::vector<PlannedWrite> in_order(std::vector<PlannedWrite> writes) {
   std::vector<Parameter> parameters;
   for (const PlannedWrite& write : writes) {
@@ -277,6 +277,9 @@ std::vector<PlannedWrite> in_order(std::vector<PlannedWrite> writes) {
   for (const std::size_t index : write_order(parameters)) {
     ordered.push_back(std::move(writes[index]));
   }
+  std::stable_partition(ordered.begin(), ordered.end(), [](const PlannedWrite& write) {
+    return write.parameter.guarding == Guarding::alone;
+  });
   return ordered;
 }
 
@@ -453,7 +456,7 @@ std::vector<Parameter> stored_parameters(const Profile& profile) {
   for (const Parameter& parameter : profile.parameters) {
     const bool is_setting = modbus::is_writable(parameter.table) &&
                             parameter.access == Access::read_write && !dangers.find(parameter);
-    if (is_setting && claims.take(parameter)) stored.push_back(profile.with_secrecy(parameter));
+    if (is_setting && claims.take(parameter)) stored.push_back(profile.marked(parameter));
   }
   return stored;
 }

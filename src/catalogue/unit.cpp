@@ -313,4 +313,9 @@ Result<Converted> convert_typed(std::string_view text, std::string_view unit) {
   return Converted{result, fmt::format("{} {} is {} {}", typed->digits, typed->unit, result, unit)};
 }
 
+bool is_torque(std::string_view unit) {
+  const auto known = find(unit);
+  return known && known->quantity == torque;
+}
+
 }  // namespace spindle::catalogue

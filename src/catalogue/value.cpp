@@ -64,9 +64,11 @@ std::string with_suggestion(std::string hint, const std::string& suggested) {
 Error not_a_label(const Parameter& parameter, std::string_view text) {
   std::vector<std::string> names;
   for (const Label& label : parameter.labels) names.push_back(label.text);
-  return fault(
+  Error error = fault(
       Errc::bad_value, parameter, fmt::format("'{}' is none of its labels", text),
       with_suggestion(fmt::format("it has {}", list_labels(parameter)), suggestion(text, names)));
+  error.remedy = remedy_for(text, names);
+  return error;
 }
 
 /// For a user who typed a word, or a comma where a point is meant.
@@ -640,6 +642,10 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   }
   value->typed = typed;
   return value;
+}
+
+std::string shown_of(const Parameter& parameter, const Value& value) {
+  return parameter.secrecy == Secrecy::secret ? "(secret)" : value.to_string();
 }
 
 Result<Value> parse_exact_value(const Parameter& parameter, std::string_view text) {

@@ -13,6 +13,12 @@ Error usage(std::string message, std::string hint) {
   return {.code = Errc::usage, .message = std::move(message), .hint = std::move(hint)};
 }
 
+Error for_help(std::string_view path, Error error) {
+  error.remedy.right = fmt::format("spindle {} --help", path);
+  error.hint = fmt::format("'{}' shows examples", error.remedy.right);
+  return error;
+}
+
 Error bad_option(std::string_view option, std::string message, std::string hint) {
   Error error = usage(std::move(message), std::move(hint));
   error.code = Errc::bad_value;
@@ -35,6 +41,19 @@ Result<Duration> to_duration(std::string_view option, const std::string& text) {
   const std::string_view why = duration ? "is too short" : "is not a duration";
   return tl::unexpected(
       bad_option(option, fmt::format("'{}' {}", text, why), "write it like 500ms, 2.5s or 5min"));
+}
+
+Result<std::vector<std::string>> to_columns(std::string_view option, const std::string& text) {
+  std::vector<std::string> columns;
+  for (const std::string_view word : split(text, ',')) {
+    if (word.empty()) {
+      return tl::unexpected(bad_option(option,
+                                       fmt::format("'{}' has a column without a name", text),
+                                       "write it like name,value,unit"));
+    }
+    columns.emplace_back(word);
+  }
+  return columns;
 }
 
 Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text) {
@@ -76,7 +95,9 @@ Error unknown_choice(std::string_view option, const std::string& text,
                      const std::vector<std::string>& words) {
   std::string hint = fmt::format("it takes {}", fmt::join(words, ", "));
   if (const std::string meant = suggestion(text, words); !meant.empty()) hint += "; " + meant;
-  return bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint));
+  Error error = bad_option(option, fmt::format("'{}' is unknown", text), std::move(hint));
+  error.remedy = remedy_for(text, words);
+  return error;
 }
 
 std::optional<Error> Faults::first() const {
@@ -91,8 +112,7 @@ std::optional<Error> Faults::first() const {
 }
 
 Error Binder::missing(std::string_view path, std::string_view argument) {
-  return usage(fmt::format("{}: {} is missing", path, argument),
-               fmt::format("'spindle {} --help' shows examples", path));
+  return for_help(path, usage(fmt::format("{}: {} is missing", path, argument)));
 }
 
 }  // namespace spindle::cli

@@ -19,6 +19,8 @@ namespace spindle::cli {
 
 /// The error of a command line that cannot be understood.
 Error usage(std::string message, std::string hint = {});
+/// The same with the advice to read the help of the command.
+Error for_help(std::string_view path, Error error);
 /// The error of an option whose value is not what it takes.
 Error bad_option(std::string_view option, std::string message, std::string hint);
 
@@ -36,6 +38,9 @@ Result<Duration> to_duration(std::string_view option, const std::string& text);
 
 /// "1-3,7": units of a serial line, each once, in the order given.
 Result<std::vector<modbus::UnitId>> to_units(std::string_view option, const std::string& text);
+
+/// "name,value,unit": words between commas.
+Result<std::vector<std::string>> to_columns(std::string_view option, const std::string& text);
 
 /// "0..999", "0x0..0x3E7" or one register; both ends count.
 struct RegisterBounds {

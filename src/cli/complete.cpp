@@ -274,8 +274,9 @@ class Completer {
     if (is_side) add("defaults", "what the profile says");
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
     if (slot.name == "PROFILE") offer_profiles();
+    if (typed_.command->name == "tools add") return;  // a name that is not there yet
     if (slot.name == "PATTERN" || slot.name.starts_with("NAME") ||
-        slot.name.starts_with("ACTION")) {
+        slot.name.starts_with("ACTION") || slot.name == "WHAT") {
       offer_of_profile(slot, word);
     }
   }
@@ -289,12 +290,15 @@ class Completer {
     const auto profile = profile_of_target();
     if (!profile) return;
     if (slot.name.starts_with("ACTION")) return offer_actions(*profile, word);
+    if (slot.name == "WHAT") return offer_learned(*profile);
     if (slot.name == "NAME=VALUE") return offer_assignments(*profile, word);
     offer_names(names_of(*profile), word);
   }
 
   void offer_tools(const std::string& word) {
-    for (const files::Tool& tool : nameable_->tools.tools) add(tool.name, tool.url);
+    for (const files::Tool& tool : nameable_->tools.tools) {
+      if (!nameable_->tools.faults.contains(tool.name)) add(tool.name, tool.url);
+    }
     if (!word.starts_with("sim:")) return add("sim:", "a simulated tool");
     for (const Candidate& profile : profiles()) add("sim:" + profile.text, "a simulated tool");
   }
@@ -305,6 +309,7 @@ class Completer {
   void offer_groups(Groups taken) {
     for (const auto& [group, members] : nameable_->tools.groups) {
       if (taken == Groups::of_one && members.size() > 1) continue;
+      if (nameable_->tools.faults.contains("@" + group)) continue;
       add("@" + group, counted(members.size(), "tool"));
     }
   }
@@ -328,6 +333,10 @@ class Completer {
 
   void offer_actions(const Profile& profile, const std::string& word) {
     const std::size_t equals = word.find('=');
+    const auto& events = profile.events;
+    if (events && events->search) {
+      add(events->search->name.to_string(), events->search->title.to_string());
+    }
     for (const catalogue::Action& action : profile.actions) {
       const bool takes_value = !action.value;
       if (equals == std::string::npos) {
@@ -335,6 +344,14 @@ class Completer {
       } else if (action.name == word.substr(0, equals)) {
         offer_labels(action.labels, word.substr(0, equals + 1));
       }
+    }
+  }
+
+  /// What a tool of this profile can show itself.
+  void offer_learned(const Profile& profile) {
+    if (!profile.learn) return;
+    for (const catalogue::LearnedAction& action : profile.learn->actions) {
+      add(action.name.to_string(), action.title.to_string());
     }
   }
 
@@ -409,7 +426,11 @@ class Completer {
                                    [&](const files::Tool& one) { return one.name == name; });
     if (tool != tools.end() && !tool->profile.empty()) return tool->profile;
     const auto endpoint = link::parse_endpoint(tool == tools.end() ? name : tool->url);
-    return endpoint ? endpoint->profile : std::string();
+    if (!endpoint || !endpoint->profile.empty() || nameable_->memory == nullptr) {
+      return endpoint ? endpoint->profile : std::string();
+    }
+    const auto seen = nameable_->memory->recall(*endpoint);
+    return seen && *seen ? (*seen)->profile : std::string();
   }
 
   /// By --profile, else that of the first tool which has one.

@@ -7,6 +7,7 @@
 #include "description.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/work/tool_memory.hpp"
 
 namespace spindle::cli {
 
@@ -28,6 +29,7 @@ struct Completion {
 struct CompletionSources {
   const files::Tools& tools;
   const files::ProfileStore& profiles;
+  const work::ToolMemory* memory = nullptr;  ///< may be null
 };
 
 /// What the last of the words, which is still being typed, can become. The program's name is left

@@ -12,6 +12,8 @@
 #include "binder.hpp"
 #include "help.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/commands/naming.hpp"
+#include "spindle/link/endpoint.hpp"
 #include "spindle/sim/fault_plan.hpp"
 #include "spindle/work/connect.hpp"
 #include "version.hpp"
@@ -38,9 +40,11 @@ struct Words {
 /// is named, because most of a short run would else be the others'.
 enum class Extent : std::uint8_t { whole, as_named };
 
-struct WatchArguments {
-  commands::WatchOptions options;
-  std::vector<std::string> arguments;  ///< TARGET... [NAME|PATTERN...]
+/// The options of a command with its words, before it is known which of them are tools.
+template <typename Options>
+struct Worded {
+  Options options = {};
+  commands::TypedWords typed = {};
 };
 
 /// Registers as they are typed, before it is known whether all of it goes together.
@@ -59,6 +63,7 @@ struct DumpArguments {
   commands::DumpOptions options;
   RegisterArguments registers;
 };
+using WordedDump = Worded<DumpArguments>;
 
 struct ScanArguments {
   commands::ScanOptions options;
@@ -67,30 +72,44 @@ struct ScanArguments {
   bool has_pause = false;
 };
 
+struct DiscoverArguments {
+  commands::DiscoverOptions options;
+  std::vector<std::string> of_groups = {};   ///< options that were given and go without a subnet
+  std::vector<std::string> of_subnets = {};  ///< the same of those that go with one
+};
+
 /// The options of every command, where the parser writes them.
 struct AllOptions {
-  commands::IdentifyOptions identify;
+  Worded<commands::IdentifyOptions> identify;
   commands::ListOptions list;
-  commands::GetOptions get;
-  commands::SetOptions set;
-  commands::DoOptions perform;
-  commands::PingOptions ping;
+  Worded<commands::GetOptions> get;
+  Worded<commands::SetOptions> set;
+  Worded<commands::DoOptions> perform;
+  Worded<commands::PingOptions> ping;
   ScanArguments scan;
-  WatchArguments watch;
+  DiscoverArguments discover;
+  commands::LearnOptions learn;
+  Worded<commands::WatchOptions> watch;
   commands::RecordOptions record;
   commands::ForwardOptions forward;
   commands::ServeOptions serve;
   commands::ReportOptions report;
-  commands::RemoteStartOptions remote_start;
-  commands::RemoteStopOptions remote_stop;
-  commands::AlarmsOptions alarms;
-  commands::BackupOptions backup;
-  DumpArguments dump;
+  Worded<commands::RemoteStartOptions> remote_start;
+  Worded<commands::RemoteStopOptions> remote_stop;
+  Worded<commands::AlarmsOptions> alarms;
+  Worded<commands::BackupOptions> backup;
+  WordedDump dump;
   commands::DiffOptions diff;
-  commands::RestoreOptions restore;
+  Worded<commands::RestoreOptions> restore;
   commands::SimulateOptions simulate;
   bool check_tools = false;
+  commands::ToolAddOptions tools_add;
+  commands::ToolsInitOptions tools_init;
+  commands::ToolsTestOptions tools_test;
   commands::ResultsOptions results;
+  commands::LogOptions log;
+  commands::UndoOptions undo;
+  commands::UseOptions use;
   commands::StoreOptions store;
   commands::StoreOptions store_check;
   commands::TrimOptions store_trim;
@@ -103,6 +122,8 @@ struct AllOptions {
   commands::ProfileNameOptions profile_show;
   commands::ProfileNameOptions profile_check;
   commands::ProfileNewOptions profile_new;
+  std::vector<std::string> helped;  ///< words of the command that help is wanted of
+  std::vector<std::string> none;
 };
 
 /// The grammar while it is being parsed: the innermost command that was named.
@@ -120,10 +141,16 @@ struct ParseState {
   const CLI::App* chosen = nullptr;
   /// Instead of what the command's words say.
   std::optional<Invocation::ToolsFile> tools_file = std::nullopt;
+  std::vector<std::string> behind_dashes = {};  ///< words that name no tool
+  bool takes_behind = false;                    ///< the command takes them so
+  bool takes_default = false;                   ///< tools may be meant that no word names
   std::string only_as_text = {};  ///< why neither JSON nor CSV can be had; empty: they can
+  bool has_columns = false;       ///< whether the command shows a list and changes nothing
 };
 
 constexpr std::string_view end_of_options = "--";
+constexpr std::string_view help_command = "help";
+constexpr std::string_view version_command = "version";
 
 /// Of options that only some profiles declare: CLI11's groups say which.
 constexpr std::string_view declared_prefix = "of ";
@@ -140,7 +167,8 @@ void add_common_options(CLI::App& app, ParseState& draft) {
   work::CommonOptions& common = invocation.common;
   commands::UserOptions& user = invocation.user;
   bind.option("-o,--output", "FORMAT", invocation.format, one_of(format_words),
-              "table, json (JSON Lines) or csv");
+              "table, wide (all columns), value (only values), json (JSON Lines), yaml, csv; "
+              "results --curve also svg");
   bind.flag(
       "--json", [] {}, "the same as -o json");  // see with_one_output_option()
   bind.option("--profile", "NAME|FILE", common.profile, "what the tool's registers mean");
@@ -229,20 +257,127 @@ void add_command(CLI::App& parent, ParseState& draft, const Words& words, Option
 
 constexpr std::string_view target_words = "tool name, @group or URL";
 
+/// For lists of what changes nothing: a wrong column is told before it is too late.
+void bind_columns(Binder& bind, ParseState& draft) {
+  draft.has_columns = true;
+  bind.option("--columns", "LIST", draft.invocation.columns, to_columns,
+              "which columns, as in name,value,unit");
+}
+
+/// The words of a command, whichever they are.
+template <typename Options>
+void bind_words(Binder& bind, ParseState& draft, Worded<Options>& worded,
+                std::string_view meaning) {
+  draft.takes_default = true;
+  draft.takes_behind = true;
+  bind.argument("TARGET", worded.typed.words, meaning);
+  bind.check([&draft, &worded]() -> std::optional<Error> {
+    const auto& behind = draft.behind_dashes;
+    worded.typed.words.insert(worded.typed.words.end(), behind.begin(), behind.end());
+    worded.typed.behind_dashes = behind.size();
+    return std::nullopt;
+  });
+}
+
+// take() gives the options of a command what of its words is a tool, and what is not.
+
+Result<void> take(commands::SortedWords words, commands::GetOptions& options) {
+  options.targets = std::move(words.targets);
+  options.names = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::WatchOptions& options) {
+  options.targets = std::move(words.targets);
+  options.names = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::DoOptions& options) {
+  options.targets = std::move(words.targets);
+  options.actions = std::move(words.others);
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::SetOptions& options) {
+  options.targets = std::move(words.targets);
+  options.assignments = std::move(words.others);
+  const bool is_empty = options.assignments.empty() && options.file.empty();
+  return is_empty ? tl::unexpected(Binder::missing("set", "NAME=VALUE")) : Result<void>();
+}
+
+/// Beside --dir there is no FILE, and all words are names.
+Result<void> take(commands::SortedWords words, commands::RestoreOptions& options) {
+  options.targets = std::move(words.targets);
+  options.patterns = std::move(words.others);
+  if (!options.folder.empty()) return {};
+  if (options.patterns.empty()) return tl::unexpected(Binder::missing("restore", "FILE"));
+  options.file = std::move(options.patterns.front());
+  options.patterns.erase(options.patterns.begin());
+  return {};
+}
+
+Error one_too_many(std::string_view command, std::string_view word) {
+  return for_help(command, usage(fmt::format("{}: '{}' is one argument too many", command, word)));
+}
+
+Result<void> take(commands::SortedWords words, DumpArguments& dump) {
+  if (words.others.empty()) return tl::unexpected(Binder::missing("dump", "FILE"));
+  if (words.targets.size() > 1) return tl::unexpected(one_too_many("dump", words.targets[1]));
+  if (words.others.size() > 1) return tl::unexpected(one_too_many("dump", words.others[1]));
+  dump.options.target = std::move(words.targets.front());
+  dump.options.file = std::move(words.others.front());
+  return {};
+}
+
+Result<void> take(commands::SortedWords words, commands::RemoteStartOptions& options) {
+  if (words.targets.size() > 1) {
+    return tl::unexpected(one_too_many("remote-start", words.targets[1]));
+  }
+  options.target = std::move(words.targets.front());
+  return {};
+}
+
+/// Of commands whose words are all tools.
+template <typename Options>
+requires requires(Options options) { options.targets; }
+Result<void> take(commands::SortedWords words, Options& options) {
+  options.targets = std::move(words.targets);
+  return {};
+}
+
+/// Runs a command once its words are told apart.
+template <typename Options, typename RunCommand>
+auto with_words(std::string_view command, commands::OtherWords kind, RunCommand run) {
+  return [=](const Worded<Options>& worded, Context& context) -> Result<Outcome> {
+    TRY_LET(auto words, commands::sort_words(worded.typed, kind, command, context));
+    Options options = worded.options;
+    TRY(take(std::move(words), options));
+    return run(options, context).map_error([&](Error error) {
+      error = commands::or_misspelt_tool(std::move(error), context);
+      if (error.asked_of.empty()) error.asked_of = asked_of(options);
+      return error;
+    });
+  };
+}
+
 void bind_jobs(Binder& bind, std::size_t& jobs) {
   bind.option("--jobs", "N", jobs, NumberFrom{1, 10'000}, "how many tools at a time (default 64)");
 }
 
 void add_identify(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"identify", "TARGET...",
+  constexpr Words words = {"identify", "[TARGET...]",
                            "who is there: maker, model, serial, firmware, profile",
                            "spindle identify sim:doga-bm\n"
                            "spindle identify tcp://192.168.10.23:5000\n"
                            "spindle identify station3 station4 --json"};
-  add_command(app, draft, words, draft.options.identify, commands::identify,
-              [](Binder& bind, commands::IdentifyOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
-                bind_jobs(bind, options.jobs);
+  add_command(app, draft, words, draft.options.identify,
+              with_words<commands::IdentifyOptions>("identify", commands::OtherWords::none,
+                                                    commands::identify),
+              [&draft](Binder& bind, Worded<commands::IdentifyOptions>& worded) {
+                bind_words(bind, draft, worded, target_words);
+                bind_columns(bind, draft);
+                bind_jobs(bind, worded.options.jobs);
               });
 }
 
@@ -253,27 +388,33 @@ void add_list(CLI::App& app, ParseState& draft) {
                            "spindle list --profile doga-bm 'preset.1.*'\n"
                            "spindle list station3 '*torque*' --json"};
   add_command(app, draft, words, draft.options.list, commands::list,
-              [](Binder& bind, commands::ListOptions& options) {
+              [&draft](Binder& bind, commands::ListOptions& options) {
+                draft.takes_default = true;
                 bind.argument("PATTERN", options.arguments,
-                              "names or patterns; a tool name or URL may stand before them");
+                              "names or patterns; a tool, URL or profile may stand before them");
+                bind_columns(bind, draft);
               });
 }
 
 void add_get(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
-      "get", "TARGET [NAME|PATTERN...]",
-      "read parameters by name, pattern, number (p242) or raw register "
-      "(@holding:2, @holding:4/f32, @coil:5), counted from 0",
+      "get", "[TARGET...] [NAME|PATTERN...]",
+      "read parameters by name, pattern, number (p242) or raw register (@holding:2)",
       "spindle get sim:doga-bm 'preset.1.*torque*'\n"
       "spindle get station3 status.ready status.alarm\n"
       "spindle get @line1 'preset.1.*' --json\n"
       "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:0..31"};
-  add_command(app, draft, words, draft.options.get, commands::get,
-              [](Binder& bind, commands::GetOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.argument("NAME", options.names, "names, patterns, numbers, raw registers");
+  add_command(app, draft, words, draft.options.get,
+              with_words<commands::GetOptions>("get", commands::OtherWords::names, commands::get),
+              [&draft](Binder& bind, Worded<commands::GetOptions>& worded) {
+                commands::GetOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "tools, and names, patterns, numbers or raw registers");
+                bind_columns(bind, draft);
                 bind.flag("--limits", options.limits, device::Limits::read,
                           "also read the tool's own minimum and maximum");
+                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                          "show what the profile marks as secret");
                 bind_jobs(bind, options.jobs);
               });
 }
@@ -285,44 +426,49 @@ constexpr std::string_view broadcast_words =
     "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
 
 void add_set(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"set", "TARGET NAME=VALUE...",
+  constexpr Words words = {"set", "[TARGET...] NAME=VALUE...",
                            "check everything, show old and new, write only what differs, read back",
                            "spindle set sim:doga-bm preset.1.target-torque=2.80\n"
                            "spindle set station3 preset.1.mode=TC/AM preset.1.speed=900\n"
                            "spindle set station3 preset.2.target-torque=3.10 --dry-run\n"
                            "spindle set @line1 preset.1.target-torque=2.80\n"
                            "spindle set sim:orientalmotor-blv operation.2.speed=1200"};
-  add_command(app, draft, words, draft.options.set, commands::set,
-              [](Binder& bind, commands::SetOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.required("NAME=VALUE", options.assignments,
-                              "what to write; a number may have its unit behind it: 1.5kW");
-                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
-                          "check and show everything, write nothing");
-                bind.flag("--save", options.storing, commands::Storing::yes, save_words);
-                bind.flag("--raw", options.raw, commands::RawWrites::ask,
-                          "also registers such as @holding:4 that no profile says can be written");
-                bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
-                          broadcast_words);
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.set,
+      with_words<commands::SetOptions>("set", commands::OtherWords::assignments, commands::set),
+      [&draft](Binder& bind, Worded<commands::SetOptions>& worded) {
+        commands::SetOptions& options = worded.options;
+        bind_words(bind, draft, worded,
+                   "tools, and NAME=VALUE (also 1.5kW, +5%), NAME+=STEP, NAME-=STEP");
+        bind.option("-f,--file", "FILE", options.file,
+                    "lines of NAME=VALUE, # begins a comment; - is standard input");
+        bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                  "check and show everything, write nothing");
+        bind.flag("--save", options.storing, commands::Storing::yes, save_words);
+        bind.flag("--raw", options.raw, commands::RawWrites::ask,
+                  "also registers such as @holding:4 that no profile says can be written");
+        bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
+                  broadcast_words);
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 constexpr std::string_view accept_unverified_words =
     "send what may move or lock the tool although its register is not certain";
 
 void add_do(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"do", "TARGET [ACTION[=VALUE]...]",
+  constexpr Words words = {"do", "[TARGET...] [ACTION[=VALUE]...]",
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
                            "spindle do station3 alarm-reset\n"
                            "spindle do @line1 lock=unlocked"};
-  add_command(app, draft, words, draft.options.perform, commands::perform,
-              [](Binder& bind, commands::DoOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.argument("ACTION", options.actions,
-                              "actions, with =VALUE where they take one");
+  add_command(app, draft, words, draft.options.perform,
+              with_words<commands::DoOptions>("do", commands::OtherWords::names, commands::perform),
+              [&draft](Binder& bind, Worded<commands::DoOptions>& worded) {
+                commands::DoOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "tools, and actions, with =VALUE where they take one");
                 bind.flag("--accept-unverified", options.acceptance,
                           commands::Acceptance::unverified, accept_unverified_words);
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
@@ -332,15 +478,18 @@ void add_do(CLI::App& app, ParseState& draft) {
 }
 
 void add_ping(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"ping", "TARGET [-c N]",
+  constexpr Words words = {"ping", "[TARGET...] [-c N]",
                            "round-trip statistics without touching any value",
                            "spindle ping sim:doga-bm -c 3 --interval 100ms\n"
                            "spindle ping station3\n"
                            "spindle ping @line1 -c 1\n"
                            "spindle ping tcp://192.168.10.23:5000 -c 100 --json"};
-  add_command(app, draft, words, draft.options.ping, commands::ping,
-              [](Binder& bind, commands::PingOptions& options) {
-                bind.required("TARGET", options.target, target_words);
+  add_command(app, draft, words, draft.options.ping,
+              with_words<commands::PingOptions>("ping", commands::OtherWords::none, commands::ping),
+              [&draft](Binder& bind, Worded<commands::PingOptions>& worded) {
+                commands::PingOptions& options = worded.options;
+                bind_words(bind, draft, worded, target_words);
+                bind_columns(bind, draft);
                 bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000},
                             "how many requests (default 4)");
                 bind.option("--interval", "DURATION", options.interval, to_duration,
@@ -418,7 +567,134 @@ void add_scan(CLI::App& app, ParseState& draft) {
     options.registers = arguments.registers.span();
     return commands::scan(options, context);
   };
-  add_command(app, draft, words, draft.options.scan, run, bind_scan);
+  add_command(app, draft, words, draft.options.scan, run,
+              [&draft](Binder& bind, ScanArguments& arguments) {
+                bind_scan(bind, arguments);
+                bind_columns(bind, draft);
+              });
+}
+
+std::string discover_words() {
+  return "Without SUBNET, tools are asked as a group (UDP multicast), as the profiles say that "
+         "they\n"
+         "can be, and each that answers is told once. That works inside of one network only, and "
+         "not\n"
+         "where an access point keeps its clients apart. What a tool says of itself there is not\n"
+         "proven: 'spindle identify' asks it.\n"
+         "\n"
+         "With SUBNET, every address is tried, and what takes a connection is asked who it is "
+         "(FC 11h).\n"
+         "Nothing else is sent, and nothing is ever written. A tool that serves one client at a "
+         "time\n"
+         "is busy for that moment: do not sweep a line that is at work. At most a /16 is asked.\n"
+         "\n"
+         "--write adds what is new to the tools file, behind its last tool; it asks first, and\n"
+         "changes no entry that is there.\n";
+}
+
+/// Some options are about a group of tools, others about addresses that are tried.
+std::optional<Error> check_discover(const DiscoverArguments& arguments) {
+  const bool has_subnet = !arguments.options.subnet.empty();
+  const auto& misplaced = has_subnet ? arguments.of_groups : arguments.of_subnets;
+  if (misplaced.empty()) return std::nullopt;
+  if (has_subnet) {
+    return usage(fmt::format("{} goes without SUBNET", misplaced.front()), "leave one of them out");
+  }
+  return usage(fmt::format("{} goes with SUBNET", misplaced.front()),
+               "name the network of the tools, such as 192.168.10.0/24");
+}
+
+/// "5000,502": TCP ports, each once, in the order given.
+Result<std::vector<std::uint16_t>> to_ports(std::string_view option, const std::string& text) {
+  constexpr std::uint64_t last_port = 0xFFFF;
+  std::vector<std::uint16_t> ports;
+  for (const std::string_view each : split(text, ',')) {
+    const auto port = parse_unsigned(each, last_port);
+    if (!port || *port == 0) {
+      return tl::unexpected(bad_option(option, fmt::format("'{}' does not fit", text),
+                                       "it takes ports from 1 to 65535, such as 5000,502"));
+    }
+    const auto number = static_cast<std::uint16_t>(*port);
+    if (std::find(ports.begin(), ports.end(), number) == ports.end()) ports.push_back(number);
+  }
+  return ports;
+}
+
+void bind_discover(Binder& bind, DiscoverArguments& arguments) {
+  commands::DiscoverOptions& options = arguments.options;
+  const auto note_in = [](std::vector<std::string>& list, const char* name) {
+    return [&list, name](const std::string&) { list.emplace_back(name); };
+  };
+  bind.argument("SUBNET", options.subnet,
+                "network whose addresses are tried, such as 192.168.10.0/24");
+  bind.repeatable("--interface", "NAME|ADDRESS", options.interfaces,
+                  "where to ask, also several times (default: all that are up)")
+      ->each(note_in(arguments.of_groups, "--interface"));
+  bind.option("--for", "DURATION", options.duration, to_duration, "how long to listen (default 3s)")
+      ->each(note_in(arguments.of_groups, "--for"));
+  bind.option("--port", "LIST", options.ports, to_ports,
+              "with SUBNET: which ports to try (default 5000,502)")
+      ->each(note_in(arguments.of_subnets, "--port"));
+  bind.option("--units", "LIST", options.units, to_units,
+              "with SUBNET: which units to ask behind each, such as 1-5")
+      ->each(note_in(arguments.of_subnets, "--units"));
+  bind.option("--rate", "N", options.rate, NumberFrom{1, 10'000},
+              "with SUBNET: connections begun in a second, at most (default 50)")
+      ->each(note_in(arguments.of_subnets, "--rate"));
+  bind.flag("--write", options.write, commands::WriteTools::yes,
+            "add what is found to the tools file; asks");
+  bind.check([&arguments] { return check_discover(arguments); });
+}
+
+void add_discover(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"discover",
+                           "[SUBNET]",
+                           "find tools in the network",
+                           "spindle discover\n"
+                           "spindle discover --interface eth0 --for 10s --json\n"
+                           "spindle discover --write\n"
+                           "spindle discover 192.168.10.0/24\n"
+                           "spindle discover 192.168.10.31/32 --port 502 --units 1-5",
+                           discover_words,
+                           Invocation::ToolsFile::all_tools};
+  const auto run = [](const DiscoverArguments& arguments, Context& context) {
+    return commands::discover(arguments.options, context);
+  };
+  add_command(app, draft, words, draft.options.discover, run, bind_discover);
+}
+
+std::string learn_words() {
+  return "WHAT is an action whose register no source of the profile says: select-preset, lock or\n"
+         "alarm-reset of a tool with firmware 4000 and later. Registers that the profile names "
+         "for it\n"
+         "are read again and again while you do on the tool what is asked for, and those that do "
+         "not\n"
+         "follow are left out, until one is left. Nothing is written to the tool.\n"
+         "\n"
+         "With -f, a profile of your own is written that has the action, with evidence "
+         "'verified'. That\n"
+         "says that the register was seen to follow, not that a write to it acts: try it as its\n"
+         "'check' says.\n";
+}
+
+void add_learn(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"learn", "TARGET WHAT [-f FILE]",
+                           "find out on your own tool which register an action has",
+                           "spindle learn station3 select-preset\n"
+                           "spindle learn station3 lock -f ./my-bmt.yaml\n"
+                           "spindle learn station3 alarm-reset --changes 2",
+                           learn_words};
+  add_command(app, draft, words, draft.options.learn, commands::learn,
+              [](Binder& bind, commands::LearnOptions& options) {
+                bind.required("TARGET", options.target, "tool name or URL");
+                bind.required("WHAT", options.what, "the action to learn");
+                bind.option("-f,--file", "FILE", options.file,
+                            "profile to write; never one that is there");
+                bind.option("--changes", "N", options.changes, NumberFrom{2, 100},
+                            "how many changes on the tool have to be followed (default 3)");
+                bind.option("--idle-timeout", "DURATION", options.idle_timeout, to_duration,
+                            "give up when nothing changed for so long (default 2min)");
+              });
 }
 
 std::string trouble_words() {
@@ -441,20 +717,7 @@ void bind_gateway(Binder& bind, std::string& listen, link::Rights& rights,
             "let what other programs write through --listen pass");
 }
 
-/// The first argument is a target, and so is every one behind it that can be nothing else.
-Result<Outcome> run_watch(const WatchArguments& watch, Context& context) {
-  commands::WatchOptions options = watch.options;
-  for (const std::string& argument : watch.arguments) {
-    const bool is_target = options.targets.empty() ||
-                           (options.names.empty() && commands::is_target(argument, context));
-    (is_target ? options.targets : options.names).push_back(argument);
-  }
-  return commands::watch(options, context);
-}
-
-void bind_watch(Binder& bind, WatchArguments& watch) {
-  commands::WatchOptions& options = watch.options;
-  bind.required("TARGET", watch.arguments, "tools, then names or patterns of values to poll");
+void bind_watch(Binder& bind, commands::WatchOptions& options) {
   bind.option("--interval", "DURATION", options.interval, to_duration,
               "time between two polls (default 200ms)");
   // --all wins over --initial.
@@ -466,7 +729,7 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
     }
   };
   bind.flag("--initial", add_first, "also the first value of everything polled");
-  bind.option("--count", "N", options.count, NumberFrom{1, 1'000'000'000},
+  bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000},
               "end after so many events, changes and samples");
   bind.option("--duration", "DURATION", options.duration, to_duration, "end after this time");
   bind.option("--idle-timeout", "DURATION", options.idle_timeout, to_duration,
@@ -484,12 +747,19 @@ void bind_watch(Binder& bind, WatchArguments& watch) {
 }
 
 void add_watch(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"watch", "TARGET... [NAME|PATTERN...]",
+  constexpr Words words = {"watch", "[TARGET...] [NAME|PATTERN...]",
                            "events as they happen and changes of polled values, until stopped",
                            "spindle watch station3\n"
                            "spindle watch station3 station4 --json --count 100\n"
                            "spindle watch station3 status.ready status.alarm --interval 500ms"};
-  add_command(app, draft, words, draft.options.watch, run_watch, bind_watch);
+  add_command(
+      app, draft, words, draft.options.watch,
+      with_words<commands::WatchOptions>("watch", commands::OtherWords::names, commands::watch),
+      [&draft](Binder& bind, Worded<commands::WatchOptions>& worded) {
+        bind_words(bind, draft, worded, "tools, and names or patterns of values to poll");
+        bind_watch(bind, worded.options);
+        bind_columns(bind, draft);
+      });
 }
 
 std::string record_words() {
@@ -533,7 +803,7 @@ void bind_record(Binder& bind, commands::RecordOptions& options) {
   });
   bind.option("--interval", "DURATION", options.watch.interval, to_duration,
               "time between two polls (default 200ms)");
-  bind.option("--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
+  bind.option("-c,--count", "N", options.watch.count, NumberFrom{1, 1'000'000'000},
               "end after so many events and changes are stored");
   bind.option("--duration", "DURATION", options.watch.duration, to_duration, "end after this time");
   bind_gateway(bind, options.watch.gateway.listen, options.watch.gateway.rights,
@@ -578,7 +848,7 @@ void bind_forward(Binder& bind, commands::ForwardOptions& options) {
   bind.option("--from", "ID|TIME", options.from, "set the sink back, or ahead, to here first");
   bind.flag("--once", options.delivery, commands::Delivery::once,
             "end when the sink has all that is in the store now");
-  bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+  bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
             "show what would be sent; send nothing");
   bind.option("--window", "N", options.window, NumberFrom{1, 10'000},
               "send at most so many that are not acknowledged (default 100; MQTT)");
@@ -658,7 +928,7 @@ void bind_report_form(Binder& bind, commands::ReportOptions& options) {
   bind.option("--study", "STUDY", options.machine, one_of(study_words),
               "machine: also Cm and Cmk of the longest run of 50 or more without an interruption");
   bind.repeatable("--require", "INDEX=VALUE", options.required,
-                  "status 1 where a stratum has less, repeatable; see below");
+                  "status 1 where a stratum has less, repeatable");
   bind.flag("--require-low", options.required_of, commands::RequiredOf::lower_bound,
             "require it of the lower end of the 95 % interval");
 }
@@ -718,7 +988,6 @@ constexpr auto stop_modes = enum_table<catalogue::StopMode>(
     {{"decelerate", catalogue::StopMode::decelerate}, {"instant", catalogue::StopMode::instant}});
 
 void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
-  bind.required("TARGET", options.target, "tool name or URL");
   bind.option("--for", "DURATION", options.limit, to_duration, "stop after this time");
   bind.option("--preset", "N", options.preset, "select this preset first")->group(of_start_action);
   bind.option("--direction", "D", options.direction, "select this direction first")
@@ -747,19 +1016,24 @@ void bind_remote_start(Binder& bind, commands::RemoteStartOptions& options) {
 
 void add_remote_start(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
-      "remote-start", "TARGET [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
+      "remote-start", "[TARGET] [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
       "spindle remote-start station3 --preset 2\n"
       "spindle remote-start station3 --for 2s --yes --json\n"
       "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
       "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
-  add_command(app, draft, words, draft.options.remote_start, commands::remote_start,
-              bind_remote_start);
+  add_command(app, draft, words, draft.options.remote_start,
+              with_words<commands::RemoteStartOptions>("remote-start", commands::OtherWords::none,
+                                                       commands::remote_start),
+              [&draft](Binder& bind, Worded<commands::RemoteStartOptions>& worded) {
+                bind_words(bind, draft, worded, "tool name or URL");
+                bind_remote_start(bind, worded.options);
+              });
 }
 
 void add_remote_stop(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"remote-stop",
-                           "TARGET...",
+                           "[TARGET...]",
                            "stop now; never asks",
                            "spindle remote-stop station3\n"
                            "spindle remote-stop @line1\n"
@@ -767,9 +1041,12 @@ void add_remote_stop(CLI::App& app, ParseState& draft) {
                            "orientalmotor-blv --broadcast",
                            nullptr,
                            Invocation::ToolsFile::salvaged};
-  add_command(app, draft, words, draft.options.remote_stop, commands::remote_stop,
-              [](Binder& bind, commands::RemoteStopOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
+  add_command(app, draft, words, draft.options.remote_stop,
+              with_words<commands::RemoteStopOptions>("remote-stop", commands::OtherWords::none,
+                                                      commands::remote_stop),
+              [&draft](Binder& bind, Worded<commands::RemoteStopOptions>& worded) {
+                commands::RemoteStopOptions& options = worded.options;
+                bind_words(bind, draft, worded, target_words);
                 bind.option("--stop", "HOW", options.stop, one_of(stop_modes),
                             "how a motor stops: decelerate (default) or instant");
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
@@ -778,24 +1055,28 @@ void add_remote_stop(CLI::App& app, ParseState& draft) {
 }
 
 void add_alarms(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"alarms", "TARGET [--reset]",
+  constexpr Words words = {"alarms", "[TARGET...] [--reset]",
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
                            "spindle alarms @line1\n"
                            "spindle alarms station3 --reset"};
-  add_command(app, draft, words, draft.options.alarms, commands::alarms,
-              [](Binder& bind, commands::AlarmsOptions& options) {
-                bind.required("TARGET", options.target, target_words);
-                bind.flag("--reset", options.reset, commands::AlarmReset::yes,
-                          "also reset the present alarm");
-                bind.flag("--accept-unverified", options.acceptance,
-                          commands::Acceptance::unverified, accept_unverified_words);
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.alarms,
+      with_words<commands::AlarmsOptions>("alarms", commands::OtherWords::none, commands::alarms),
+      [&draft](Binder& bind, Worded<commands::AlarmsOptions>& worded) {
+        commands::AlarmsOptions& options = worded.options;
+        bind_words(bind, draft, worded, target_words);
+        bind_columns(bind, draft);
+        bind.flag("--reset", options.reset, commands::AlarmReset::yes,
+                  "also reset the present alarm");
+        bind.flag("--accept-unverified", options.acceptance, commands::Acceptance::unverified,
+                  accept_unverified_words);
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 void add_backup(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"backup", "TARGET... [-f FILE|-] [--dir FOLDER]",
+  constexpr Words words = {"backup", "[TARGET...] [-f FILE|-] [--dir FOLDER]",
                            "every stored parameter into a file that people can read and git can "
                            "compare",
                            "spindle backup station3\n"
@@ -804,21 +1085,23 @@ void add_backup(CLI::App& app, ParseState& draft) {
   const auto note_file = [&draft](const std::string& file) {
     if (file == "-") draft.only_as_text = "with -f - the backup itself is on standard output";
   };
-  add_command(app, draft, words, draft.options.backup, commands::backup,
-              [note_file](Binder& bind, commands::BackupOptions& options) {
-                bind.required("TARGET", options.targets, target_words);
-                bind.option("-f,--file", "FILE", options.file,
-                            "where to (default TARGET.yaml in the present folder); - is standard "
-                            "output")
-                    ->each(note_file);
-                bind.option("--dir", "FOLDER", options.folder,
-                            "one file TARGET.yaml a tool in this folder");
-                bind.flag("--force", options.overwrite, Overwrite::allow,
-                          "replace files that are there");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "also what the profile marks as secret");
-                bind_jobs(bind, options.jobs);
-              });
+  add_command(
+      app, draft, words, draft.options.backup,
+      with_words<commands::BackupOptions>("backup", commands::OtherWords::none, commands::backup),
+      [&draft, note_file](Binder& bind, Worded<commands::BackupOptions>& worded) {
+        commands::BackupOptions& options = worded.options;
+        bind_words(bind, draft, worded, target_words);
+        bind.option("-f,--file", "FILE", options.file,
+                    "where to (default TARGET.yaml in the present folder); - is standard "
+                    "output")
+            ->each(note_file);
+        bind.option("--dir", "FOLDER", options.folder,
+                    "one file TARGET.yaml a tool in this folder");
+        bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
+        bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                  "also what the profile marks as secret");
+        bind_jobs(bind, options.jobs);
+      });
 }
 
 /// Beside --dir no second side and no FILE is named, so what stands there is the first NAME. Else
@@ -834,7 +1117,7 @@ std::optional<Error> make_name_of(std::string_view argument, std::string& typed,
 }
 
 void add_dump(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"dump", "TARGET FILE [--registers 0..999]",
+  constexpr Words words = {"dump", "[TARGET] FILE [--registers 0..999]",
                            "raw registers into a file that diff can compare",
                            "spindle dump station3 monday.yaml\n"
                            "spindle dump tcp://192.168.10.40 unknown.yaml --registers 0..999\n"
@@ -848,24 +1131,25 @@ void add_dump(CLI::App& app, ParseState& draft) {
     options.table = arguments.registers.table;
     return commands::dump(options, context);
   };
-  add_command(app, draft, words, draft.options.dump, run,
-              [note_file](Binder& bind, DumpArguments& arguments) {
-                commands::DumpOptions& options = arguments.options;
-                bind.required("TARGET", options.target, "tool name or URL");
-                bind.required("FILE", options.file, "where to; - is standard output");
-                bind.check([&options, note_file]() -> std::optional<Error> {
-                  note_file(options.file);
-                  return std::nullopt;
-                });
-                bind_registers(bind, arguments.registers,
-                               "which (default: all that the profile knows, of every table)");
-                bind.option("--pause", "DURATION", options.pause, to_duration,
-                            "between two requests (default 20ms)");
-                bind.flag("--force", options.overwrite, Overwrite::allow,
-                          "replace a file that is there");
-                bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
-                          "also what the profile marks as secret");
-              });
+  add_command(
+      app, draft, words, draft.options.dump,
+      with_words<DumpArguments>("dump", commands::OtherWords::names, run),
+      [&draft, note_file](Binder& bind, WordedDump& worded) {
+        DumpArguments& arguments = worded.options;
+        commands::DumpOptions& options = arguments.options;
+        bind_words(bind, draft, worded, "the tool, and FILE: where to; - is standard output");
+        bind.check([&worded, note_file]() -> std::optional<Error> {
+          if (!worded.typed.words.empty()) note_file(worded.typed.words.back());
+          return std::nullopt;
+        });
+        bind_registers(bind, arguments.registers,
+                       "which (default: all that the profile knows, of every table)");
+        bind.option("--pause", "DURATION", options.pause, to_duration,
+                    "between two requests (default 20ms)");
+        bind.flag("--force", options.overwrite, Overwrite::allow, "replace a file that is there");
+        bind.flag("--include-secrets", options.secrets, commands::Secrets::include,
+                  "also what the profile marks as secret");
+      });
 }
 
 void add_diff(CLI::App& app, ParseState& draft) {
@@ -879,7 +1163,8 @@ void add_diff(CLI::App& app, ParseState& draft) {
       "spindle diff station3 dump.yaml\n"
       "spindle diff @line1 --dir backups"};
   add_command(app, draft, words, draft.options.diff, commands::diff,
-              [](Binder& bind, commands::DiffOptions& options) {
+              [&draft](Binder& bind, commands::DiffOptions& options) {
+                bind_columns(bind, draft);
                 bind.required("A", options.a,
                               "tool, backup or dump file, or 'defaults'; with --dir also @group");
                 bind.argument("B", options.b, "tool, backup or dump file, or 'defaults'");
@@ -897,21 +1182,24 @@ void add_diff(CLI::App& app, ParseState& draft) {
 }
 
 void add_restore(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"restore", "TARGET {FILE|--dir FOLDER} [NAME|PATTERN...]",
+  constexpr Words words = {"restore", "[TARGET...] {FILE|--dir FOLDER} [NAME|PATTERN...]",
                            "plan, confirm, write what differs, verify; put back if it fails",
                            "spindle restore station3 station3.yaml --dry-run\n"
                            "spindle restore station3 station3.yaml 'preset.1.*'\n"
                            "spindle restore station3 old-tool.yaml --yes --json\n"
                            "spindle restore @line1 --dir backups"};
-  add_command(app, draft, words, draft.options.restore, commands::restore,
-              [](Binder& bind, commands::RestoreOptions& options) {
-                bind.required("TARGET", options.target, "tool name or URL; with --dir also @group");
-                bind.argument("FILE", options.file, "backup file");
-                bind.argument("NAME", options.patterns, "restore only these");
+  add_command(app, draft, words, draft.options.restore,
+              with_words<commands::RestoreOptions>("restore", commands::OtherWords::names,
+                                                   commands::restore),
+              [&draft](Binder& bind, Worded<commands::RestoreOptions>& worded) {
+                commands::RestoreOptions& options = worded.options;
+                bind_words(bind, draft, worded,
+                           "the tool (with --dir tools and @groups), the backup FILE, and names or "
+                           "patterns: restore only these");
                 bind.option("--dir", "FOLDER", options.folder,
                             "restore each tool from its own backup in this folder, as backup "
                             "--dir writes it");
-                bind.flag("--dry-run", options.execution, commands::Execution::dry_run,
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
                           "show the plan, write nothing");
                 bind.flag("--force", options.model, commands::ModelCheck::off,
                           "also to a tool of another model");
@@ -919,10 +1207,6 @@ void add_restore(CLI::App& app, ParseState& draft) {
                           "leave what was written when something fails");
                 bind.flag("--save", options.storing, commands::Storing::yes, save_words);
                 bind_jobs(bind, options.jobs);
-                bind.check([&options] {
-                  return make_name_of("FILE", options.file, options.folder, options.patterns,
-                                      "restore");
-                });
               });
 }
 
@@ -944,7 +1228,7 @@ void bind_simulated_line(Binder& bind, commands::SimulateOptions& options) {
   bind.flag("--no-gap", options.gaps, sim::LineModel::Gaps::ignored,
             "serial tools: also hear clients that keep too short a silence");
   bind.repeatable("--fault", "FAULT", options.faults,
-                  "make the tool misbehave, repeatable; see below");
+                  "make the tool misbehave, repeatable");
   bind.option("--busy", "DURATION", options.tool.busy, to_busy,
               "how long Configuration takes (default 200ms, at most 1s)")
       ->group(of_command_word);
@@ -976,6 +1260,9 @@ void bind_simulated_work(Binder& bind, sim::DeviceOptions& bm) {
       bind.option("--burst", "N", bm.burst, NumberFrom{0, 10'000},
                   "results that each of the operator's screws brings, all at once (default 1)")
           ->group(of_screwdrivers);
+  bind.option("--event-number", "N", bm.event_number, NumberFrom{0, 0xFFFF},
+              "number of the last event, which the next one counts on from")
+      ->group(of_screwdrivers);
   bind.check([every, burst, &bm]() -> std::optional<Error> {
     const bool work_is_described = every->count() > 0 || burst->count() > 0;
     if (work_is_described && !bm.rundown_every) {
@@ -1009,7 +1296,7 @@ void add_simulate(CLI::App& app, ParseState& draft) {
                 bind_simulated_line(bind, options);
                 bind_simulated_work(bind, options.tool.bm);
                 bind.repeatable("--outage", "OUTAGE", options.outages,
-                                "let the tool be away at times, repeatable; see below");
+                                "let the tool be away at times, repeatable");
               });
 }
 
@@ -1033,7 +1320,8 @@ void add_profile_commands(CLI::App& profile, ParseState& draft) {
   };
   add_command(profile, draft,
               {"list", "", "all profiles that can be named", "spindle profile list"},
-              draft.options.profile_list, list, [](Binder&, Options&) {});
+              draft.options.profile_list, list,
+              [&draft](Binder& bind, Options&) { bind_columns(bind, draft); });
   add_command(profile, draft,
               {"show", "PROFILE", "everything that a profile says", "spindle profile show doga-bm"},
               draft.options.profile_show, commands::profile_show, bind_name);
@@ -1070,11 +1358,52 @@ void add_profile(CLI::App& app, ParseState& draft) {
               [&draft](Binder& bind, Options&) { add_profile_commands(bind.command(), draft); });
 }
 
+void add_tools_commands(CLI::App& tools, ParseState& draft) {
+  constexpr auto not_read = Invocation::ToolsFile::only_found;
+  constexpr std::string_view dry_run_words = "say what would be written, write nothing";
+  add_command(tools, draft,
+              {"add", "NAME URL", "add a tool to the tools file, and ask it who it is first",
+               "spindle tools add station3 tcp://192.168.10.23:5000\n"
+               "spindle tools add station4 192.168.10.24 --profile doga-bmt --torque-unit N.m\n"
+               "spindle tools add conveyor1 '/dev/ttyUSB0?unit=3' --profile orientalmotor-blv\n"
+               "spindle tools add station5 tcp://192.168.10.25:5000 --offline",
+               nullptr, not_read},
+              draft.options.tools_add, commands::add_tool,
+              [dry_run_words](Binder& bind, commands::ToolAddOptions& options) {
+                bind.required("NAME", options.name, "by which it is told about from now on");
+                bind.required("URL", options.url, "where it is: a URL, an address or a port");
+                bind.option("--torque-unit", "UNIT", options.torque_unit,
+                            "the unit that is set on the tool, such as N.m");
+                bind.flag("--offline", options.asking, commands::Asking::offline,
+                          "ask nothing; for a tool that is not there yet");
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          dry_run_words);
+              });
+  add_command(tools, draft,
+              {"init", "", "write a tools file to begin with",
+               "spindle tools init\nspindle tools init --tools ./spindle.yaml", nullptr, not_read},
+              draft.options.tools_init, commands::init_tools,
+              [dry_run_words](Binder& bind, commands::ToolsInitOptions& options) {
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          dry_run_words);
+              });
+  add_command(tools, draft,
+              {"test", "[TARGET...]", "ask every tool who it is, and compare with the tools file",
+               "spindle tools test\nspindle tools test @line1 --json", nullptr,
+               Invocation::ToolsFile::all_tools},
+              draft.options.tools_test, commands::test_tools,
+              [](Binder& bind, commands::ToolsTestOptions& options) {
+                bind.argument("TARGET", options.targets, "tools (default: all of the tools file)");
+                bind_jobs(bind, options.jobs);
+              });
+}
+
 void add_tools(CLI::App& app, ParseState& draft) {
-  constexpr Words words = {"tools", "[--check]",
-                           "the named tools of the tools file, with endpoints and profiles",
+  constexpr Words words = {"tools", "[--check|add|init|test]",
+                           "the named tools of the tools file: list, add, ask each of them",
                            "spindle tools\n"
-                           "spindle tools --json\n"
+                           "spindle tools add station3 tcp://192.168.10.23:5000\n"
+                           "spindle tools test\n"
                            "spindle tools --check --tools ./spindle.yaml"};
   const auto run = [](bool check, Context& context) {
     return check ? commands::check_tools(context) : commands::tools(context);
@@ -1086,6 +1415,8 @@ void add_tools(CLI::App& app, ParseState& draft) {
                   draft.tools_file = Invocation::ToolsFile::only_found;
                 };
                 bind.flag("--check", check_file, "every fault of the file, with its place");
+                bind_columns(bind, draft);
+                add_tools_commands(bind.command(), draft);
               });
 }
 
@@ -1121,6 +1452,10 @@ std::optional<Error> check_results(const commands::ResultsOptions& options) {
       return unknown_choice("--kind", kind, known);
     }
   }
+  if (!options.curve.empty() &&
+      (!options.qdas.empty() || options.following == commands::Following::yes)) {
+    return usage("--curve shows one result that is stored", "leave --qdas and --follow out");
+  }
   if (options.qdas.empty()) return std::nullopt;
   if (options.following == commands::Following::yes) {
     return usage("--qdas and --follow exclude each other", "leave one of them out");
@@ -1146,10 +1481,12 @@ void bind_results(Binder& bind, commands::ResultsOptions& options) {
   bind.flag("--gaps", options.told, commands::Told::gaps, "what was missed, and nothing else");
   bind.flag("--all", options.told, commands::Told::all,
             "also links, changes, totals, and what the recorder did");
-  bind.option("-n,--count", "N", options.count, NumberFrom{1, 1'000'000'000}, "the newest so many");
+  bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000}, "the newest so many");
   bind.flag("-f,--follow", options.following, commands::Following::yes,
             "go on with what is stored from now on");
   bind.option("--qdas", "FOLDER", options.qdas, "write files for Q-DAS (.dfq) into this folder");
+  bind.option("--curve", "KEY", options.curve,
+              "the curves of one result, SERIAL/EPOCH/NUMBER; with -o svg drawn");
   bind.flag("--force", options.overwrite, Overwrite::allow, "replace files that are there");
   bind.option("--store", "FILE", options.store, store_words);
   bind.check([&options] { return check_results(options); });
@@ -1162,9 +1499,14 @@ void add_results(CLI::App& app, ParseState& draft) {
                            "spindle results station3 --since '2026-11-30 14:00' --ng\n"
                            "spindle results @line1 --since 30d -o csv\n"
                            "spindle results --follow --json\n"
-                           "spindle results station3 --qdas quality",
+                           "spindle results station3 --qdas quality\n"
+                           "spindle results --curve 2401190042/0/1962 -o svg > curve.svg",
                            results_words};
-  add_command(app, draft, words, draft.options.results, commands::results, bind_results);
+  add_command(app, draft, words, draft.options.results, commands::results,
+              [&draft](Binder& bind, commands::ResultsOptions& options) {
+                bind_results(bind, options);
+                bind_columns(bind, draft);
+              });
 }
 
 void add_store_commands(CLI::App& store, ParseState& draft) {
@@ -1241,6 +1583,89 @@ void add_store(CLI::App& app, ParseState& draft) {
               [&draft](Binder& bind, Options&) { add_store_commands(bind.command(), draft); });
 }
 
+void add_log(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"log", "[TARGET...] [NAME|PATTERN...]",
+                           "what was changed on which tool, when, and how it ended",
+                           "spindle log\n"
+                           "spindle log station3 --since 7d\n"
+                           "spindle log '*.target-torque' --json"};
+  add_command(app, draft, words, draft.options.log, commands::log,
+              [&draft](Binder& bind, commands::LogOptions& options) {
+                bind_columns(bind, draft);
+                bind.argument("TARGET", options.arguments,
+                              "tools, groups, serial numbers, names or patterns of parameters");
+                bind.option("--since", "TIME", options.since, "from this time on");
+                bind.option("-c,--count", "N", options.count, NumberFrom{1, 1'000'000'000},
+                            "the newest so many");
+              });
+}
+
+void add_undo(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"undo", "[ID]",
+                           "take back what a command changed, if the tool still holds it",
+                           "spindle undo\n"
+                           "spindle undo 3f2a91c0 --dry-run"};
+  add_command(app, draft, words, draft.options.undo, commands::undo,
+              [&draft](Binder& bind, commands::UndoOptions& options) {
+                draft.takes_default = true;  // the record names tools
+                bind.argument("ID", options.id,
+                              "of a change or a command, from 'spindle log' (default: the last)");
+                bind.flag("-n,--dry-run", options.execution, commands::Execution::dry_run,
+                          "check and show everything, write nothing");
+              });
+}
+
+void add_use(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {"use", "[TARGET|-]", "the tool that is meant where none is named",
+                           "spindle use station3\n"
+                           "spindle use\n"
+                           "spindle use -"};
+  add_command(app, draft, words, draft.options.use, commands::use,
+              [](Binder& bind, commands::UseOptions& options) {
+                bind.argument("TARGET", options.target,
+                              "tool name, @group or URL; - forgets it; none: show it");
+                bind.flag("--clear", options.forget, commands::Forgetting::yes, "forget it");
+                bind.check([&options]() -> std::optional<Error> {
+                  if (options.target == "-") {
+                    options.target.clear();
+                    options.forget = commands::Forgetting::yes;
+                  }
+                  const bool is_both =
+                      !options.target.empty() && options.forget == commands::Forgetting::yes;
+                  if (!is_both) return std::nullopt;
+                  return usage("use: --clear forgets the default, and a TARGET makes one",
+                               "leave one of them out");
+                });
+              });
+}
+
+/// These two are the options of the same names, as people type them; invocation_of() sees to it.
+void add_help(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {help_command,
+                           "[COMMAND]",
+                           "what there is, or how one command is used",
+                           "spindle help\nspindle help set\nspindle help store trim",
+                           nullptr,
+                           Invocation::ToolsFile::only_found};
+  const auto none = [](const auto&, Context&) -> Result<Outcome> { return Outcome(); };
+  add_command(app, draft, words, draft.options.helped, none,
+              [](Binder& bind, std::vector<std::string>& command) {
+                bind.argument("COMMAND", command, "the command, and one below it");
+              });
+}
+
+void add_version(CLI::App& app, ParseState& draft) {
+  constexpr Words words = {version_command,
+                           "",
+                           "the version of the program and of its library",
+                           "spindle version\nspindle version --json",
+                           nullptr,
+                           Invocation::ToolsFile::only_found};
+  const auto none = [](const auto&, Context&) -> Result<Outcome> { return Outcome(); };
+  add_command(app, draft, words, draft.options.none, none,
+              [](Binder&, std::vector<std::string>&) {});
+}
+
 void build(CLI::App& app, ParseState& draft) {
   app.set_help_flag();
   app.allow_extras();
@@ -1250,7 +1675,9 @@ void build(CLI::App& app, ParseState& draft) {
        {add_identify,     add_list,        add_get,    add_set,      add_do,      add_watch,
         add_record,       add_results,     add_report, add_store,    add_forward, add_serve,
         add_remote_start, add_remote_stop, add_alarms, add_backup,   add_dump,    add_diff,
-        add_restore,      add_ping,        add_scan,   add_simulate, add_profile, add_tools}) {
+        add_restore,      add_ping,        add_scan,   add_discover, add_learn,   add_simulate,
+        add_profile,      add_tools,       add_log,    add_undo,     add_use,     add_help,
+        add_version}) {
     add(app, draft);
   }
 }
@@ -1273,24 +1700,30 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App* comma
   return names;
 }
 
+Error unknown_command(const std::string& name, const std::vector<std::string>& known) {
+  std::string hint = suggestion(name, known);
+  if (hint.empty()) hint = "'spindle --help' lists all commands";
+  Error error = usage(fmt::format("unknown command '{}'", name), std::move(hint));
+  error.remedy = remedy_for(name, known, "spindle --help");
+  return error;
+}
+
 Error unexpected_argument(const CLI::App& app, const ParseState& draft, const std::string& extra) {
   const std::string command = draft.chosen == nullptr ? "" : path_of(draft.chosen);
   if (extra.size() > 1 && extra.front() == '-') {
     const std::string name = extra.substr(0, extra.find('='));
-    std::string hint = suggestion(name, option_names(app, draft.chosen));
-    if (hint.empty())
-      hint =
-          fmt::format("'spindle {}--help' lists all options", command.empty() ? "" : command + " ");
-    return usage(fmt::format("unknown option '{}'", name), hint);
+    const auto known = option_names(app, draft.chosen);
+    const std::string help = fmt::format("spindle {}--help", command.empty() ? "" : command + " ");
+    std::string hint = suggestion(name, known);
+    if (hint.empty()) hint = fmt::format("'{}' lists all options", help);
+    Error error = usage(fmt::format("unknown option '{}'", name), std::move(hint));
+    error.remedy = remedy_for(name, known, help);
+    return error;
   }
   if (draft.chosen == nullptr || !draft.chosen->get_subcommands({}).empty()) {
-    std::string hint =
-        suggestion(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
-    if (hint.empty()) hint = "'spindle --help' lists all commands";
-    return usage(fmt::format("unknown command '{}'", extra), hint);
+    return unknown_command(extra, command_names(draft.chosen == nullptr ? app : *draft.chosen));
   }
-  return usage(fmt::format("{}: '{}' is one argument too many", command, extra),
-               fmt::format("'spindle {} --help' shows examples", command));
+  return for_help(command, usage(fmt::format("{}: '{}' is one argument too many", command, extra)));
 }
 
 Error empty_value(const std::string& option) {
@@ -1353,11 +1786,20 @@ Description description_of(const CLI::App& app, const ParseState& draft) {
   return {.common = options_of(app), .commands = commands_of(app, draft)};
 }
 
-std::string help_of(const CLI::App& app, const ParseState& draft) {
-  const Description description = description_of(app, draft);
-  if (draft.chosen == nullptr) return program_help(description);
-  const CommandDescription* command = find_command(description, path_of(draft.chosen));
-  return command_help(description, *command);
+bool is_chosen(const ParseState& draft, std::string_view name) {
+  return draft.chosen != nullptr && path_of(draft.chosen) == name;
+}
+
+Result<std::string> help_of(const CLI::App& app, const ParseState& draft) {
+  const Description description = describe_grammar();  // also of commands that are not typed
+  std::string name = draft.chosen == nullptr ? std::string() : path_of(draft.chosen);
+  if (is_chosen(draft, help_command) && !draft.help) {
+    name = fmt::format("{}", fmt::join(draft.options.helped, " "));
+  }
+  if (name.empty()) return program_help(description);
+  const CommandDescription* command = find_command(description, name);
+  if (command == nullptr) return tl::unexpected(unknown_command(name, command_names(app)));
+  return command_help(*command);
 }
 
 /// What nothing in the grammar takes.
@@ -1391,6 +1833,7 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   constexpr std::array<std::string_view, 6> targets = {"TARGET", "BUS",     "A",
                                                        "B",      "PATTERN", "SINK"};
   bool takes_words = false;
+  bool takes_targets = false;
   bool has_words = false;
   for (const CLI::Option* known : command.get_options()) {
     if (!known->get_positional()) continue;
@@ -1398,10 +1841,56 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
     has_words = has_words || !known->results().empty();
     const std::string name = known->get_name(true);
     if (std::find(targets.begin(), targets.end(), name) == targets.end()) continue;
+    takes_targets = true;
     const auto& words = known->results();
     if (std::any_of(words.begin(), words.end(), files::may_name_tools)) return true;
   }
-  return !takes_words || (use == Invocation::ToolsFile::all_tools && !has_words);
+  const bool is_about_all = !has_words || !takes_targets;
+  return !takes_words || (use == Invocation::ToolsFile::all_tools && is_about_all);
+}
+
+/// Whether the first word is a URL that is no name: then the tools file only tells whether others
+/// are tools, too, and its faults keep no command from what it is asked for.
+bool begins_with_url(const CLI::App& command) {
+  for (const CLI::Option* known : command.get_options()) {
+    const auto& words = known->results();
+    if (!known->get_positional() || words.empty()) continue;
+    return link::looks_like_url(words.front()) && !files::may_name_tools(words.front());
+  }
+  return false;
+}
+
+/// What of the tools file is read for the words of this command.
+Invocation::ToolsFile tools_use_for(const CLI::App& command, const ParseState& draft,
+                                    Invocation::ToolsFile use) {
+  using ToolsFile = Invocation::ToolsFile;
+  const bool may_be_default = draft.takes_default && !begins_with_url(command);
+  if (!may_be_default && !names_tools(command, use)) return ToolsFile::only_found;
+  const bool is_by_url = use == ToolsFile::loaded && draft.takes_default && !may_be_default;
+  return is_by_url ? ToolsFile::salvaged : use;
+}
+
+Invocation telling(std::string text) {
+  Invocation help;
+  help.text = std::move(text);
+  return help;
+}
+
+/// Where columns cannot be chosen, and where they have to be.
+std::optional<Error> check_columns(const ParseState& draft) {
+  using report::Format;
+  const Format format = draft.invocation.format;
+  const bool has_all = format == Format::json || format == Format::yaml || format == Format::svg;
+  if (has_all && !draft.invocation.columns.empty()) {
+    return usage("--columns is about tables, CSV and -o value", "JSON and YAML have every key");
+  }
+  const bool resets = draft.options.alarms.options.reset == commands::AlarmReset::yes;
+  if (resets && (format == Format::value || !draft.invocation.columns.empty())) {
+    return usage("--columns and -o value do not go with --reset", "leave one of them out");
+  }
+  if (format != Format::value || draft.has_columns || draft.chosen == nullptr) return std::nullopt;
+  return usage(fmt::format("{} has no list of values", path_of(draft.chosen)),
+               "-o value is for 'spindle get' and other lists; --json has every key");
 }
 
 Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
@@ -1409,11 +1898,9 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   // Where a command is misspelt, the program's help would hide it.
   const bool misspelt = extra && draft.chosen == nullptr;
   if (draft.help && !misspelt) {
-    Invocation help;
-    help.text = help_of(app, draft);
-    return help;
+    return help_of(app, draft).map(telling);
   }
-  const bool wants_version = draft.version && !misspelt;
+  const bool wants_version = (draft.version && !misspelt) || is_chosen(draft, version_command);
   if (extra && !wants_version) return tl::unexpected(unexpected_argument(app, draft, *extra));
   if (const auto empty = option_without_value(app)) {
     return tl::unexpected(empty_value(*empty));
@@ -1424,12 +1911,21 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
     invocation.asks = Invocation::Asks::version;
     return std::move(invocation);
   }
-  if (!draft.only_as_text.empty() && invocation.format != report::Format::table) {
+  if (!draft.only_as_text.empty() && invocation.format != report::Format::table &&
+      invocation.format != report::Format::wide) {
     return tl::unexpected(
         usage(draft.only_as_text, "leave out --json and --output, or name a file"));
   }
+  if (invocation.format == report::Format::svg && draft.options.results.curve.empty()) {
+    return tl::unexpected(usage("only 'spindle results --curve' draws",
+                                "choose another --output: table, json or csv"));
+  }
+  if (auto fault = check_columns(draft)) return tl::unexpected(std::move(*fault));
+  if (is_chosen(draft, help_command)) return help_of(app, draft).map(telling);
   if (draft.chosen == nullptr) {
-    return tl::unexpected(usage("no command is given", "'spindle --help' lists all commands"));
+    Error error = usage("no command is given", "'spindle --help' lists all commands");
+    error.remedy.right = "spindle --help";
+    return tl::unexpected(std::move(error));
   }
   invocation.user.format = invocation.format;
   invocation.tools_use = draft.tools_file.value_or(draft.words[draft.chosen].tools_file);
@@ -1437,8 +1933,8 @@ Result<Invocation> invocation_of(const CLI::App& app, ParseState& draft) {
   // for it.
   const bool told = !invocation.common.tools_file.empty() &&
                     invocation.tools_use != Invocation::ToolsFile::salvaged;
-  if (!told && !names_tools(*draft.chosen, invocation.tools_use)) {
-    invocation.tools_use = Invocation::ToolsFile::only_found;
+  if (!told) {
+    invocation.tools_use = tools_use_for(*draft.chosen, draft, invocation.tools_use);
   }
   return std::move(invocation);
 }
@@ -1451,11 +1947,8 @@ std::vector<std::string> with_one_output_option(std::vector<std::string> argumen
 }
 
 /// Where `named` is there, only commands that it names are known; help is of all of them.
-Result<Invocation> parse_with(const std::vector<std::string>* named,
-                              const std::vector<std::string>& arguments) {
+Result<Invocation> parse_words(ParseState& draft, const std::vector<std::string>& arguments) {
   CLI::App app;
-  ParseState draft;
-  draft.named = named;
   build(app, draft);
   try {
     auto words = with_one_output_option(arguments);
@@ -1464,8 +1957,24 @@ Result<Invocation> parse_with(const std::vector<std::string>* named,
   } catch (const CLI::ParseError& error) {
     return tl::unexpected(parser_error(arguments, error));
   }
-  if (draft.help && named != nullptr) return tl::unexpected(usage("help needs all commands"));
+  const bool tells = draft.help || is_chosen(draft, help_command);
+  if (tells && draft.named != nullptr) return tl::unexpected(usage("help needs all commands"));
   return invocation_of(app, draft);
+}
+
+Result<Invocation> parse_with(const std::vector<std::string>* named,
+                              const std::vector<std::string>& arguments) {
+  const auto dashes = std::find(arguments.begin(), arguments.end(), end_of_options);
+  if (dashes != arguments.end()) {
+    ParseState draft;
+    draft.named = named;
+    draft.behind_dashes.assign(dashes + 1, arguments.end());
+    auto invocation = parse_words(draft, {arguments.begin(), dashes});
+    if (draft.takes_behind) return invocation;
+  }
+  ParseState draft;
+  draft.named = named;
+  return parse_words(draft, arguments);
 }
 
 }  // namespace
@@ -1479,6 +1988,7 @@ Description describe_grammar() {
 }
 
 Result<Invocation> parse(const std::vector<std::string>& arguments) {
+  if (arguments.empty()) return telling(program_help(describe_grammar()));
   // The commands that nothing names are a good part of a short run; a fault may have to know them.
   auto invocation = parse_with(&arguments, arguments);
   return invocation ? std::move(invocation) : parse_with(nullptr, arguments);

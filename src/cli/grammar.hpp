@@ -21,7 +21,11 @@ inline constexpr auto color_words = enum_table<ColorChoice>({{"auto", ColorChoic
                                                              {"never", ColorChoice::never}});
 inline constexpr auto format_words = enum_table<report::Format>({{"table", report::Format::table},
                                                                  {"json", report::Format::json},
-                                                                 {"csv", report::Format::csv}});
+                                                                 {"csv", report::Format::csv},
+                                                                 {"svg", report::Format::svg},
+                                                                 {"wide", report::Format::wide},
+                                                                 {"value", report::Format::value},
+                                                                 {"yaml", report::Format::yaml}});
 
 /// What --rules, --include and --study of report take.
 inline constexpr auto rule_set_words =
@@ -43,6 +47,7 @@ struct Invocation {
   /// Set: print this and end with status 0 (--help).
   std::optional<std::string> text = std::nullopt;
   report::Format format = report::Format::table;
+  std::vector<std::string> columns = {};  ///< those that are wanted; none: as usual
   ColorChoice color = ColorChoice::automatic;
   /// Whether the command wants the tools file without a fault, wants it also where no tool is named
   /// because that means all, makes do with what can be read of it, or is about its faults.

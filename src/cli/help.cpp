@@ -1,15 +1,62 @@
 #include "help.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "spindle/base/text.hpp"
 
 namespace spindle::cli {
 namespace {
 
-/// Those that only some profiles declare stand behind the others, in the order of their first one.
-std::string option_lines(const std::vector<OptionDescription>& options) {
+constexpr std::size_t most_lines = 25;
+constexpr std::size_t widest_line = 100;
+
+/// Behind what begins the first line, with line breaks in place of blanks; the other lines begin
+/// with `indent` blanks.
+std::string wrapped(std::string begin, std::string_view text, std::size_t indent) {
+  std::string lines;
+  std::string line = std::move(begin);
+  bool is_first = true;
+  for (const std::string_view word : split(text, ' ')) {
+    if (!is_first && line.size() + 1 + word.size() > widest_line) {
+      lines += std::exchange(line, std::string(indent, ' ')) + "\n";
+      is_first = true;
+    }
+    line.append(std::exchange(is_first, false) ? "" : " ").append(word);
+  }
+  return lines + line + "\n";
+}
+
+std::size_t lines_in(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+/// An option or argument with what it means.
+std::string option_lines(const OptionDescription& option, std::size_t width) {
+  std::string begin = fmt::format("  {:<{}}  ", names_of(option), width);
+  const std::size_t indent = begin.size();
+  return wrapped(std::move(begin), option.meaning, indent);
+}
+
+std::size_t width_of(const std::vector<OptionDescription>& options) {
+  std::size_t width = 0;
+  for (const OptionDescription& option : options) width = std::max(width, names_of(option).size());
+  return width;
+}
+
+/// One for each option. Those that only some profiles declare stand behind the others, in the order
+/// of their first one.
+struct Entry {
   std::string text;
+  const OptionDescription* option;
+};
+
+std::vector<Entry> entries_of(const std::vector<OptionDescription>& options) {
+  std::vector<Entry> entries;
   std::vector<std::string> groups = {""};
   for (const OptionDescription& option : options) {
     if (std::find(groups.begin(), groups.end(), option.declared_by) == groups.end()) {
@@ -17,13 +64,41 @@ std::string option_lines(const std::vector<OptionDescription>& options) {
     }
   }
   for (const std::string& group : groups) {
-    if (!group.empty()) text += fmt::format("\nOptions {}:\n", group);
+    std::string heading = group.empty() ? "" : fmt::format("\nOptions {}:\n", group);
     for (const OptionDescription& option : options) {
       if (option.declared_by != group) continue;
-      text += fmt::format("  {:<32}{}\n", names_of(option), option.meaning);
+      entries.push_back(
+          {std::exchange(heading, "") + option_lines(option, width_of(options)), &option});
     }
   }
+  return entries;
+}
+
+std::string option_lines(const std::vector<OptionDescription>& options) {
+  std::string text;
+  for (const Entry& entry : entries_of(options)) text += entry.text;
   return text;
+}
+
+/// The names of options without what they mean.
+std::string names_only(const std::vector<Entry>& entries, std::size_t from) {
+  std::vector<std::string> names;
+  for (std::size_t at = from; at < entries.size(); ++at) {
+    names.push_back(entries[at].option->names.back());
+  }
+  return wrapped("  also ", fmt::format("{}", fmt::join(names, ", ")), 4);
+}
+
+/// In so many lines, if need be with names alone at the end.
+std::string option_lines(const std::vector<OptionDescription>& options, std::size_t room) {
+  const std::vector<Entry> entries = entries_of(options);
+  for (std::size_t told = entries.size(); told > 0; --told) {
+    std::string text;
+    for (std::size_t at = 0; at < told; ++at) text += entries[at].text;
+    if (told < entries.size()) text += names_only(entries, told);
+    if (lines_in(text) <= room) return text;
+  }
+  return names_only(entries, 0);
 }
 
 std::string indented(const std::vector<std::string>& lines) {
@@ -65,18 +140,21 @@ std::string program_help(const Description& description) {
       command_lines(description.commands), option_lines(description.common));
 }
 
-std::string command_help(const Description& description, const CommandDescription& command) {
+std::string command_help(const CommandDescription& command) {
   const std::string space = command.synopsis.empty() ? "" : " ";
-  std::string text = fmt::format("{}\n\nExamples:\n{}\nUsage: spindle {}{}{}\n", command.meaning,
-                                 indented(command.examples), command.name, space, command.synopsis);
+  std::string text = fmt::format(
+      "{}\nExamples:\n{}\n{}", wrapped("", command.meaning, 0), indented(command.examples),
+      wrapped("Usage: spindle ", fmt::format("{}{}{}", command.name, space, command.synopsis), 4));
   if (!command.commands.empty()) {
     text += fmt::format("\nCommands:\n{}", command_lines(command.commands));
   }
+  constexpr std::size_t around = 4;  // the heading and the last line, each behind an empty one
   if (!command.options.empty()) {
-    text += fmt::format("\nArguments and options:\n{}", option_lines(command.options));
+    const std::size_t used = lines_in(text) + around;
+    text += fmt::format("\nArguments and options:\n{}",
+                        option_lines(command.options, most_lines - std::min(used, most_lines)));
   }
-  if (command.appendix != nullptr) text += "\n" + command.appendix();
-  return text + fmt::format("\nOptions of every command:\n{}", option_lines(description.common));
+  return text + "\nmore: 'man spindle'; options of every command: 'spindle --help'\n";
 }
 
 }  // namespace spindle::cli

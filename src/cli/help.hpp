@@ -9,8 +9,9 @@ namespace spindle::cli {
 /// `spindle --help`.
 std::string program_help(const Description& description);
 
-/// `spindle COMMAND --help`: examples first, then usage, arguments and options.
-std::string command_help(const Description& description, const CommandDescription& command);
+/// `spindle COMMAND --help`: examples first, then usage, arguments and its own options, on 25 lines
+/// of 100 columns. Options that have no room there are named, and the manual explains them.
+std::string command_help(const CommandDescription& command);
 
 /// "-o, --output FORMAT", "    --json", "TARGET".
 std::string names_of(const OptionDescription& option);

@@ -11,6 +11,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/show_frames.hpp"
 #include "spindle/files/capture.hpp"
+#include "spindle/work/tool_memory.hpp"
 #include "version.hpp"
 
 namespace spindle::cli {
@@ -18,6 +19,8 @@ namespace {
 
 /// Not a command for people: the completion scripts of the shells use it.
 constexpr std::string_view completion_command = "__complete";
+
+using Texts = std::vector<std::string>;
 
 int exit_status(ExitStatus status) { return static_cast<int>(status); }
 
@@ -36,6 +39,12 @@ std::string xdg_folder(const World& world, std::string_view name, std::string_vi
 /// Where spindle keeps what it remembers between runs; empty when it is not said.
 std::string state_folder(const World& world) {
   const std::string folder = xdg_folder(world, "XDG_STATE_HOME", ".local/state");
+  return folder.empty() ? folder : folder + "/spindle";
+}
+
+/// Where spindle keeps what it can do without; empty when it is not said.
+std::string cache_folder(const World& world) {
+  const std::string folder = xdg_folder(world, "XDG_CACHE_HOME", ".cache");
   return folder.empty() ? folder : folder + "/spindle";
 }
 
@@ -60,13 +69,18 @@ files::ProfileStore profile_store(const World& world) {
   return files::ProfileStore(profile_folders(world), world.disk, world.shipped);
 }
 
+/// Where a tools file is made when there is none; empty when no folder for it is known.
+std::string usual_tools_file(const World& world) {
+  const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
+  return config.empty() ? std::string() : config + "/spindle/tools.yaml";
+}
+
 /// The tools file that counts; empty when there is none.
 std::string find_tools_file(const World& world, const Invocation& invocation) {
   if (!invocation.common.tools_file.empty()) return invocation.common.tools_file;
   if (std::string named = variable(world, "SPINDLE_TOOLS"); !named.empty()) return named;
   std::vector<std::string> places = {"./spindle.yaml"};
-  const std::string config = xdg_folder(world, "XDG_CONFIG_HOME", ".config");
-  if (!config.empty()) places.push_back(config + "/spindle/tools.yaml");
+  if (std::string own = usual_tools_file(world); !own.empty()) places.push_back(std::move(own));
   places.emplace_back("/etc/spindle/tools.yaml");
   for (std::string& place : places) {
     if (!world.disk.absent(place)) return std::move(place);
@@ -80,7 +94,7 @@ Result<files::Tools> find_tools(const World& world, const Invocation& invocation
   switch (invocation.tools_use) {
     case Invocation::ToolsFile::loaded:
     case Invocation::ToolsFile::all_tools:
-      return files::load_tools(path, world.disk);
+      return files::usable_tools(path, world.disk);
     case Invocation::ToolsFile::salvaged:
       return files::salvage_tools(path, world.disk);
     case Invocation::ToolsFile::only_found:
@@ -130,15 +144,22 @@ Result<commands::Outcome> run_command(const Invocation& invocation, World& world
                              .tools = tools,
                              .show_frames = show_frames,
                              .common = invocation.common,
-                             .make_doors = world.make_doors},
+                             .make_doors = world.make_doors,
+                             .cache_folder = cache_folder(world),
+                             .network = world.network,
+                             .target_variable = variable(world, "SPINDLE_TARGET")},
                             {.io = world.io,
                              .serve = world.serve,
                              .end_waits = world.end_waits,
                              .companions = world.companions,
                              .user = invocation.user,
-                             .supervision = world.supervision},
+                             .supervision = world.supervision,
+                             .new_tools_file = usual_tools_file(world)},
                             {.renderer = renderer}};
-  context.supervision.load_tools = [&] { return find_tools(world, invocation); };
+  // A file that is read again while a command runs is taken whole, or not at all.
+  context.supervision.load_tools = [&] {
+    return find_tools(world, invocation).and_then(&files::without_faults);
+  };
   TRY(begin_capture(invocation.common.trace_file, world.disk));
   return invocation.run(context);
 }
@@ -153,12 +174,14 @@ int tell(const Error& error, World& world, report::Renderer& renderer) {
 
 /// What the shells' completion scripts ask. A broken file must not make a shell noisy.
 int run_completion(const std::vector<std::string>& words, World& world) {
-  const auto typed = parse(words);
-  const auto tools = find_tools(world, typed.value_or(Invocation()));
+  auto typed = parse(words).value_or(Invocation());
+  typed.tools_use = Invocation::ToolsFile::loaded;  // also where no word is typed yet
+  const auto tools = find_tools(world, typed);
   const files::Tools none;
   const files::ProfileStore profiles = profile_store(world);
+  const work::ToolMemory memory(world.disk, cache_folder(world));
   const Completion completion =
-      complete(words, describe_grammar(), {tools ? *tools : none, profiles});
+      complete(words, describe_grammar(), {tools ? *tools : none, profiles, &memory});
   const auto written = world.io.out(to_text(completion));
   return exit_status(written ? ExitStatus::ok : written.error().status());
 }
@@ -167,7 +190,9 @@ Result<void> tell_version(const World& world, report::Format format, report::Ren
   const std::string& library = world.installation.modbus_library;
   const std::string plain = fmt::format("spindle {}\nlibmodbus {}\nprofile format {}", version,
                                         library, files::profile_format);
-  if (format != report::Format::json) return world.io.out(plain + "\n");
+  if (format != report::Format::json && format != report::Format::yaml) {
+    return world.io.out(plain + "\n");
+  }
   report::Texts profiles;
   for (const auto& entry : profile_store(world).list()) {
     profiles.push_back(entry.id);
@@ -186,13 +211,19 @@ int run_guarded(const std::vector<std::string>& arguments, World& world) {
   if (!arguments.empty() && arguments.front() == completion_command) {
     return run_completion({arguments.begin() + 1, arguments.end()}, world);
   }
+  world.io.typed = arguments;
   auto invocation = parse(arguments);
   const report::Format format = invocation ? invocation->format : wanted_format(arguments);
   const report::Verbosity verbosity =
       invocation ? invocation->user.verbosity : report::Verbosity::normal;
   if (invocation) world.io.color = color_of(world, invocation->color);
   if (invocation && is_dumb(world)) invocation->user.progress = report::Showing::unwanted;
-  const auto renderer = report::make_renderer(format, world.io, verbosity);
+  const auto renderer =
+      report::make_renderer({.format = format,
+                             .verbosity = verbosity,
+                             .columns = invocation ? invocation->columns : Texts(),
+                             .clock = &world.clock},
+                            world.io);
   if (!invocation) return tell(invocation.error(), world, *renderer);
   if (invocation->asks == Invocation::Asks::version) {
     const auto told = tell_version(world, format, *renderer);

@@ -17,25 +17,32 @@ using report::Column;
 
 constexpr std::string_view present_list = "present";
 
-const std::array<Column, 5> columns = {{{"LIST", "list"},
-                                        {"INDEX", "index", report::Align::right},
-                                        {"CODE", "code", report::Align::right},
-                                        {"TEXT", "text"},
-                                        {"REMEDY", "remedy"}}};
+const std::array<Column, 5> columns = {
+    {{"LIST", "list"},
+     {"INDEX", "index", report::Align::right},
+     {"CODE", "code", report::Align::right},
+     {"TEXT", "text", report::Align::left, 0, report::wrapped(16)},
+     {"REMEDY", "remedy", report::Align::left, 0, report::wrapped(20)}}};
 
 report::Record alarm_record(const AlarmSource& source, std::size_t index,
                             const catalogue::Value& value, const catalogue::CodeText* text,
                             const Target& target, const Clock& clock) {
   const std::int64_t code = value.number.mantissa();
   const bool is_free = code == 0 && source.table != catalogue::CodeTable::none;
+  const bool is_present = code != 0 && source.list == present_list;
   const std::string meaning = text != nullptr ? text->text.to_string() : is_free ? "none" : "";
   return {.type = "alarm",
           .target = target.shown,
           .time = clock.wall(),
           .fields = {{"list", source.list},
                      {"index", count(index)},
-                     {"code", number(code), value.to_string()},
-                     {"text", text_or_null(meaning)},
+                     {.key = "code",
+                      .cell = number(code),
+                      .shown = value.to_string(),
+                      .tone = is_present ? report::Tone::bad : report::Tone::plain},
+                     {.key = "text",
+                      .cell = text_or_null(meaning),
+                      .tone = is_present ? report::Tone::bad : report::Tone::plain},
                      {"remedy", text_or_null(text != nullptr ? text->remedy : "")}}};
 }
 
@@ -50,10 +57,13 @@ const catalogue::CodeText* text_of(std::int64_t code, catalogue::CodeTable table
   return texts->find(code);
 }
 
+/// Whether places without an alarm are listed, too.
+enum class Zeros : std::uint8_t { listed, left_out };
+
 /// One code of a list, told and remembered.
 void tell(const AlarmSource& source, std::size_t index, const device::Reading& reading,
           const catalogue::CodeTables& tables, const OpenTool& tool, AlarmReport& report,
-          Listing& listing, const Clock& clock) {
+          Listing& listing, Zeros shown, const Clock& clock) {
   const bool tells_present = source.list == present_list;
   report.was_asked = report.was_asked || tells_present;
   if (!reading.value) {
@@ -72,6 +82,8 @@ void tell(const AlarmSource& source, std::size_t index, const device::Reading& r
     report.present = *reading.value;
     if (text != nullptr) report.resettable = text->resettable;
   }
+  // A table of a tool that is well would be a list of nothing.
+  if (reading.value->number == Decimal(0) && shown == Zeros::left_out) return;
   listing.add(alarm_record(source, index, *reading.value, text, tool.target, clock));
 }
 
@@ -104,11 +116,12 @@ Result<void> show_alarms(const std::vector<AlarmSource>& sources, OpenTool& tool
   const auto readings = tool.device.read_each(parameters, device::Limits::skip);
   if (!readings) return tl::unexpected(readings.error());
   Listing listing(context, columns);
+  const Zeros zeros = report::is_table(context.user.format) ? Zeros::left_out : Zeros::listed;
   std::size_t index = 0;
   for (std::size_t at = 0; at < readings->size(); ++at) {
     const AlarmSource& source = sources[at];
     index = at > 0 && sources[at - 1].list == source.list ? index + 1 : 1;
-    tell(source, index, (*readings)[at], *tables, tool, report, listing, context.clock);
+    tell(source, index, (*readings)[at], *tables, tool, report, listing, zeros, context.clock);
   }
   return listing.end();
 }

@@ -157,7 +157,7 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
 }  // namespace
 
 Result<Outcome> alarms(const AlarmsOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, Addressing::unicast, context)
+  return resolve_one_or_group(options.targets, Addressing::unicast, context)
       .and_then([&](const Targets& targets) {
         return run_verb(Alarms(options, targets.is_group), targets, options.jobs, context);
       });

@@ -28,13 +28,21 @@ const std::array<Column, 3> columns = {{{"FILE", "file"},
 /// A profile that cannot be read is told before a tool is asked.
 Result<void> check_profiles(const std::vector<Target>& targets, const Context& context) {
   for (const Target& target : targets) {
+    if (!target.fault.empty()) continue;  // told in its turn
     TRY(load_profile(target, context));
   }
   return {};
 }
 
-report::Record saved_record(const Target& target, const std::string& path,
-                            const ToolSnapshot& taken, const Clock& clock) {
+/// What a tool holds, and whether its file said that already.
+struct Kept {
+  ToolSnapshot taken;
+  bool is_unchanged = false;
+};
+
+report::Record saved_record(const Target& target, const std::string& path, const Kept& kept,
+                            const Clock& clock) {
+  const ToolSnapshot& taken = kept.taken;
   const auto missing = [&](Missing why) {
     return static_cast<std::size_t>(
         std::count_if(taken.snapshot.missing.begin(), taken.snapshot.missing.end(),
@@ -43,12 +51,13 @@ report::Record saved_record(const Target& target, const std::string& path,
   return {.type = "backup",
           .target = target.shown,
           .time = clock.wall(),
-          .fields = {{"file", path},
+          .fields = {{"file", path, kept.is_unchanged ? path + " (unchanged)" : ""},
                      {"parameters", count(taken.snapshot.entries.size())},
                      {"missing", count(taken.snapshot.missing.size())},
                      {"absent", count(missing(Missing::absent))},
                      {"unreadable", count(missing(Missing::unreadable))},
-                     {"left_out", count(missing(Missing::left_out))}}};
+                     {"left_out", count(missing(Missing::left_out))},
+                     {"result", std::string(kept.is_unchanged ? "unchanged" : "saved")}}};
 }
 
 /// Whether a file was written. A backup that lacks what could not be read is a failure all the
@@ -56,6 +65,7 @@ report::Record saved_record(const Target& target, const std::string& path,
 struct Saved {
   Outcome outcome = {};
   bool is_written = false;
+  bool is_unchanged = false;  ///< the file said that already
 };
 
 /// What it refers to does not change while it runs.
@@ -74,14 +84,14 @@ class Backup final : public Verb<std::monostate, Saved> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& /*plan*/, Context& context) const override {
-    const auto taken = save(tool, context);
-    if (is_quiet()) return tell_quietly(taken);
-    if (!taken) return tell_failure(taken.error(), context);
-    Saved saved{.is_written = true};
+    const auto kept = save(tool, context);
+    if (is_quiet()) return tell_quietly(kept);
+    if (!kept) return tell_failure(kept.error(), context);
+    Saved saved{.is_written = !kept->is_unchanged, .is_unchanged = kept->is_unchanged};
     Listing listing(context, columns);
-    listing.add(saved_record(tool.target, paths_->at(tool.target.shown), *taken, context.clock));
+    listing.add(saved_record(tool.target, paths_->at(tool.target.shown), *kept, context.clock));
     saved.outcome.succeed();
-    for (const Error& error : taken->unreadable) {
+    for (const Error& error : kept->taken.unreadable) {
       saved.outcome.fail(error);
       listing.add(error);
     }
@@ -94,23 +104,40 @@ class Backup final : public Verb<std::monostate, Saved> {
   }
 
   [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
-    const auto saved = static_cast<std::size_t>(
-        std::count_if(all.done.begin(), all.done.end(),
-                      [](const auto& done) { return done && done->is_written; }));
-    const std::size_t failed = all.tools - saved;
-    return Summary{.counts = {{"saved", count(saved)}, {"failed", count(failed)}},
-                   .sentence = fmt::format("{} saved, {} failed", saved, failed)};
+    const auto count_of = [&](bool Saved::*is) {
+      return static_cast<std::size_t>(
+          std::count_if(all.done.begin(), all.done.end(),
+                        [is](const auto& done) { return done && (*done).*is; }));
+    };
+    const std::size_t saved = count_of(&Saved::is_written);
+    const std::size_t unchanged = count_of(&Saved::is_unchanged);
+    const std::size_t failed = all.tools - saved - unchanged;
+    const std::string alike = unchanged == 0 ? "" : fmt::format("{} unchanged, ", unchanged);
+    return Summary{.counts = {{"saved", count(saved)},
+                              {"unchanged", count(unchanged)},
+                              {"failed", count(failed)}},
+                   .sentence = fmt::format("{} saved, {}{} failed", saved, alike, failed)};
   }
 
  private:
   /// Standard output holds the backup and nothing else.
   [[nodiscard]] bool is_quiet() const { return options_->file == standard_output; }
 
-  Result<ToolSnapshot> save(OpenTool& tool, const Context& context) const {
-    auto taken = read(tool, context);
-    if (!taken) return taken;
-    return write(paths_->at(tool.target.shown), files::render_backup(taken->snapshot), context)
-        .map([&] { return std::move(*taken); });
+  /// A file of a folder that needs no other text is left as it is, for those who keep it in git.
+  Result<Kept> save(OpenTool& tool, const Context& context) const {
+    TRY_LET(auto taken, read(tool, context));
+    const std::string& path = paths_->at(tool.target.shown);
+    const bool in_folder = !options_->folder.empty();
+    if (in_folder && says_the_same(path, taken.snapshot, context.disk)) {
+      return Kept{.taken = std::move(taken), .is_unchanged = true};
+    }
+    const bool is_kept = options_->overwrite == Overwrite::refuse;
+    if (in_folder && is_kept && context.disk.exists(path)) {
+      return tl::unexpected(holds_another(path));
+    }
+    return write(path, files::render_backup(taken.snapshot), context).map([&] {
+      return Kept{.taken = std::move(taken)};
+    });
   }
 
   [[nodiscard]] Result<ToolSnapshot> read(OpenTool& tool, const Context& context) const {
@@ -126,9 +153,10 @@ class Backup final : public Verb<std::monostate, Saved> {
     return context.disk.write(path, text, options_->overwrite, privacy);
   }
 
-  static Result<Done> tell_quietly(const Result<ToolSnapshot>& taken) {
-    if (!taken) return tl::unexpected(taken.error());
-    if (!taken->unreadable.empty()) return tl::unexpected(taken->unreadable.front());
+  static Result<Done> tell_quietly(const Result<Kept>& kept) {
+    if (!kept) return tl::unexpected(kept.error());
+    const std::vector<Error>& unreadable = kept->taken.unreadable;
+    if (!unreadable.empty()) return tl::unexpected(unreadable.front());
     Saved saved{.is_written = true};
     saved.outcome.succeed();
     return saved;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
 #include <utility>
 
 #include "spindle/work/snapshot.hpp"
@@ -52,7 +54,9 @@ Result<BackupPaths> choose_paths(const std::vector<Target>& targets, const Backu
                    ? by_target(targets, options.folder, "would both be written to",
                                "back them up one by one, each into a --file of its own")
                    : BackupPaths{{targets.front().shown, options.file}};
-  if (!paths || options.overwrite == Overwrite::allow) return paths;
+  // In a folder a file may say already what the tool holds.
+  const bool may_exist = options.overwrite == Overwrite::allow || !options.folder.empty();
+  if (!paths || may_exist) return paths;
   for (const Target& target : targets) {
     const std::string& path = paths->at(target.shown);
     if (path == standard_output || !context.disk.exists(path)) continue;
@@ -64,9 +68,52 @@ Result<BackupPaths> choose_paths(const std::vector<Target>& targets, const Backu
   return paths;
 }
 
+bool says_the_same(const std::string& path, catalogue::Snapshot snapshot, const Disk& disk) {
+  if (path == standard_output || !disk.exists(path)) return false;
+  const auto text = disk.read(path);
+  if (!text) return false;
+  const auto file = files::read_backup(*text, path);
+  if (!file) return false;
+  snapshot.time = file->head.time;
+  return files::render_backup(snapshot) == *text;
+}
+
+Error holds_another(const std::string& path) {
+  return {.code = Errc::usage,
+          .message = "this file is there already and does not say what the tool holds now",
+          .hint = "'spindle diff' with the same --dir shows what differs; --force replaces it",
+          .name = path};
+}
+
 Result<BackupPaths> paths_in_folder(const std::vector<Target>& targets, const std::string& folder) {
   return by_target(targets, folder, "would both have the backup",
                    "name the tools one by one, each with a FILE of its own");
+}
+
+Result<files::BackupFile> read_backup_of(const Target& target, const std::string& path,
+                                         const std::string& folder, const Context& context) {
+  auto file = read_backup_file(path, context);
+  if (!file && context.disk.absent(path)) {
+    file.error().hint = fmt::format("'spindle backup {} --dir {}' makes it", target.shown, folder);
+  }
+  return file;
+}
+
+std::vector<std::string> files_of_no_tool(const BackupPaths& paths, const std::string& folder,
+                                          const Context& context) {
+  std::set<std::string> known;
+  for (const auto& [target, path] : paths) known.insert(path);
+  for (const files::Tool& tool : context.tools.tools) {
+    known.insert(path_in({.shown = tool.name}, folder));
+  }
+  std::vector<std::string> found;
+  for (const std::string& name : context.disk.list(folder)) {
+    std::string path = fmt::format("{}/{}", folder, name);
+    const bool is_backup = name.ends_with(".yaml") && !name.starts_with('.');
+    if (is_backup && !known.contains(path)) found.push_back(std::move(path));
+  }
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 Result<Backups> read_backups(const std::vector<Target>& targets, const std::string& folder,
@@ -74,7 +121,8 @@ Result<Backups> read_backups(const std::vector<Target>& targets, const std::stri
   TRY_LET(const auto paths, paths_in_folder(targets, folder));
   Backups backups;
   for (const Target& target : targets) {
-    auto file = read_backup_file(paths.at(target.shown), context);
+    if (!target.fault.empty()) continue;  // told in its turn
+    auto file = read_backup_of(target, paths.at(target.shown), folder, context);
     if (!file) return tl::unexpected(with_target(std::move(file.error()), target));
     backups.emplace(target.shown, std::move(*file));
   }

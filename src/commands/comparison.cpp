@@ -21,11 +21,12 @@ using catalogue::Selection;
 using report::Align;
 using report::Column;
 
-const std::array<Column, 5> columns = {{{"NAME", "name"},
-                                        {"REGISTER", "register", Align::right},
-                                        {"A", "a", Align::right},
-                                        {"B", "b", Align::right},
-                                        {"UNIT", "unit"}}};
+const std::array<Column, 5> columns = {
+    {{"NAME", "name"},
+     {"REGISTER", "register", Align::right, 0, report::left_out(1)},
+     {"A", "a", Align::right},
+     {"B", "b", Align::right},
+     {"UNIT", "unit"}}};
 
 Error nothing_left() {
   return {.code = Errc::usage,
@@ -46,6 +47,9 @@ std::string units_in_words(const Difference& difference) {
 report::Field side_field(std::string key, const std::optional<catalogue::Value>& value,
                          const Difference& difference) {
   if (!value) return {std::move(key), report::Cell(), "-"};
+  if (difference.parameter.secrecy == catalogue::Secrecy::secret) {
+    return {std::move(key), report::Cell(), shown_of(difference.parameter, *value)};
+  }
   const auto& [a, b] = std::tie(difference.a, difference.b);
   const bool looks_same =
       a && b && difference.units == catalogue::Units::same && a->to_string() == b->to_string();
@@ -58,16 +62,25 @@ report::Field side_field(std::string key, const std::optional<catalogue::Value>&
 
 report::Record difference_record(const Difference& difference, const std::string& target,
                                  const Clock& clock) {
+  const auto toned = [](report::Field field, report::Tone tone) {
+    field.tone = tone;
+    return field;
+  };
   return {.type = "diff",
           .target = target,
           .time = clock.wall(),
           .fields = {{"name", difference.parameter.name},
                      {"register", number(difference.parameter.address.value)},
-                     side_field("a", difference.a, difference),
-                     side_field("b", difference.b, difference),
+                     toned(side_field("a", difference.a, difference), report::Tone::bad),
+                     toned(side_field("b", difference.b, difference), report::Tone::good),
                      {"unit", text_or_null(units_in_words(difference))},
                      {"unit_a", text_or_null(difference.unit_a)},
                      {"unit_b", text_or_null(difference.unit_b)}}};
+}
+
+const char* state_of(const DiffResult& result) {
+  if (result.outcome.failed() > 0) return "failed";
+  return result.different > 0 ? "different" : "same";
 }
 
 }  // namespace
@@ -83,13 +96,18 @@ Result<void> check_selection(const DiffOptions& options, const Profile& profile)
 }
 
 Summary diff_summary(const DiffResult& result, const std::string& target) {
-  return {.counts = {{"different", count(result.different)}, {"same", count(result.same)}},
+  return {.counts =
+              {
+                  {"different", count(result.different)},
+                  {"same", count(result.same)},
+              },
           .sentence = fmt::format("{} different, {} the same", result.different, result.same),
           .target = target};
 }
 
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, Lacking lacking,
-                           const std::string& target, Context& context) {
+                           const std::string& target, Context& context,
+                           const std::vector<report::Field>& more) {
   const auto& [a, b] = sides;
   TRY_LET(const auto selection, Selection::make(options.patterns, options.ignored, a.profile));
   const auto comparison = catalogue::compare(a.snapshot, b.snapshot, selection, lacking);
@@ -109,8 +127,12 @@ Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options, L
       listing.add(error);
     }
   }
-  return finish(listing, result.outcome, diff_summary(result, target), context)
-      .map([&](const Outcome&) { return result; });
+  Summary summary = diff_summary(result, target);
+  summary.counts.push_back({"state", std::string(state_of(result))});
+  summary.counts.insert(summary.counts.end(), more.begin(), more.end());
+  return finish(listing, result.outcome, std::move(summary), context).map([&](const Outcome&) {
+    return result;
+  });
 }
 
 }  // namespace spindle::commands

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "diff_side.hpp"
 #include "listing.hpp"
@@ -27,9 +28,11 @@ struct DiffResult {
 };
 
 /// Lists what differs, and what could not be read. `target` is the tool that it is told of; empty:
-/// none. Error `usage` where nothing could be compared, which proves nothing.
+/// none. `more` stands in the summary. Error `usage` where nothing could be compared, which proves
+/// nothing.
 Result<DiffResult> compare(const ReadSides& sides, const DiffOptions& options,
-                           catalogue::Lacking lacking, const std::string& target, Context& context);
+                           catalogue::Lacking lacking, const std::string& target, Context& context,
+                           const std::vector<report::Field>& more = {});
 
 Summary diff_summary(const DiffResult& result, const std::string& target);
 

@@ -19,12 +19,22 @@ Error unanswerable(std::string_view what) {
           .hint = "add --yes when you are sure"};
 }
 
+/// The question behind what it is about, in one piece.
+std::string on_one_line(std::string_view what, std::string_view question, std::size_t columns) {
+  std::string text = report::wrapped(fmt::format("{}.", what), columns);
+  const std::size_t begin = text.rfind('\n');
+  const std::size_t width = text.size() - (begin == std::string::npos ? 0 : begin + 1);
+  constexpr std::size_t answer = 16;  // stands behind it
+  const bool fits = width + 1 + question.size() + answer <= columns;
+  return text + (fits ? " " : "\n  ") + std::string(question);
+}
+
 /// What the user typed; empty: --yes answers.
 Result<std::optional<std::string>> ask(std::string_view what, std::string_view question,
                                        const Context& context) {
   if (context.user.consent == Consent::given) return std::nullopt;
   if (!can_ask(context)) return tl::unexpected(unanswerable(what));
-  context.io.err(fmt::format("{}. {} ", what, question));
+  context.io.err(on_one_line(what, question, report::columns_of(context.io)) + " ");
   const auto answer = context.io.read_line();
   if (answer) return *answer;
   context.io.err("\n");  // behind a question without an answer, the terminal's line goes on

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <optional>
 #include <utility>
 
 #include "backup_paths.hpp"
 #include "comparison.hpp"
+#include "drift.hpp"
 #include "dump_diff.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
@@ -31,8 +33,14 @@ struct Counterpart {
 struct Counterparts {
   BackupPaths backups = {};
   DiffSide side = {};
-  bool is_first = false;  ///< the other side is A
+  bool is_first = false;                ///< the other side is A
+  bool is_group = false;                ///< every tool gets a line of its own at the end
+  std::vector<std::string> extra = {};  ///< files of no tool
 };
+
+std::string serial_of(const catalogue::Snapshot& snapshot) {
+  return snapshot.identity ? snapshot.identity->serial : std::string();
+}
 
 /// What it refers to does not change while it runs.
 class Diff final : public Verb<Counterpart, DiffResult> {
@@ -52,38 +60,55 @@ class Diff final : public Verb<Counterpart, DiffResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
+    auto done = compare_tool(tool, plan, context);
+    if (!done && counterparts_->is_group) {
+      tell_not_compared(tool.target, done.error(), backup_of(tool.target), context);
+    }
+    return done;
+  }
+
+  Result<Done> give_up(const Target& target, const Plan* /*plan*/, const Error& error,
+                       Context& context) const override {
+    tell_not_compared(target, error, backup_of(target), context);
+    return tl::unexpected(error);
+  }
+
+  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
+    return drift_summary(all.done, all.tools, counterparts_->extra);
+  }
+
+ private:
+  /// Path of the backup of a tool; empty: it is compared with another side.
+  [[nodiscard]] std::string backup_of(const Target& target) const {
+    const auto found = counterparts_->backups.find(target.shown);
+    return found == counterparts_->backups.end() ? std::string() : found->second;
+  }
+
+  Result<Done> compare_tool(OpenTool& tool, const Plan& plan, Context& context) const {
     TRY_LET(auto own, read_tool(tool, context));
     TRY_LET(
         auto other, plan.content ? Result<SideContent>(*plan.content) : [&] {
           tool.device.disconnect();  // the other one may be on the same line
           return read_tool(*plan.side.target, context);
         }());
+    const std::string own_serial = serial_of(own.snapshot);
     ReadSides sides{std::move(own), std::move(other)};
     if (counterparts_->is_first) std::swap(sides.a, sides.b);
-    return compare(sides, *options_, lacking_of(plan.side), tool.target.shown, context);
+    return compare(sides, *options_, lacking_of(plan.side), tool.target.shown, context,
+                   counterparts_->backups.empty()
+                       ? std::vector<report::Field>()
+                       : tell_serials({.tool = own_serial,
+                                       .backup = serial_of(plan.content->snapshot),
+                                       .file = plan.side.text},
+                                      tool.target, context));
   }
 
-  [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
-    DiffResult sum;
-    std::size_t failed = 0;
-    for (const auto& done : all.done) {
-      if (!done || done->outcome.failed() > 0) ++failed;
-      if (!done) continue;
-      sum.different += done->different;
-      sum.same += done->same;
-    }
-    Summary summary = diff_summary(sum, {});
-    summary.sentence +=
-        fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
-    return summary;
-  }
-
- private:
   [[nodiscard]] Result<DiffSide> find_backup(const Target& target) const {
     const std::string& path = counterparts_->backups.at(target.shown);
-    return read_backup_file(path, *context_).map([&](files::BackupFile file) {
-      return DiffSide{.text = path, .file = std::move(file)};
-    });
+    return read_backup_of(target, path, options_->folder, *context_)
+        .map([&](files::BackupFile file) {
+          return DiffSide{.text = path, .file = std::move(file)};
+        });
   }
 
   /// Reads the other side as far as no tool has to be asked; `profile` says the defaults.
@@ -130,11 +155,18 @@ Result<Outcome> diff_sides(const DiffOptions& options, Context& context) {
 }
 
 Result<Outcome> diff_with_backups(const DiffOptions& options, Context& context) {
-  TRY_LET(auto targets, resolve_one_or_group(options.a, Addressing::unicast, context));
+  TRY_LET(auto targets, resolve_one_or_group({options.a}, Addressing::unicast, context));
   TRY_LET(auto paths, check_names_only(options.patterns, context).and_then([&] {
     return paths_in_folder(targets.tools, options.folder);
   }));
-  const Counterparts backups{.backups = std::move(paths)};
+  Counterparts backups{.backups = std::move(paths), .is_group = targets.is_group};
+  if (targets.is_group) {
+    backups.extra = files_of_no_tool(backups.backups, options.folder, context);
+  }
+  if (!backups.extra.empty()) {
+    context.renderer.note(
+        fmt::format("of no tool in the tools file: {}", fmt::join(backups.extra, ", ")));
+  }
   return run_verb(Diff(options, backups, context), targets, options.jobs, context);
 }
 

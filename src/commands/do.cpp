@@ -5,6 +5,7 @@
 
 #include "actions.hpp"
 #include "change_log.hpp"
+#include "find_block.hpp"
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
@@ -29,7 +30,10 @@ Result<void> check_guard(const ActionRequest& request, const Profile& profile) {
       .hint = profile.is_guarded_start(request.action.name)
                   ? "'spindle remote-start' starts it under a guard that always ends in a stop"
                   : "",
-      .name = request.action.name});
+      .name = request.action.name,
+      .remedy = {.right = profile.is_guarded_start(request.action.name)
+                              ? "spindle remote-start TARGET"
+                              : ""}});
 }
 
 Result<std::vector<ActionRequest>> check_deeds(const DoOptions& options, const Profile& profile,
@@ -64,6 +68,8 @@ Result<Outcome> list_actions(const Target& target, Context& context) {
     listing.add(action_record(action, target.shown, context.clock));
     outcome.succeed();
   }
+  const std::string search = search_in_words(profile, target);
+  if (!search.empty()) context.renderer.note(search);
   return finish(listing, outcome, listed(outcome, target.shown), context);
 }
 
@@ -96,6 +102,11 @@ class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
 
   [[nodiscard]] bool changes_tools() const override { return true; }
 
+  [[nodiscard]] std::string_view otherwise(const std::string& word,
+                                           const Profile& profile) const override {
+    return profile.find_action(word) ? "an action" : "";
+  }
+
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
     return check_deeds(*options_, profile, target);
   }
@@ -117,7 +128,8 @@ class Do final : public Verb<std::vector<ActionRequest>, Outcome> {
       }
       outcome.succeed();
     }
-    return finish(listing, outcome, summary_of(outcome, tool.target.addressing, tool.target.shown),
+    return finish(listing, outcome,
+                  with_change(summary_of(outcome, tool.target.addressing, tool.target.shown), log),
                   context);
   }
 
@@ -159,9 +171,10 @@ Result<Outcome> list_all_actions(const Targets& targets, const DoOptions& option
 }  // namespace
 
 Result<Outcome> perform(const DoOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, options.addressing, context)
+  return resolve_one_or_group(options.targets, options.addressing, context)
       .and_then([&](const Targets& targets) {
         if (options.actions.empty()) return list_all_actions(targets, options, context);
+        if (wants_search(options, targets, context)) return find_block(options, targets, context);
         return run_verb(Do(options, targets.is_group), targets, options.jobs, context);
       });
 }

@@ -2,31 +2,57 @@
 
 #include <fmt/ranges.h>
 
+#include <utility>
+
 #include "spindle/base/text.hpp"
 #include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
 
-Result<Targets> resolve_one_or_group(const std::string& text, Addressing addressing,
+Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addressing addressing,
                                      const Context& context) {
-  auto tools = resolve_compatible_targets({text}, context);
+  auto tools = resolve_compatible_targets(texts, context);
   if (!tools) return tl::unexpected(std::move(tools.error()));
   if (addressing == Addressing::broadcast && tools->size() > 1) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("--broadcast is for everybody on one serial line, and '{}' is "
                                      "{} tools",
-                                     text, tools->size()),
+                                     fmt::join(texts, " "), tools->size()),
               .hint = "name the line, as in rtu:///dev/ttyUSB0?unit=0, or leave out --broadcast"});
   }
   for (Target& target : *tools) target.addressing = addressing;
+  const bool are_several = texts.size() > 1 || names_group(texts.front()) ||
+                           context.user.choice == TargetChoice::by_default;
   return Targets{.tools = std::move(*tools),
-                 .is_group = names_group(text) && addressing == Addressing::unicast};
+                 .is_group = are_several && addressing == Addressing::unicast};
+}
+
+Error doubtful(const std::string& word, std::string_view what, const Context& context) {
+  Error error{.code = Errc::usage,
+              .message = fmt::format("'{}' is the name of a tool, and of {}", word, what),
+              .hint = "behind -- no word is a tool"};
+  error.remedy.right = "spindle";
+  bool is_marked = false;
+  for (const std::string& typed : context.io.typed) {
+    if (typed == word && !std::exchange(is_marked, true)) error.remedy.right += " --";
+    error.remedy.right += " " + shell_word(typed);
+  }
+  return error;
 }
 
 Targets reopening(Targets targets) {
   for (Target& target : targets.tools) target = reopening(std::move(target));
   return targets;
+}
+
+void tell_caution(const OpenTool& tool, const Context& context) {
+  const auto& identity = tool.device.identity();
+  if (!identity || !tool.profile->identity) return;
+  const std::string caution = catalogue::caution_of(*tool.profile->identity, *identity);
+  if (caution.empty()) return;
+  context.renderer.note(fmt::format("warning: {}: firmware {}: {}", tool.target.shown,
+                                    identity->firmware.value_or(0), caution));
 }
 
 Result<void> begin_turn(const Target& target, const Context& context) {

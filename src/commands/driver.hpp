@@ -19,9 +19,13 @@
 /// waiting.
 namespace spindle::commands {
 
-/// What one name, @group or URL means; a broadcast has one target, which is everybody.
-Result<Targets> resolve_one_or_group(const std::string& text, Addressing addressing,
+/// What names, @groups and URLs mean; a broadcast has one target, which is everybody. The default
+/// target counts as a group of one: its name is told, and what changes it is asked about.
+Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addressing addressing,
                                      const Context& context);
+
+/// Error `usage` where a word that was taken for a tool may also mean something else.
+Error doubtful(const std::string& word, std::string_view what, const Context& context);
 
 /// The same targets, whose connections are opened once more where the tools close them.
 Targets reopening(Targets targets);
@@ -34,6 +38,9 @@ std::string tools_in_words(const std::vector<std::string>& names, std::size_t of
 
 /// "; 1 of 3 tools failed"; empty where none did.
 std::string failed_in_words(std::size_t failed, std::size_t of);
+
+/// Before something is written: what the profile says of a tool with this firmware.
+void tell_caution(const OpenTool& tool, const Context& context);
 
 /// Whether such a failure says that the request is wrong rather than that the tool is not there.
 bool rejects_all(const Error& error);

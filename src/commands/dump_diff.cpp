@@ -26,14 +26,15 @@ using catalogue::Parameter;
 using catalogue::Profile;
 using report::Align;
 
-const std::array<report::Column, 8> columns = {{{"NAME", "name"},
-                                                {"TABLE", "table"},
-                                                {"REGISTER", "register", Align::right},
-                                                {"A", "a", Align::right},
-                                                {"B", "b", Align::right},
-                                                {"UNIT", "unit"},
-                                                {"RAW A", "raw_a", Align::right},
-                                                {"RAW B", "raw_b", Align::right}}};
+const std::array<report::Column, 8> columns = {
+    {{"NAME", "name"},
+     {"TABLE", "table", Align::left, 0, report::left_out(1)},
+     {"REGISTER", "register", Align::right},
+     {"A", "a", Align::right},
+     {"B", "b", Align::right},
+     {"UNIT", "unit"},
+     {"RAW A", "raw_a", Align::right, 0, report::left_out(2)},
+     {"RAW B", "raw_b", Align::right, 0, report::left_out(2)}}};
 
 using Place = std::pair<modbus::RegisterTable, std::uint32_t>;
 /// What one side holds.

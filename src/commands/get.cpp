@@ -3,6 +3,7 @@
 #include "listing.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/commands/commands.hpp"
 
 namespace spindle::commands {
@@ -10,19 +11,43 @@ namespace {
 
 bool is_raw(const std::string& name) { return name.starts_with('@'); }
 
+/// Whether one of these raw registers is a secret of some product: then the tool is asked first
+/// what it is.
+bool may_be_secret(const std::vector<std::string>& names, const Context& context) {
+  const auto wanted = catalogue::Profile().describe(names);
+  if (!wanted) return false;
+  for (const catalogue::Profile& profile : context.profiles.load_all()) {
+    for (const catalogue::Parameter& secret : profile.parameters) {
+      if (secret.secrecy == catalogue::Secrecy::open) continue;
+      const bool is_wanted = std::any_of(
+          wanted->begin(), wanted->end(),
+          [&](const catalogue::Parameter& raw) { return catalogue::share_registers(raw, secret); });
+      if (is_wanted) return true;
+    }
+  }
+  return false;
+}
+
 class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
  public:
-  explicit Get(const GetOptions& options) : options_(&options) {}
-
-  [[nodiscard]] Need need() const override {
-    const auto& names = options_->names;
+  Get(const GetOptions& options, const Context& context) : options_(&options) {
+    const auto& names = options.names;
     const bool raw_only = !names.empty() && std::all_of(names.begin(), names.end(), is_raw);
-    return raw_only ? Need::raw_registers : Need::named_registers;
+    if (!raw_only) return;
+    need_ = may_be_secret(names, context) ? Need::raw_secrets : Need::raw_registers;
   }
+
+  [[nodiscard]] Need need() const override { return need_; }
   [[nodiscard]] Fit fit() const override { return Fit::one; }
 
   Result<Plan> plan(const catalogue::Profile& profile, const Target& /*target*/) const override {
-    return profile.select(options_->names);
+    return catalogue::meant_by(options_->names, profile)
+        .and_then([&](const std::vector<std::string>& names) { return profile.select(names); });
+  }
+
+  [[nodiscard]] std::string_view otherwise(const std::string& word,
+                                           const catalogue::Profile& profile) const override {
+    return catalogue::is_meant(word, profile) ? "a parameter" : "";
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
@@ -32,7 +57,7 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
     for (const device::Reading& reading : readings) {
       if (reading.value) {
         outcome.succeed();
-        listing.add(value_record(reading, tool.target, context.clock, options_->limits));
+        listing.add(value_record(reading, tool.target, context.clock, *options_));
       } else {
         outcome.fail(reading.value.error());
         listing.add(reading.value.error());
@@ -43,14 +68,16 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
 
  private:
   const GetOptions* options_;
+  Need need_ = Need::named_registers;
 };
 
 }  // namespace
 
 Result<Outcome> get(const GetOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, Addressing::unicast, context)
+  return resolve_one_or_group(options.targets, Addressing::unicast, context)
       .and_then([&](Targets targets) {
-        return run_verb(Get(options), reopening(std::move(targets)), options.jobs, context);
+        return run_verb(Get(options, context), reopening(std::move(targets)), options.jobs,
+                        context);
       });
 }
 

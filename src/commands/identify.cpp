@@ -10,7 +10,7 @@
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/work/identification.hpp"
+#include "spindle/work/meeting.hpp"
 #include "spindle/work/shared_lines.hpp"
 
 namespace spindle::commands {
@@ -19,11 +19,12 @@ namespace {
 using report::Cell;
 using report::Column;
 
-const std::array<Column, 5> columns = {{{"MODEL", "tool_model"},
-                                        {"SERIAL", "serial"},
-                                        {"FIRMWARE", "firmware"},
-                                        {"PROFILE", "profile"},
-                                        {"ROUND TRIP", "round_trip_ms"}}};
+const std::array<Column, 5> columns = {
+    {{"MODEL", "tool_model"},
+     {"SERIAL", "serial"},
+     {"FIRMWARE", "firmware", report::Align::left, 0, report::left_out(2)},
+     {"PROFILE", "profile"},
+     {"ROUND TRIP", "round_trip_ms", report::Align::left, 0, report::left_out(1)}}};
 
 /// One tool's answer, or why there is none.
 struct Identified {
@@ -34,6 +35,13 @@ struct Identified {
 template <typename Number>
 Cell number_or_null(const std::optional<Number>& value) {
   return value ? number(static_cast<std::int64_t>(*value)) : Cell();
+}
+
+/// "4002 (4.0.2)" where the tool says both.
+std::string shown_firmware(const catalogue::Identity& identity) {
+  if (!identity.firmware) return {};
+  const std::string number = std::to_string(*identity.firmware);
+  return identity.version.empty() ? number : fmt::format("{} ({})", number, identity.version);
 }
 
 report::Record identity_record(const OpenTool& tool, const Identification& found,
@@ -55,18 +63,11 @@ report::Record identity_record(const OpenTool& tool, const Identification& found
                      {"controller_model_code", number_or_null(identity.controller_model_code)},
                      {"id", number_or_null(identity.id)},
                      {"serial", text_or_null(identity.serial)},
-                     {"firmware", number_or_null(identity.firmware)},
+                     {"firmware", number_or_null(identity.firmware), shown_firmware(identity)},
                      {"raw", to_compact_hex(identity.raw)},
                      {"round_trip_ms", milliseconds(round_trip), tenths.to_string() + " ms"},
                      {"notes", identity.notes},
                      {"total_fastenings", number_or_null(identity.total)}}};
-}
-
-std::optional<Error> misfit_of(const Target& target, const Identification& found) {
-  if (target.profile.empty() || !found.candidates.empty()) return std::nullopt;
-  return Error{.code = Errc::mismatch,
-               .message = fmt::format("this is not what profile {} describes: {}", target.profile,
-                                      fmt::join(found.identity.notes, "; "))};
 }
 
 /// The table has no room for notes, so people get them as sentences.
@@ -78,49 +79,19 @@ void tell_notes(const Identified& identified, const Context& context) {
   }
 }
 
-/// One exchange that touches nothing. A device that knows only reads and writes of registers stays
-/// silent to others, so its first parameter is read.
-Result<Duration> meet_once(OpenTool& tool) {
-  auto round_trip = tool.device.ping();
-  const bool silent = !round_trip && round_trip.error().code == Errc::no_answer;
-  const auto readable = tool.profile->select({});  // nothing that reading clears
-  if (!silent || tool.profile->link.loopback || !readable || readable->empty()) return round_trip;
-  const auto read = tool.device.read_each({readable->front()}, device::Limits::skip);
-  if (!read) return tl::unexpected(read.error());
-  return tool.device.session().last_round_trip();
-}
-
-/// A product without an identity can only be met, not proven.
-Result<Identified> meet(OpenTool& tool, const Clock& clock) {
-  TRY_LET(const auto round_trip, meet_once(tool));
-  Identification found;
-  found.profile = tool.profile->id;
-  found.candidates = {tool.profile->id};
-  found.maker = tool.profile->maker;
-  found.series = tool.profile->series;
-  found.identity.notes.push_back(fmt::format(
-      "{}, but {} cannot prove what it is: profile {} is what the user named",
-      tool.profile->link.loopback ? "answers a loop-back" : "answers",
-      tool.profile->series.empty() ? "it" : with_article(tool.profile->series), tool.profile->id));
-  if (auto words = motor_state_words(tool); !words.empty()) {
-    found.identity.notes.push_back(std::move(words));
-  }
-  return Identified{identity_record(tool, found, round_trip, clock), std::nullopt};
-}
-
 Result<Identified> identify_one(OpenTool& tool, const Context& context) {
-  const Target& target = tool.target;
-  // What says nothing of an identity cannot be contradicted by one.
-  const bool named = !target.profile.empty();
-  if (named && !tool.profile->identity) return meet(tool, context.clock);
-  if (!named && target.endpoint.medium != link::Medium::tcp) {
-    return tl::unexpected(unproven(target));
+  TRY_LET(auto met, work::meet(tool, context));
+  if (!met.is_proven) {
+    if (auto words = motor_state_words(tool); !words.empty()) {
+      met.found.identity.notes.push_back(std::move(words));
+    }
   }
-  TRY_LET(const auto answer, tool.device.report_server_id());
-  const Duration round_trip = tool.device.session().last_round_trip();
-  TRY_LET(const auto found, match_identity(answer, target.profile, context));
-  return Identified{identity_record(tool, found, round_trip, context.clock),
-                    misfit_of(target, found)};
+  Identified identified{identity_record(tool, met.found, met.round_trip, context.clock),
+                        std::move(met.misfit)};
+  if (const std::string& version = met.found.identity.version; !version.empty()) {
+    identified.record.fields.push_back({"firmware_version", version});
+  }
+  return identified;
 }
 
 class Identify final : public Verb<std::monostate, Outcome> {

@@ -1,7 +1,16 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "list_fold.hpp"
 #include "listing.hpp"
 #include "records.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/work/connect.hpp"
+#include "spindle/work/default_target.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -24,9 +33,16 @@ catalogue::Profile with_units_of(const Target& target, catalogue::Profile profil
 }
 
 /// Without a tool there is nothing to ask: the profile's own words.
-Result<Subject> offline(const ListOptions& options, const Context& context) {
-  TRY_LET(auto profile, context.profiles.load(context.common.profile));
-  return Subject{{}, std::move(profile), options.arguments};
+Result<Subject> offline(const std::string& name, std::vector<std::string> patterns,
+                        const Context& context) {
+  TRY_LET(auto profile, context.profiles.load(name));
+  return Subject{{}, std::move(profile), std::move(patterns)};
+}
+
+bool is_profile(const std::string& word, const Context& context) {
+  const auto profiles = context.profiles.list();
+  return std::any_of(profiles.begin(), profiles.end(),
+                     [&](const files::ProfileEntry& entry) { return entry.id == word; });
 }
 
 Result<Subject> of_target(const ListOptions& options, const Context& context) {
@@ -44,31 +60,62 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
   const bool has_target =
       !options.arguments.empty() && is_target(options.arguments.front(), context);
   if (has_target) return of_target(options, context);
-  if (!context.common.profile.empty()) return offline(options, context);
+  if (!context.common.profile.empty()) {
+    return offline(context.common.profile, options.arguments, context);
+  }
+  if (!options.arguments.empty() && is_profile(options.arguments.front(), context)) {
+    return offline(options.arguments.front(),
+                   {options.arguments.begin() + 1, options.arguments.end()}, context);
+  }
+  TRY_LET(const auto usual, work::default_target(context));
+  if (usual) {
+    ListOptions of_usual = options;
+    of_usual.arguments.insert(of_usual.arguments.begin(), usual->text);
+    return of_target(of_usual, context);
+  }
   if (!options.arguments.empty()) return of_target(options, context);
   return tl::unexpected(Error{.code = Errc::usage,
                               .message = "list what? neither a target nor a profile is named",
-                              .hint =
-                                  "try 'spindle list --profile doga-bm'; 'spindle profile list' "
-                                  "shows all profiles"});
+                              .hint = "try 'spindle list doga-bm'; 'spindle profile list' "
+                                      "shows all profiles"});
+}
+
+/// People who ask for nothing particular see once what is there several times.
+std::vector<report::Record> without_repeats(std::vector<report::Record> records,
+                                            const Subject& subject, const Context& context) {
+  if (!report::is_table(context.user.format) || !subject.patterns.empty()) return records;
+  FoldedList list = fold(std::move(records));
+  if (!list.folded.empty()) {
+    const std::string& one = list.folded.front();
+    context.renderer.note(fmt::format("told once: {}; '{}.*' lists one of them",
+                                      fmt::join(list.folded, ", "), one.substr(0, one.find('-'))));
+  }
+  return std::move(list.records);
 }
 
 }  // namespace
 
 Result<Outcome> list(const ListOptions& options, Context& context) {
   TRY_LET(const auto subject, subject_of(options, context));
-  auto parameters = subject.profile.describe(subject.patterns);
+  auto parameters = catalogue::meant_by(subject.patterns, subject.profile)
+                        .and_then([&](const std::vector<std::string>& names) {
+                          return subject.profile.describe(names);
+                        });
   if (!parameters) {
     parameters.error().asked_of = subject.target;
     return tl::unexpected(std::move(parameters.error()));
   }
   Outcome outcome;
   const auto columns = parameter_columns(*parameters);
-  Listing listing(context, columns);
+  std::vector<report::Record> records;
+  records.reserve(parameters->size());
   for (const catalogue::Parameter& parameter : *parameters) {
-    listing.add(parameter_record(parameter, subject.target, context.clock));
+    records.push_back(parameter_record(parameter, subject.target, context.clock));
     outcome.succeed();
   }
+  records = without_repeats(std::move(records), subject, context);
+  Listing listing(context, columns);
+  for (const report::Record& record : records) listing.add(record);
   return finish(listing, outcome);
 }
 

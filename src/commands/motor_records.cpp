@@ -65,12 +65,13 @@ report::Record motor_record(const device::MotorTransition& news, const Target& t
 
 std::vector<report::Column> motor_columns(Tools tools) {
   using report::Align;
-  std::vector<report::Column> columns = {{"TIME", "time", Align::left, 24}};
-  if (tools == Tools::several) columns.push_back({"TARGET", "target", Align::left, 16});
+  std::vector<report::Column> columns = {{"TIME", "time", Align::left, 24, report::wrapped(14)}};
+  if (tools == Tools::several)
+    columns.push_back({"TARGET", "target", Align::left, 16, report::wrapped(12)});
   columns.insert(columns.end(), {{"KIND", "kind", Align::left, 8},
                                  {"SPEED", "speed", Align::right, 6},
                                  {"LOAD", "load", Align::right, 4},
-                                 {"TEXT", "text", Align::left, 1}});
+                                 {"TEXT", "text", Align::left, 1, report::below_row()}});
   return columns;
 }
 

@@ -51,6 +51,9 @@ class MotorRun final : public ToolRun {
     });
   }
   [[nodiscard]] std::vector<report::Column> columns() const override {
+    if (context().user.format == report::Format::csv) {
+      return exchange_columns({tool().profile.get()});
+    }
     return motor_columns(Tools::one);
   }
   [[nodiscard]] work::LoggedChange start_change() const override {

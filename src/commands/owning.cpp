@@ -106,7 +106,8 @@ Result<Outcome> hold_tools(const ServeOptions& options, Context& context) {
   // A tool that says nothing of itself can be held as well.
   static const std::vector<std::string> any_register = {"@holding:0"};
   ProfileShelf shelf(context.profiles);
-  TRY_LET(const auto resolved, resolve_targets(options.targets, context));
+  TRY_LET(auto resolved, resolve_targets(options.targets, context));
+  const std::vector<Error> faults = take_out_faulty(resolved);
   TRY_LET(auto tools, prepare_tools(resolved, any_register, shelf, context));
   std::vector<Target> targets;
   for (const WatchedTool& tool : tools) targets.push_back(tool.target());
@@ -115,6 +116,11 @@ Result<Outcome> hold_tools(const ServeOptions& options, Context& context) {
     const std::lock_guard lock(speaking);
     context.renderer.note(sentence);
   };
+  Outcome outcome;
+  for (const Error& fault : faults) {
+    outcome.fail(fault);
+    TRY(context.renderer.error(fault, context.clock.wall()));
+  }
   OwnedLines lines(targets, context, note);
   TRY(let_others_ask(lines, {.listen = options.listen, .rights = options.rights}, note));
   const device::OpenTransport open = lines.opener();
@@ -129,7 +135,6 @@ Result<Outcome> hold_tools(const ServeOptions& options, Context& context) {
     Holding& holding = *held[static_cast<std::size_t>(&tool - tools.data())];
     watch_tool(tool, open, plan, device::Reconnection::whatever, holding, context);
   });
-  Outcome outcome;
   for (const auto& holding : held) {
     if (!holding->failure()) {
       outcome.succeed();

@@ -152,7 +152,7 @@ class Ping final : public Verb<std::monostate, Statistics> {
 }  // namespace
 
 Result<Outcome> ping(const PingOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, Addressing::unicast, context)
+  return resolve_one_or_group(options.targets, Addressing::unicast, context)
       .and_then([&](const Targets& targets) {
         return run_verb(Ping(options), targets, options.jobs, context);
       });

@@ -13,11 +13,12 @@ namespace {
 using report::Column;
 using report::Record;
 
-const std::array<Column, 5> profile_columns = {{{"PROFILE", "profile"},
-                                                {"TITLE", "title"},
-                                                {"PARAMETERS", "parameters", report::Align::right},
-                                                {"ACTIONS", "actions", report::Align::right},
-                                                {"FILE", "file"}}};
+const std::array<Column, 5> profile_columns = {
+    {{"PROFILE", "profile"},
+     {"TITLE", "title", report::Align::left, 0, report::wrapped(20)},
+     {"PARAMETERS", "parameters", report::Align::right},
+     {"ACTIONS", "actions", report::Align::right, 0, report::left_out(2)},
+     {"FILE", "file", report::Align::left, 0, report::left_out(1)}}};
 
 Record profile_record(const catalogue::Profile& profile, const Clock& clock) {
   return {

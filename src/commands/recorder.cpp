@@ -189,6 +189,12 @@ device::RecordHooks RecordedTool::hooks() {
 
 void RecordedTool::record(const device::ToolEvent& news) {
   store::Event row = rows_->row(news);
+  if (!adopt_unit(news.block)) {
+    // A number with another unit would be a wrong one. The block has them all.
+    for (const auto& [word, column] : store::column_words) {
+      if (work::is_torque(column)) row.columns[column].reset();
+    }
+  }
   row.tool = *tool_;
   row.place = place_;
   auto begins = epochs_.begins();
@@ -213,6 +219,46 @@ void RecordedTool::record(const device::ToolEvent& news) {
           recorder_->counters().note_stored(entry_.shown, *event.gap);
           tell_stream(work::news_of(*event.gap), serial, stored.epoch, stored.gap);
         }
+        tell_stream(news, serial, stored.epoch, stored.id);
+      });
+}
+
+/// An event is of a place whose torques have its unit. False where there is none and it cannot be
+/// made.
+bool RecordedTool::adopt_unit(const Registers& block) {
+  const std::string unit = voice_.records->torque_unit_of(block);
+  if (unit == place_row_.torque_unit) return true;
+  store::Place other = place_row_;
+  other.torque_unit = unit;
+  other.since = now();
+  const auto place = recorder_->writer().place(other);
+  if (!place) return false;
+  place_row_ = std::move(other);
+  place_ = *place;
+  return true;
+}
+
+/// It goes behind its event. What belongs to none is told, and not kept.
+void RecordedTool::record(const device::ToolCurve& news) {
+  if (!news.block || !news.number || !tool_) {
+    tell_stream(news, serial_, 0, 0);
+    return;
+  }
+  report::Record header = voice_.records->curve_header(news, {.serial = serial_});
+  const report::Field* sampling = header.find("sampling_ms");
+  const auto* interval = sampling == nullptr ? nullptr : std::get_if<Decimal>(&sampling->cell);
+  constexpr std::int64_t us_in_ms = 1000;
+  store::Curve curve = {
+      .interval_us =
+          interval == nullptr ? 0 : interval->divided_by(Decimal(1)).value_or(0) * us_in_ms,
+      .channels = report::to_json(header)};
+  for (const Bytes& channel : news.channels) {
+    curve.samples.insert(curve.samples.end(), channel.begin(), channel.end());
+  }
+  recorder_->journal().add(
+      store::NewCurve{.tool = *tool_, .number = *news.number, .curve = std::move(curve)},
+      [this, news, serial = serial_](const store::Entry&, const store::Stored& stored) {
+        if (stored.as == store::Stored::As::known) return;
         tell_stream(news, serial, stored.epoch, stored.id);
       });
 }
@@ -316,14 +362,15 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   TRY_LET(const auto tool, writer.tool(name, identity ? identity->tool_model : std::string()));
   const std::optional<std::uint32_t> firmware = identity ? identity->firmware : std::nullopt;
   TRY_LET(const auto number_of_lease, fence());
-  TRY_LET(const auto place, writer.place({.tool = tool,
-                                          .name = target_.shown,
-                                          .url = target_.endpoint.text,
-                                          .profile = profile_->id.to_string(),
-                                          .firmware = firmware,
-                                          .torque_unit = target_.torque_unit,
-                                          .since = now(),
-                                          .fence = number_of_lease}));
+  const store::Place row = {.tool = tool,
+                            .name = target_.shown,
+                            .url = target_.endpoint.text,
+                            .profile = profile_->id.to_string(),
+                            .firmware = firmware,
+                            .torque_unit = target_.torque_unit,
+                            .since = now(),
+                            .fence = number_of_lease};
+  TRY_LET(const auto place, writer.place(row));
   TRY(recorder_->settle(tool, *this));
   TRY_LET(const auto last, known_last(tool, name));
   {
@@ -340,6 +387,7 @@ Result<device::RecordedPast> RecordedTool::register_tool(device::Device& device)
   }
   tool_ = tool;
   place_ = place;
+  place_row_ = row;
   is_informed_ = true;
   flush_link();
   // Where events still wait to be stored, the last one that is stored is none to count from.

@@ -109,12 +109,14 @@ class RecordedTool final : public Listener {
   void record(const device::PolledValue& news);
   void record(const device::PollLag& news);
   void record(const device::MotorTransition& news);
+  void record(const device::ToolCurve& news);
 
   Result<device::RecordedPast> register_tool(device::Device& device);
   Result<std::optional<std::int64_t>> fence() const;
   Result<std::optional<store::Last>> known_last(store::RowId tool, const store::ToolName& name);
   void record_total(const catalogue::Identity& identity, const std::optional<store::Last>& last);
   std::optional<device::Errand> next_errand();
+  bool adopt_unit(const Registers& block);
   void want_settings(const device::ToolEvent& news);
   void want_settings(std::int64_t preset);
   void flush_gap();
@@ -138,6 +140,7 @@ class RecordedTool final : public Listener {
   const catalogue::Profile* profile_ = nullptr;
   std::optional<work::EventRows> rows_ = std::nullopt;
   std::optional<store::RowId> tool_ = std::nullopt;  ///< empty: never connected
+  store::Place place_row_ = {};                      ///< of `place_`
   store::RowId place_ = 0;
   std::string serial_ = {};
   work::EpochFollower epochs_ = {};

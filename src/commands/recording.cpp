@@ -94,8 +94,14 @@ Result<void> RecordingRenderer::error(const Error& error, WallTime time) {
 }
 
 std::vector<report::Column> with_target_column(std::span<const report::Column> columns) {
-  std::vector<report::Column> all = {{"TARGET", "target"}};
-  all.insert(all.end(), columns.begin(), columns.end());
+  std::vector<report::Column> all(columns.begin(), columns.end());
+  const auto known = std::find_if(all.begin(), all.end(),
+                                  [](const report::Column& one) { return one.key == "target"; });
+  if (known == all.end()) {
+    all.insert(all.begin(), {"TARGET", "target"});
+  } else {
+    known->room.shown = report::Shown::always;
+  }
   return all;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "spindle/base/text.hpp"
+#include "spindle/commands/commands.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -16,6 +17,8 @@ using report::Align;
 using report::Cell;
 using report::Column;
 using report::Field;
+using report::left_out;
+using report::wrapped;
 
 Cell number_or_null(const std::optional<Decimal>& value) {
   return value ? Cell(*value) : Cell(std::monostate());
@@ -157,18 +160,23 @@ Cell milliseconds(Duration duration) {
 }
 
 report::Record value_record(const device::Reading& reading, const Target& target,
-                            const Clock& clock, device::Limits limits) {
+                            const Clock& clock, const GetOptions& options) {
   const Parameter& parameter = reading.parameter;
+  const bool is_hidden =
+      parameter.secrecy == catalogue::Secrecy::secret && options.secrets == Secrets::leave_out;
+  const auto& value = *reading.value;
   report::Record record{
       .type = "value", .target = target.shown, .time = clock.wall(), .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"table", std::string(catalogue::to_text(parameter.table))},
                    {"register", number(parameter.address.value)},
-                   {"raw", *reading.registers},
-                   {"value", value_cell(*reading.value), reading.value->to_string()},
-                   {"label", text_or_null(reading.value->label)},
+                   {"raw", is_hidden ? Registers() : *reading.registers},
+                   {"value", is_hidden ? Cell() : value_cell(value),
+                    is_hidden ? shown_of(parameter, value) : value.to_string()},
+                   {"label", is_hidden ? Cell() : text_or_null(value.label)},
                    {"unit", text_or_null(unit_of(parameter, target))}};
-  if (limits == device::Limits::read) {
+  if (is_hidden) record.fields.push_back({"secret", true, "yes"});
+  if (options.limits == device::Limits::read) {
     record.fields.push_back({"minimum", number_or_null(reading.minimum)});
     record.fields.push_back({"maximum", number_or_null(reading.maximum)});
   }
@@ -176,12 +184,17 @@ report::Record value_record(const device::Reading& reading, const Target& target
 }
 
 std::span<const Column> value_columns(device::Limits limits) {
-  static const std::array<Column, 5> columns = {{{"NAME", "name"},
+  using report::only_wide;
+  static const std::array<Column, 9> columns = {{{"TIME", "time", Align::left, 0, only_wide()},
+                                                 {"TARGET", "target", Align::left, 0, only_wide()},
+                                                 {"NAME", "name"},
                                                  {"VALUE", "value", Align::right},
                                                  {"UNIT", "unit"},
+                                                 {"RAW", "raw", Align::right, 0, only_wide()},
+                                                 {"LABEL", "label", Align::left, 0, only_wide()},
                                                  {"MINIMUM", "minimum", Align::right},
                                                  {"MAXIMUM", "maximum", Align::right}}};
-  return std::span(columns).first(limits == device::Limits::read ? 5 : 3);
+  return std::span(columns).first(limits == device::Limits::read ? 9 : 7);
 }
 
 report::Record parameter_record(const Parameter& parameter, const std::string& target,
@@ -219,23 +232,26 @@ report::Record parameter_record(const Parameter& parameter, const std::string& t
   if (parameter.hazard != catalogue::Hazard::none) {
     record.fields.push_back({"hazard", std::string(catalogue::to_text(parameter.hazard))});
   }
+  if (parameter.guarding == catalogue::Guarding::alone) record.fields.push_back({"guarded", true});
+  if (parameter.secrecy == catalogue::Secrecy::secret) record.fields.push_back({"secret", true});
   return record;
 }
 
 std::vector<Column> parameter_columns(std::span<const Parameter> parameters) {
   std::vector<Column> columns = {{{"NAME", "name"},
-                                  {"TABLE", "table"},
-                                  {"REGISTER", "register", Align::right},
-                                  {"TYPE", "encoding"},
+                                  {"TABLE", "table", Align::left, 0, left_out(1)},
+                                  {"REGISTER", "register", Align::right, 0, left_out(4)},
+                                  {"TYPE", "encoding", Align::left, 0, left_out(3)},
                                   {"MINIMUM", "minimum", Align::right},
                                   {"MAXIMUM", "maximum", Align::right},
                                   {"UNIT", "unit"},
-                                  {"ACCESS", "access"},
-                                  {"EVIDENCE", "evidence"},
-                                  {"MEANING", "title"}}};
+                                  {"ACCESS", "access", Align::left, 0, left_out(5)},
+                                  {"EVIDENCE", "evidence", Align::left, 0, left_out(2)},
+                                  {"MEANING", "title", Align::left, 0, wrapped(24)}}};
   const bool any = std::any_of(parameters.begin(), parameters.end(),
                                [](const Parameter& one) { return one.effect.has_value(); });
-  if (any) columns.insert(columns.end() - 1, {"TAKES EFFECT", "effect"});
+  if (any)
+    columns.insert(columns.end() - 1, {"TAKES EFFECT", "effect", Align::left, 0, left_out(6)});
   return columns;
 }
 
@@ -258,13 +274,14 @@ report::Record action_record(const catalogue::Action& action, const std::string&
 }
 
 std::span<const Column> action_columns() {
-  static const std::array<Column, 7> columns = {{{"ACTION", "action"},
-                                                 {"REGISTER", "register", Align::right},
-                                                 {"VALUES", "values"},
-                                                 {"HAZARD", "hazard"},
-                                                 {"EVIDENCE", "evidence"},
-                                                 {"SOURCE", "source"},
-                                                 {"MEANING", "title"}}};
+  static const std::array<Column, 7> columns = {
+      {{"ACTION", "action"},
+       {"REGISTER", "register", Align::right, 0, left_out(2)},
+       {"VALUES", "values", Align::left, 0, wrapped(16)},
+       {"HAZARD", "hazard"},
+       {"EVIDENCE", "evidence", Align::left, 0, left_out(3)},
+       {"SOURCE", "source", Align::left, 0, left_out(1)},
+       {"MEANING", "title", Align::left, 0, wrapped(24)}}};
   return columns;
 }
 

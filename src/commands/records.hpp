@@ -9,6 +9,8 @@
 
 namespace spindle::commands {
 
+struct GetOptions;
+
 using report::count;
 using report::number;
 using report::text_or_null;
@@ -19,9 +21,9 @@ report::Cell value_cell(const catalogue::Value& value);
 
 report::Cell milliseconds(Duration duration);
 
-/// The `value` record of a reading that succeeded.
+/// The `value` record of a reading that succeeded; of a secret only where it was asked for.
 report::Record value_record(const device::Reading& reading, const Target& target,
-                            const Clock& clock, device::Limits limits);
+                            const Clock& clock, const GetOptions& options);
 std::span<const report::Column> value_columns(device::Limits limits);
 
 report::Record parameter_record(const catalogue::Parameter& parameter, const std::string& target,

@@ -56,22 +56,24 @@ ReportZone zone_of(const Assessed& assessed, const Clock& clock) {
 }
 
 Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
-                        const ReportOptions& options, Context& context) {
+                        const ReportOptions& options, store::Reader& reader, Context& context) {
+  TRY_LET(const auto curves, load_curves(assessed, reader));
   const std::string page = report_page(assessed, {.zone = zone,
                                                   .made = context.clock.wall(),
                                                   .version = std::string(context.version),
-                                                  .options = options});
+                                                  .options = options,
+                                                  .curves = curves});
   if (options.file == standard_output) return context.io.out(page);
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
 Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
-                         const ReportOptions& options, Context& context) {
+                         const ReportOptions& options, store::Reader& reader, Context& context) {
   if (!options.file.empty()) {
-    auto written = write_page(assessed, zone, options, context);
+    auto written = write_page(assessed, zone, options, reader, context);
     if (!written) return written;
   }
-  if (context.user.format == report::Format::table) {
+  if (report::is_table(context.user.format)) {
     if (!options.file.empty()) return {};
     for (const std::string& line : report_lines(assessed, zone)) {
       auto told = context.renderer.line({}, line);
@@ -114,6 +116,18 @@ Summary summary_of(const Assessed& assessed, const ReportOptions& options) {
           .sentence = std::move(sentence)};
 }
 
+/// Limits of joints that are not known, as their tool's entry has a fault.
+void tell_faults(const Context& context) {
+  for (const files::Tool& tool : context.tools.tools) {
+    const auto fault = context.tools.faults.find(tool.name);
+    if (fault == context.tools.faults.end()) continue;
+    context.renderer.note(
+        fmt::format("warning: {}: limits of joints in the tools file are not used, as its entry "
+                    "has a fault: {}",
+                    tool.name, fault->second.message));
+  }
+}
+
 }  // namespace
 
 Result<Outcome> report(const ReportOptions& options, Context& context) {
@@ -131,6 +145,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   if (!reader) return tl::unexpected(std::move(reader.error()));
   const auto selection = select_for_report(options, **reader, context);
   if (!selection) return tl::unexpected(selection.error());
+  tell_faults(context);
 
   work::Study study(selection->facts, *study_options, std::move(*exclusions));
   auto read = (*reader)->events(selection->filter, [&](const store::EventView& event) {
@@ -149,7 +164,7 @@ Result<Outcome> report(const ReportOptions& options, Context& context) {
   Outcome outcome;
   outcome.succeed();
   if (!assessed.unmet.empty()) outcome.negate();
-  return tell_report(assessed, zone, options, context)
+  return tell_report(assessed, zone, options, **reader, context)
       .and_then([&] { return tell(summary_of(assessed, options), outcome, context); })
       .map([&] { return outcome; });
 }

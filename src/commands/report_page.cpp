@@ -207,6 +207,7 @@ class Page {
       const bool zooms = is_interactive() && !figure.empty();
       out_ += zooms ? zooming(figure, run_chart_of(subject, quantity, *study_, zone())) : figure;
     }
+    out_ += curve_figures(subject, *study_, facts_->curves);
     for (const AssessedStratum& each : subject) add_stratum(each, subject.size() > 1);
   }
 
@@ -328,7 +329,10 @@ class Page {
       item("As you asked, results that were not completed are in the statistics.");
     }
     item(limit_assumption);
-    item("Curves of torque over angle: none are stored.");
+    item(facts_->curves.empty()
+             ? "Curves of torque over angle: none are stored."
+             : "Curves are those that the tool sent, the newest 40 OK and 40 NG ones of each "
+               "stratum; steps are those of the newest.");
     out_ += "</ul>\n";
   }
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "report_assessment.hpp"
+#include "report_curves.hpp"
 #include "report_words.hpp"
 
 namespace spindle::commands {
@@ -12,6 +13,7 @@ struct PageFacts {
   WallTime made = {};
   std::string version = {};  ///< of spindle
   const ReportOptions& options;
+  const StoredCurves& curves;
 };
 
 /// The report as one page that needs nothing else: no script, no request.

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "result_key.hpp"
 #include "spindle/base/text.hpp"
 #include "stored_choice.hpp"
 
@@ -23,6 +24,10 @@ Result<void> add_targets(const ReportOptions& options, const std::vector<Place>&
   for (const Place& place : places) known.insert(place.name);
   for (const auto& [group, members] : context.tools.groups) known.insert("@" + group);
   for (const std::string& text : options.targets) {
+    const auto fault = context.tools.faults.find(text);
+    if (names_group(text) && fault != context.tools.faults.end()) {
+      return tl::unexpected(fault->second);
+    }
     const auto group = context.tools.groups.find(text.substr(1));
     if (!names_group(text)) {
       names.push_back(text);
@@ -142,6 +147,7 @@ Result<work::StudyOptions> study_options_of(const ReportOptions& options,
                            .include_not_completed = options.include_not_completed,
                            .preset = options.preset};
   for (const files::Tool& tool : tools.tools) {
+    if (tools.faults.contains(tool.name)) continue;  // told by the report
     for (const auto& [preset, limits] : tool.limits) study.joints[{tool.name, preset}] = limits;
   }
   const auto add = [&](std::string_view option, const std::string& text,
@@ -164,23 +170,14 @@ Result<std::vector<work::Exclusion>> exclusions_of(const ReportOptions& options)
   std::vector<work::Exclusion> exclusions;
   for (std::size_t at = 0; at < options.excluded.size(); ++at) {
     const std::string& key = options.excluded[at];
-    const auto second = key.rfind('/');
-    const auto first =
-        second == std::string::npos || second == 0 ? second : key.rfind('/', second - 1);
-    const bool has_parts = first != std::string::npos && first != second && first > 0;
-    const std::string_view text = key;
-    const auto epoch =
-        has_parts ? parse_unsigned(text.substr(first + 1, second - first - 1), 1'000'000'000)
-                  : std::nullopt;
-    const auto number = has_parts ? parse_unsigned(text.substr(second + 1), 65'535) : std::nullopt;
-    if (!epoch || !number || options.reasons[at].empty()) {
-      return tl::unexpected(
-          bad_option("--exclude", fmt::format("'{}' names no result", key),
-                     "write SERIAL/EPOCH/NUMBER as JSON has them: 1021100042/0/1962"));
+    const auto named = parse_result_key(key);
+    if (!named || options.reasons[at].empty()) {
+      return tl::unexpected(bad_option("--exclude", fmt::format("'{}' names no result", key),
+                                       std::string(result_key_hint)));
     }
-    exclusions.push_back({.serial = key.substr(0, first),
-                          .epoch = static_cast<std::int64_t>(*epoch),
-                          .number = static_cast<std::uint16_t>(*number),
+    exclusions.push_back({.serial = named->serial,
+                          .epoch = named->epoch,
+                          .number = named->number,
                           .reason = options.reasons[at]});
   }
   return exclusions;

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
@@ -169,16 +170,16 @@ Result<Backups> find_backups(const std::vector<Target>& tools, const RestoreOpti
 
 /// One file is the backup of one tool.
 Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
-  auto targets = resolve_one_or_group(options.target, Addressing::unicast, context);
+  auto targets = resolve_one_or_group(options.targets, Addressing::unicast, context);
   if (!targets || !options.folder.empty()) return targets;
   if (targets->tools.size() > 1) {
     return tl::unexpected(
         Error{.code = Errc::usage,
               .message = fmt::format("'{}' is {} tools, and one FILE is restored to one",
-                                     options.target, targets->tools.size()),
+                                     fmt::join(options.targets, " "), targets->tools.size()),
               .hint = "--dir FOLDER restores each from its own backup in it"});
   }
-  targets->is_group = false;
+  targets->is_group = context.user.choice == TargetChoice::by_default;
   return targets;
 }
 

@@ -33,8 +33,9 @@ std::string serial_of(const Snapshot& snapshot) {
   return snapshot.identity ? snapshot.identity->serial : std::string();
 }
 
-std::string in_words(const std::optional<catalogue::Value>& value) {
-  return value ? value->to_string() : "nothing";
+std::string in_words(const catalogue::Parameter& parameter,
+                     const std::optional<catalogue::Value>& value) {
+  return value ? shown_of(parameter, *value) : "nothing";
 }
 
 }  // namespace
@@ -56,11 +57,11 @@ Result<RestoreTask> plan_by_tool(RestoreTask task, OpenTool& tool, const Restore
                                  const Context& context) {
   TRY_LET(auto present, read_present(task, tool, context));
   task.present = std::move(present);
-  const bool is_strict = options.model == ModelCheck::strict;
-  if (auto same = check_model(task); is_strict && !same) {
+  const Profile& profile = tool.device.profile();
+  const bool is_strict = options.model == ModelCheck::strict || profile.has_guarded();
+  if (auto same = check_model(task, profile); is_strict && !same) {
     return tl::unexpected(std::move(same.error()));
   }
-  const Profile& profile = tool.device.profile();
   task.destination = catalogue::destination_of(task.backup, task.present);
   task.plan = catalogue::plan_restore(
       task.backup, task.present, profile, task.selection, task.destination,
@@ -83,7 +84,8 @@ Result<RestoreTask> confirm_unchanged(const RestoreTask& task, OpenTool& tool,
     if (changes_by_itself(difference.parameter)) continue;
     return tl::unexpected(work::changed_meanwhile(
         fmt::format("{} changed meanwhile from {} to {}", difference.parameter.name,
-                    in_words(difference.a), in_words(difference.b))));
+                    in_words(difference.parameter, difference.a),
+                    in_words(difference.parameter, difference.b))));
   }
   if (!now->plan.findings.empty()) return tl::unexpected(now->plan.findings.front());
   return now;

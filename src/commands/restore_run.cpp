@@ -40,13 +40,16 @@ std::string command_for(const Target& target, const Context& context, const std:
 }
 
 /// What the tool should hold after the restore: what it held before, with the plan laid over it.
-Snapshot expected_after(const RestoreTask& task, const catalogue::Profile& profile) {
+Snapshot expected_after(const RestoreTask& task, const std::vector<PlannedWrite>& rest,
+                        const catalogue::Profile& profile) {
   Snapshot expected = task.present;
+  std::vector<PlannedWrite> writes = task.plan.writes;
+  writes.insert(writes.end(), rest.begin(), rest.end());
   const auto entry_of = [&](std::string_view name) {
     return std::find_if(expected.entries.begin(), expected.entries.end(),
                         [&](const auto& entry) { return entry.parameter.name == name; });
   };
-  for (const PlannedWrite& write : task.plan.writes) {
+  for (const PlannedWrite& write : writes) {
     const auto entry = entry_of(write.parameter.name);
     if (entry == expected.entries.end()) continue;
     entry->raw = catalogue::encode(write.parameter, write.after, entry->raw).value_or(entry->raw);
@@ -57,15 +60,30 @@ Snapshot expected_after(const RestoreTask& task, const catalogue::Profile& profi
     if (parameter.scale_by.empty()) continue;
     const auto entry = entry_of(parameter.name);
     if (entry == expected.entries.end()) continue;
-    for (const PlannedWrite& write : task.plan.writes) {
+    for (const PlannedWrite& write : writes) {
       *entry = catalogue::with_step_of(*entry, parameter, write);
     }
   }
   return expected;
 }
 
-std::string said(const std::optional<Value>& value) {
-  return value ? value->to_string() : std::string("nothing");
+std::string said(const Parameter& parameter, const std::optional<Value>& value) {
+  return value ? shown_of(parameter, *value) : std::string("nothing");
+}
+
+/// What is kept of what the tool holds: a secret only where it is about to be overwritten.
+Snapshot kept_of(const RestoreTask& task) {
+  Snapshot kept = task.present;
+  std::erase_if(kept.entries, [&](const catalogue::SnapshotEntry& entry) {
+    const auto& writes = task.plan.writes;
+    const bool is_written = std::any_of(writes.begin(), writes.end(), [&](const auto& write) {
+      return write.parameter.name == entry.parameter.name;
+    });
+    if (entry.parameter.secrecy == catalogue::Secrecy::open || is_written) return false;
+    kept.missing.push_back({entry.parameter, catalogue::Missing::left_out});
+    return true;
+  });
+  return kept;
 }
 
 std::string without_colons(std::string time) {
@@ -108,7 +126,7 @@ Result<void> RestoreRun::save_present() {
   const std::string path = fmt::format("{}/{}-{}.yaml", folder, file_name_of(task_->present.target),
                                        without_colons(task_->present.time));
   auto saved = context_->disk.make_folders(folder, Privacy::own).and_then([&] {
-    return context_->disk.write(path, files::render_backup(task_->present), Overwrite::allow,
+    return context_->disk.write(path, files::render_backup(kept_of(*task_)), Overwrite::allow,
                                 Privacy::own);
   });
   if (!saved) {
@@ -120,11 +138,42 @@ Result<void> RestoreRun::save_present() {
   return {};
 }
 
+/// What is guarded goes first, as it may change what the others mean, or change them along.
 void RestoreRun::write_all() {
-  work::write_in_passes(
-      task_->plan.writes, [&](const PlannedWrite& write) { return write_one(write); },
-      [&](const PlannedWrite& write) { give_up(write); });
+  for (const PlannedWrite& write : task_->plan.writes) {
+    const bool is_guarded = write.parameter.guarding == catalogue::Guarding::alone;
+    (is_guarded ? guarded_ : rest_).push_back(write);
+  }
+  write(guarded_);
+  if (errors_.empty() && !guarded_.empty()) plan_rest();
+  if (errors_.empty()) write(rest_);
   if (!errors_.empty()) roll_back();
+}
+
+void RestoreRun::write(const std::vector<PlannedWrite>& writes) {
+  work::write_in_passes(
+      writes, [&](const PlannedWrite& one) { return write_one(one); },
+      [&](const PlannedWrite& one) { give_up(one); });
+}
+
+/// By what the tool holds now.
+void RestoreRun::plan_rest() {
+  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
+                                 progress_.counter(tool_->target.shown + ": reading again"));
+  if (!now) return fail(now.error());
+  for (const Error& error : now->unreadable) fail(error);
+  auto plan = catalogue::plan_restore(task_->backup, now->snapshot, tool_->device.profile(),
+                                      task_->selection, task_->destination);
+  for (const Error& finding : plan.findings) fail(finding);
+  for (const PlannedWrite& write : plan.writes) {
+    if (write.parameter.guarding == catalogue::Guarding::none) continue;
+    fail(about(write.parameter, fmt::format("holds {} again, not {}: writing another parameter "
+                                            "changed it",
+                                            shown_of(write.parameter, write.before),
+                                            shown_of(write.parameter, write.after))));
+  }
+  rest_ = std::move(plan.writes);
+  counts_.planned = guarded_.size() + rest_.size();
 }
 
 work::Step RestoreRun::write_one(const PlannedWrite& write) {
@@ -147,7 +196,7 @@ work::Step RestoreRun::write_one(const PlannedWrite& write) {
     note(write.parameter, write.before, Ending::written, *written.now);
     progress_.advance({.what = tool_->target.shown + ": writing",
                        .done = ++counts_.written,
-                       .total = task_->plan.writes.size()});
+                       .total = counts_.planned});
     return work::Step::done;
   }
   const bool is_refused = written.result == device::WriteResult::refused;
@@ -188,13 +237,14 @@ void RestoreRun::compare_everything() {
   }
   for (const Error& error : now->unreadable) fail(error);
   const auto changed =
-      catalogue::compare(expected_after(*task_, tool_->device.profile()), now->snapshot, {});
+      catalogue::compare(expected_after(*task_, rest_, tool_->device.profile()), now->snapshot, {});
   for (const catalogue::Difference& difference : changed.differences) {
     if (changes_by_itself(difference.parameter)) continue;
     Error error = about(difference.parameter,
                         fmt::format("holds {} after the restore, not {}: writing another "
                                     "parameter changed it",
-                                    said(difference.b), said(difference.a)));
+                                    said(difference.parameter, difference.b),
+                                    said(difference.parameter, difference.a)));
     error.hint = fmt::format("{} writes what is left; what the tool held before is in {}",
                              command_to_finish(), saved_);
     fail(error);
@@ -244,11 +294,12 @@ void RestoreRun::report_put_back(const device::PutBackReport& report) {
     note(parameter, report.found.value_or(tried), Ending::rolled_back, before);
     return;
   }
-  const std::string holds = report.now ? fmt::format("holds {}", report.now->to_string())
-                                       : fmt::format("holds {} or {}, it is not known which",
-                                                     tried.to_string(), before.to_string());
+  const std::string holds =
+      report.now ? fmt::format("holds {}", shown_of(parameter, *report.now))
+                 : fmt::format("holds {} or {}, it is not known which", shown_of(parameter, tried),
+                               shown_of(parameter, before));
   Error error = about(parameter, fmt::format("COULD NOT BE PUT BACK to {}: it {}: {}",
-                                             before.to_string(), holds, report.trouble));
+                                             shown_of(parameter, before), holds, report.trouble));
   if (report.result == RollbackResult::unknown) error.code = Errc::no_answer;
   error.hint = fmt::format("{} puts everything back, {} finishes the restore",
                            command_for(tool_->target, *context_, saved_), command_to_finish());
@@ -272,9 +323,10 @@ void RestoreRun::check_rolled_back(device::Rollback& rollback) {
     const auto value = (*readings)[index].held();
     const Value& before = task_->present.entries[index].value;
     if (!value || *value == before || changes_by_itself(parameters[index])) continue;
-    Error error = about(parameters[index],
-                        fmt::format("holds {} after everything was put back, but held {} before",
-                                    value->to_string(), before.to_string()));
+    Error error = about(
+        parameters[index],
+        fmt::format("holds {} after everything was put back, but held {} before",
+                    shown_of(parameters[index], *value), shown_of(parameters[index], before)));
     error.hint =
         fmt::format("{} puts everything back", command_for(tool_->target, *context_, saved_));
     fail(error);
@@ -297,7 +349,7 @@ std::string RestoreRun::command_to_finish() const {
 
 /// What was written and is not put back, because it is wanted so.
 void RestoreRun::tell_what_stays() {
-  const std::size_t planned = task_->plan.writes.size();
+  const std::size_t planned = counts_.planned;
   const bool left = !errors_.empty() && counts_.written < planned && counts_.rolled_back == 0;
   if (!left || options_->on_failure != OnFailure::leave) return;
   Error error =
@@ -323,7 +375,7 @@ Result<RestoreResult> RestoreRun::end() {
   if (!told && errors_.empty()) return tl::unexpected(std::move(told.error()));
   const RestoreResult result{outcome_, counts_};
   if (!told) return result;
-  Summary summary = restore_summary(counts_, saved_, tool_->target.shown);
+  Summary summary = with_change(restore_summary(counts_, saved_, tool_->target.shown), log_);
   if (!errors_.empty()) summary.sentence += fmt::format(", {} rolled back", counts_.rolled_back);
   return tell(std::move(summary), outcome_, *context_).map([&] { return result; });
 }

@@ -35,6 +35,8 @@ class RestoreRun {
  private:
   Result<void> save_present();
   void write_all();
+  void write(const std::vector<catalogue::PlannedWrite>& writes);
+  void plan_rest();
   work::Step write_one(const catalogue::PlannedWrite& write);
   [[nodiscard]] bool is_missing(const std::string& name) const;
   /// Of a write that did not succeed.
@@ -67,6 +69,8 @@ class RestoreRun {
   std::vector<Error> errors_ = {};  ///< told last, where they are not overlooked
   std::string saved_ = {};
   RestoreCounts counts_;
+  std::vector<catalogue::PlannedWrite> guarded_ = {};  ///< written before all others
+  std::vector<catalogue::PlannedWrite> rest_ = {};
   std::map<const catalogue::PlannedWrite*, device::Written> refused_ = {};
 };
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <tuple>
+
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
 
@@ -14,7 +16,7 @@ using catalogue::Snapshot;
 
 std::string shown_model(const Snapshot& snapshot) {
   if (!snapshot.identity) return fmt::format("profile {}", snapshot.profile);
-  const auto& [model, code, serial, firmware, raw] = *snapshot.identity;
+  const auto& [model, code, serial, firmware, raw, version] = *snapshot.identity;
   return model.empty() ? fmt::format("code {}", code.value_or(0)) : model;
 }
 
@@ -24,8 +26,28 @@ bool is_same_model(const Snapshot& backup, const Snapshot& present) {
   return backup.identity->model_code == present.identity->model_code;
 }
 
+/// By the names that the tools have for themselves, where both are known.
+bool is_named_alike(const Snapshot& backup, const Snapshot& present) {
+  if (!backup.identity || !present.identity) return true;
+  const auto& [a, b] = std::tie(backup.identity->model, present.identity->model);
+  return a.empty() || b.empty() || a == b;
+}
+
+/// "4" of 4.0.2.
+std::string_view major_of(std::string_view version) { return version.substr(0, version.find('.')); }
+
+/// Where a write may change what other values mean, values are not brought over to a firmware that
+/// may have others.
+bool is_same_firmware(const Snapshot& backup, const Snapshot& present) {
+  if (!backup.identity || !present.identity) return false;
+  const auto& [a, b] = std::tie(*backup.identity, *present.identity);
+  if (a.version.empty() || b.version.empty()) return a.firmware && a.firmware == b.firmware;
+  return major_of(a.version) == major_of(b.version);
+}
+
 std::string shown_firmware(const Snapshot& snapshot) {
   const bool known = snapshot.identity && snapshot.identity->firmware;
+  if (known && !snapshot.identity->version.empty()) return snapshot.identity->version;
   return known ? std::to_string(*snapshot.identity->firmware) : std::string("unknown");
 }
 
@@ -120,14 +142,25 @@ void warn_of_plan(const RestoreTask& task, const Profile& profile,
 
 }  // namespace
 
-Result<void> check_model(const RestoreTask& task) {
-  if (is_same_model(task.backup, task.present)) return {};
-  return tl::unexpected(Error{.code = Errc::wrong_model,
-                              .message = fmt::format("the backup is of {}, and this tool is {}",
-                                                     with_article(shown_model(task.backup)),
-                                                     with_article(shown_model(task.present))),
-                              .hint = "--force restores it all the same",
-                              .name = task.file});
+Result<void> check_model(const RestoreTask& task, const Profile& profile) {
+  const bool is_guarded = profile.has_guarded();
+  const bool is_same = is_same_model(task.backup, task.present) &&
+                       (!is_guarded || is_named_alike(task.backup, task.present));
+  if (!is_same) {
+    return tl::unexpected(
+        Error{.code = Errc::wrong_model,
+              .message = fmt::format("the backup is of a {}, and this tool is a {}",
+                                     shown_model(task.backup), shown_model(task.present)),
+              .hint = is_guarded ? "" : "--force restores it all the same",
+              .name = task.file});
+  }
+  if (!is_guarded || is_same_firmware(task.backup, task.present)) return {};
+  return tl::unexpected(
+      Error{.code = Errc::wrong_model,
+            .message = fmt::format("the backup is of firmware {}, and this tool has {}",
+                                   shown_firmware(task.backup), shown_firmware(task.present)),
+            .hint = "values of one generation of firmware are not restored to another one",
+            .name = task.file});
 }
 
 std::vector<std::string> warnings_for(const RestoreTask& task, const Profile& profile) {

@@ -8,7 +8,7 @@
 namespace spindle::commands {
 
 /// Refuses the backup of another model. Error `wrong_model`.
-Result<void> check_model(const RestoreTask& task);
+Result<void> check_model(const RestoreTask& task, const catalogue::Profile& profile);
 
 /// What the user should know before the restore: how the tool and its profile differ from those of
 /// the backup, what the writes bring with them, and what is not written.

@@ -71,6 +71,8 @@ class Selector {
     for (const std::string& text : wanted_->targets) {
       std::vector<std::string> names = {text};
       if (names_group(text)) {
+        const auto fault = context_->tools.faults.find(text);
+        if (fault != context_->tools.faults.end()) return tl::unexpected(fault->second);
         const auto group = groups.find(text.substr(1));
         if (group == groups.end()) {
           return tl::unexpected(unknown_in_store(text, known_names(*records_, context_->tools)));

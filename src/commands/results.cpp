@@ -6,6 +6,7 @@
 #include "qdas_export.hpp"
 #include "result_selection.hpp"
 #include "result_stream.hpp"
+#include "results_curve.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "stored_records.hpp"
@@ -20,7 +21,7 @@ constexpr Duration follow_every = std::chrono::milliseconds(200);
 std::optional<std::size_t> newest_wanted(const ResultsOptions& options, const Selection& selection,
                                          store::Reader& reader, const Context& context) {
   if (options.count) return options.count;
-  const bool is_screen = context.io.out_is_terminal && context.user.format == report::Format::table;
+  const bool is_screen = context.io.out_is_terminal && report::is_table(context.user.format);
   if (!is_screen || !selection.is_whole || options.told == Told::gaps) return std::nullopt;
   const auto newest = reader.newest();
   if (!newest || *newest <= static_cast<store::RowId>(newest_on_terminal)) return std::nullopt;
@@ -81,6 +82,7 @@ Result<Outcome> results(const ResultsOptions& options, Context& context) {
   TRY_LET(auto reader, open_store(options.store, context));
   ProfileShelf shelf(context.profiles);
   TRY_LET(auto records, StoredRecords::make(*reader, shelf, context));
+  if (!options.curve.empty()) return show_curve(options, *reader, records, context);
   TRY_LET(const auto selection, select_results(options.filter, records, context));
   if (!options.qdas.empty()) {
     return export_qdas(options, *reader, records, selection, context);

@@ -97,7 +97,7 @@ Result<std::unique_ptr<RunPlan>> plan_run(const RemoteStartOptions& options, con
 Result<Outcome> run_and_tell(ToolRun& run, catalogue::StopMode mode, OpenTool& tool,
                              Context& context, const std::function<void()>& on_prepared) {
   const auto columns = run.columns();
-  RunOutput output(columns, tool, context, on_prepared);
+  RunOutput output(columns, tool, context, run.log(), on_prepared);
   run.show_on(output);
   return run_guarded(run, mode, tool, run.log(), context, output)
       .and_then([&](const work::RunReport& report) { return output.end(report); });

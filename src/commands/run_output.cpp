@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "change_log.hpp"
 #include "records.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/work/stop.hpp"
@@ -80,13 +81,16 @@ void RunOutput::tell_left(const std::vector<Left>& left) const {
 Result<void> RunOutput::summarise(const work::RunReport& report) {
   const auto& [stop, run_end, left] = report;
   const bool stopped = stop.result == device::StopResult::confirmed;
-  return context_->renderer.summary(
-      summary_record({{"result", text_or_null(run_end.result)},
-                      {"stop_confirmed", stopped},
-                      {"left", cell_of(left)}},
-                     outcome_.status(), tool_->target.shown, context_->clock),
-      fmt::format("{} {}", run_end.subject,
-                  stopped ? "stands still" : "may still run: the stop could not be confirmed"));
+  return tell(with_change({.counts = {{"result", text_or_null(run_end.result)},
+                                      {"stop_confirmed", stopped},
+                                      {"left", cell_of(left)}},
+                           .sentence = fmt::format("{} {}", run_end.subject,
+                                                   stopped ? "stands still"
+                                                           : "may still run: the stop could not be "
+                                                             "confirmed"),
+                           .target = tool_->target.shown},
+                          *log_),
+              outcome_, *context_);
 }
 
 Result<Outcome> RunOutput::end(const work::RunReport& report) {

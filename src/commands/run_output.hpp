@@ -20,9 +20,10 @@ class RunOutput final : public work::RunObserver {
  public:
   /// All must outlive it.
   RunOutput(std::span<const report::Column> columns, const OpenTool& tool, Context& context,
-            const std::function<void()>& when_prepared)
+            const work::ChangeLog& log, const std::function<void()>& when_prepared)
       : columns_(columns),
         tool_(&tool),
+        log_(&log),
         context_(&context),
         when_prepared_(&when_prepared),
         progress_(context) {}
@@ -69,6 +70,7 @@ class RunOutput final : public work::RunObserver {
 
   std::span<const report::Column> columns_;
   const OpenTool* tool_;
+  const work::ChangeLog* log_;
   Context* context_;
   const std::function<void()>* when_prepared_;
   ProgressLine progress_;

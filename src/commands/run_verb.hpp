@@ -36,6 +36,7 @@ class VerbRun {
   Result<Outcome> on_group(const std::vector<Target>& tools);
 
  private:
+  Result<Plan> plan_for(const Profile& profile, const Target& target) const;
   Result<Opened<Plan>> open(const Target& target, Context& context) const;
   Result<Opened<Plan>> open_again(const Planned<Plan>& planned, Context& context) const;
   Result<Plan> ask_for_one(const Target& target, Plan plan) const;
@@ -66,6 +67,16 @@ Result<Outcome> run_verb(const V& verb, const Targets& targets, std::size_t jobs
   return targets.is_group ? run.on_group(targets.tools) : run.on_one(targets.tools.front());
 }
 
+/// A word that was taken for a tool must not be meant as something else.
+template <typename V>
+auto VerbRun<V>::plan_for(const Profile& profile, const Target& target) const -> Result<Plan> {
+  for (const std::string& word : context_->user.doubtful) {
+    const std::string_view meaning = verb_->otherwise(word, profile);
+    if (!meaning.empty()) return tl::unexpected(doubtful(word, meaning, *context_));
+  }
+  return verb_->plan(profile, target);
+}
+
 // ---- one tool ----
 
 template <typename V>
@@ -82,11 +93,12 @@ Result<Outcome> VerbRun<V>::on_one(const Target& target) {
     return ask_for_one(asked, std::move(plan));
   };
   auto opened = open_prepared(target, verb_->need(), *context_, [&](const Profile& profile) {
-    return verb_->plan(profile, target).and_then([&](Plan plan) {
+    return plan_for(profile, target).and_then([&](Plan plan) {
       return ask_by(V::Basis::profile, target, std::move(plan));
     });
   });
   if (!opened) return tl::unexpected(std::move(opened.error()));
+  if (verb_->changes_tools()) tell_caution(opened->tool, *context_);
   const auto plan = verb_->examine(opened->tool, std::move(opened->prepared), *context_)
                         .and_then([&](Plan known) {
                           return ask_by(V::Basis::tool, opened->tool.target, std::move(known));
@@ -113,8 +125,9 @@ auto VerbRun<V>::finish(OpenTool& tool, const Plan& plan, Context& context) cons
 template <typename V>
 auto VerbRun<V>::open(const Target& target, Context& context) const -> Result<Opened<Plan>> {
   auto opened = open_prepared(target, verb_->need(), context,
-                              [&](const Profile& profile) { return verb_->plan(profile, target); });
+                              [&](const Profile& profile) { return plan_for(profile, target); });
   if (!opened) return opened;
+  if (verb_->changes_tools()) tell_caution(opened->tool, context);
   auto plan = verb_->examine(opened->tool, std::move(opened->prepared), context);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   return Opened<Plan>{std::move(opened->tool), std::move(*plan)};
@@ -159,7 +172,7 @@ auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) c
     known = known_target(*tool);
     *profile = *tool->profile;
   }
-  return verb_->plan(*profile, target).map([&](Plan plan) {
+  return plan_for(*profile, target).map([&](Plan plan) {
     return Planned<Plan>{std::move(known), std::move(plan)};
   });
 }
@@ -181,7 +194,8 @@ auto VerbRun<V>::prepare(const std::vector<Target>& tools) const -> Result<Prefl
         return begin_turn(target, own).and_then([&] { return plan_one(target, own); });
       });
   Preflight<Plan> preflight;
-  for (auto& result : results) {
+  for (std::size_t index = 0; index < results.size(); ++index) {
+    auto& result = results[index];
     if (result) {
       preflight.planned.push_back(std::move(*result));
     } else if (work::is_interruption(result.error())) {
@@ -189,8 +203,8 @@ auto VerbRun<V>::prepare(const std::vector<Target>& tools) const -> Result<Prefl
       error.message = "interrupted, nothing was changed";
       return tl::unexpected(std::move(error));
     } else {
-      (rejects_all(result.error()) ? preflight.rejected : preflight.unavailable)
-          .fail(result.error());
+      const bool is_unfit = tools[index].fault.empty() && rejects_all(result.error());
+      (is_unfit ? preflight.rejected : preflight.unavailable).fail(result.error());
     }
   }
   return output.end().map([&] { return std::move(preflight); });
@@ -254,10 +268,10 @@ Result<Outcome> VerbRun<V>::all_together(const std::vector<Target>& tools) const
 template <typename V>
 Result<void> VerbRun<V>::check_all_fit(const std::vector<Target>& tools) const {
   for (const Target& target : tools) {
-    if (target.profile.empty()) continue;
+    if (target.profile.empty()) continue;  // asked later, or its entry has a fault
     const auto profile = load_profile(target, *context_);
     if (!profile) return tl::unexpected(with_target(profile.error(), target));
-    const auto plan = verb_->plan(*profile, target);
+    const auto plan = plan_for(*profile, target);
     if (!plan) return tl::unexpected(with_target(plan.error(), target));
   }
   return {};
@@ -269,10 +283,11 @@ template <typename V>
 Result<void> VerbRun<V>::check_one_fits(const std::vector<Target>& tools) const {
   Result<void> checked;
   for (const Target& target : tools) {
+    if (!target.fault.empty()) continue;
     if (target.profile.empty()) return {};
     const auto profile = load_profile(target, *context_);
     if (!profile) return {};  // told as one of this tool
-    const auto plan = verb_->plan(*profile, target);
+    const auto plan = plan_for(*profile, target);
     if (plan) return {};
     if (checked) checked = tl::unexpected(plan.error());
   }

@@ -20,34 +20,43 @@ using catalogue::Profile;
 
 class Set final : public Verb<SetPlan, SetResult> {
  public:
-  Set(const SetOptions& options, bool is_group) : options_(&options), is_group_(is_group) {}
+  Set(const SetOptions& options, const std::vector<PlacedText>& texts, bool is_group)
+      : options_(&options), texts_(&texts), is_group_(is_group) {}
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
   /// Where no names are used nothing has to be known of the registers.
   [[nodiscard]] Need need() const override {
-    const auto& texts = options_->assignments;
-    const bool raw_only = options_->raw == RawWrites::ask && !texts.empty() &&
-                          std::all_of(texts.begin(), texts.end(), is_raw);
-    return raw_only ? Need::raw_registers : Need::named_registers;
+    const bool raw_only =
+        options_->raw == RawWrites::ask && !texts_->empty() &&
+        std::all_of(texts_->begin(), texts_->end(),
+                    [](const PlacedText& assignment) { return is_raw(assignment.text); });
+    return raw_only ? Need::raw_writes : Need::named_registers;
   }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
-    return parse_assignments(options_->assignments, profile, target, options_->raw)
-        .and_then([&](std::vector<Assignment> assignments) {
-          return check_storing(options_->storing, profile).map([&] {
-            return SetPlan{.assignments = std::move(assignments)};
-          });
-        });
+    const auto torque =
+        profile.torque_unit_from.empty() ? TorqueUnit::known : TorqueUnit::told_by_tool;
+    TRY_LET(auto assignments, parse(profile, target, torque));
+    return check_storing(options_->storing, profile).map([&] {
+      return SetPlan{.assignments = std::move(assignments)};
+    });
   }
 
   Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
+    if (!tool.profile->torque_unit_from.empty()) {
+      TRY_LET(auto told, parse(*tool.profile, tool.target, TorqueUnit::known));
+      plan.assignments = std::move(told);
+    }
     TRY_LET(auto steps, options_->addressing == Addressing::broadcast
                             ? steps_for_everybody(plan.assignments)
                             : check_against_tool(plan.assignments, tool.device));
     plan.steps = std::move(steps);
     plan.serial = serial_of(tool.device);
+    if (options_->undoing) {
+      TRY(check_undo(plan, *options_->undoing));
+    }
     tell_other_steps(plan.steps, tool.device.profile(), tool.target, context);
     tell_roundings(plan.steps, tool.target, context);
     return plan;
@@ -59,8 +68,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     std::vector<std::string_view> what;
     if (options_->addressing == Addressing::broadcast) what.emplace_back("set");
     if (stores()) what.emplace_back(store_action);
-    const std::string raw =
-        options_->raw == RawWrites::ask ? raw_in_words(options_->assignments) : std::string();
+    const std::string raw = options_->raw == RawWrites::ask ? raw_in_words(*texts_) : std::string();
     if (!raw.empty()) what.emplace_back(raw);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
@@ -82,7 +90,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     Listing listing(context, planned ? set_plan_columns() : set_columns());
     for (const SetStep& step : plan.steps) {
       listing.add(planned
-                      ? planned_record(step, target, context.clock)
+                      ? planned_step_record(step, target, context.clock)
                       : step_record(step, Ending::unchanged, *step.before, target, context.clock));
       result.outcome.succeed();
     }
@@ -95,7 +103,8 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    SetWriter writer(tool, options_->storing, context);
+    TRY(ask_of_guarded(tool, plan, context));
+    SetWriter writer(options_->undoing ? "undo" : "set", tool, options_->storing, context);
     if (!is_group_) tell_risks(plan.steps, tool.target, context);
     return options_->addressing == Addressing::broadcast ? writer.send(plan.steps)
                                                          : writer.write(plan.steps);
@@ -105,7 +114,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   Result<Done> give_up(const Target& target, const Plan* plan, const Error& error,
                        Context& context) const override {
     SetResult result;
-    result.counts.left = plan != nullptr ? plan->steps.size() : options_->assignments.size();
+    result.counts.left = plan != nullptr ? plan->steps.size() : texts_->size();
     result.outcome.fail(error);
     Listing listing(context, set_columns());
     listing.add(error);
@@ -117,7 +126,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     SetCounts counts;
     std::size_t failed = all.tools - all.planned.size();
     const bool planned = is_dry_run() && !all.is_rejected;
-    if (!planned) counts.left = failed * options_->assignments.size();
+    if (!planned) counts.left = failed * texts_->size();
     for (std::size_t index = 0; index < all.done.size(); ++index) {
       const Result<SetResult>& done = all.done[index];
       done ? counts.add(done->counts) : counts.add({.left = all.planned[index].plan.steps.size()});
@@ -136,19 +145,18 @@ class Set final : public Verb<SetPlan, SetResult> {
   [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
   [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
 
-  static report::Record planned_record(const SetStep& step, const Target& target,
-                                       const Clock& clock) {
-    return step_record(step, Ending::planned, step.assignment.value, target, clock);
+  [[nodiscard]] Result<std::vector<Assignment>> parse(const Profile& profile, const Target& target,
+                                                      TorqueUnit torque) const {
+    return parse_assignments(*texts_, profile, target, options_->raw, torque);
   }
 
-  static Result<void> show_plans(const AllPlanned& planned, Context& context) {
-    Listing listing(context, with_target_column(set_plan_columns()));
-    for (const auto& [target, plan] : planned) {
-      for (const SetStep& step : plan.steps) {
-        listing.add(planned_record(step, target, context.clock));
-      }
-    }
-    return listing.end();
+  /// What is guarded is known only once the tool has said what it holds. Several tools were asked
+  /// about together.
+  Result<void> ask_of_guarded(OpenTool& tool, const Plan& plan, Context& context) const {
+    const std::string guarded = guarded_in_words(plan.steps);
+    if (guarded.empty() || is_group_) return {};
+    TRY(ask_away_from(tool, fmt::format("{} on {}", guarded, tool.target.shown), context));
+    return confirm_plan(plan, tool.device).map([](const Plan&) {});
   }
 
   /// The user sees first what the question is about.
@@ -162,7 +170,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     }
     if (names.empty()) return {};
     if (can_ask(context)) {
-      TRY(show_plans(planned, context));
+      TRY(show_set_plans(planned, context));
     }
     return ask_consent(fmt::format("write {} to {}{}", counted(counts.changed, "value"),
                                    tools_in_words(names, of), stores() ? ", and save" : ""),
@@ -170,6 +178,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   const SetOptions* options_;
+  const std::vector<PlacedText>* texts_;
   bool is_group_;
 };
 
@@ -179,9 +188,11 @@ class Set final : public Verb<SetPlan, SetResult> {
 /// and each is opened again to be written if it is still as it was shown: no line is held while the
 /// user thinks about the question.
 Result<Outcome> set(const SetOptions& options, Context& context) {
-  return resolve_one_or_group(options.target, options.addressing, context)
+  TRY_LET(const auto texts, texts_to_set(options, context));
+  return resolve_one_or_group(options.targets, options.addressing, context)
       .and_then([&](Targets targets) {
-        const Set verb(options, targets.is_group);
+        targets.is_group = targets.is_group || options.undoing;  // it is shown, and asked about
+        const Set verb(options, texts, targets.is_group);
         return run_verb(verb, reopening(std::move(targets)), options.jobs, context);
       });
 }

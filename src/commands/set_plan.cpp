@@ -53,8 +53,38 @@ Result<void> check_danger(const Parameter& parameter, const Profile& profile) {
             .register_address = parameter.address.value});
 }
 
+/// Whether the profile lets it be written at all, whatever the user says.
+Result<void> check_listed(const Parameter& parameter, const Profile& profile) {
+  const bool is_raw_register = is_raw(parameter.name) && modbus::is_writable(parameter.table);
+  if (!is_raw_register) return {};
+  return profile
+      .may_write(parameter.table, parameter.written_at(),
+                 catalogue::register_count(parameter.encoding))
+      .map_error([&](Error error) {
+        error.name = parameter.name;
+        return error;
+      });
+}
+
+/// What is guarded is written alone: it may change what the others mean.
+Result<void> check_guarded(const std::vector<Assignment>& assignments) {
+  if (assignments.size() < 2) return {};
+  for (const Assignment& assignment : assignments) {
+    const Parameter& parameter = assignment.parameter;
+    if (parameter.guarding == catalogue::Guarding::none) continue;
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "it may change what other values mean, so it is written alone",
+              .hint = "give it in a command of its own, and look at the others behind it",
+              .name = parameter.name,
+              .register_address = parameter.address.value});
+  }
+  return {};
+}
+
 /// Whether the user may write it. What may move or lock a tool is no setting in any case.
 Result<void> check_access(const Parameter& parameter, const Profile& profile, RawWrites raw) {
+  if (auto allowed = check_listed(parameter, profile); !allowed) return allowed;
   const bool is_asked =
       raw == RawWrites::ask && is_raw(parameter.name) && modbus::is_writable(parameter.table);
   if (parameter.access == catalogue::Access::read_only && !is_asked) {
@@ -73,6 +103,13 @@ bool takes_unit(const Parameter& parameter, std::string_view text) {
       parameter.labels.begin(), parameter.labels.end(),
       [&](const catalogue::Label& label) { return same_ignoring_case(label.text, text); });
   return is_number && !is_label && parameter.bits.empty();
+}
+
+/// Whether the unit of what was typed is known once the tool was read.
+bool waits_for_unit(const Assignment& assignment, const Target& target, TorqueUnit torque) {
+  const Parameter& parameter = assignment.parameter;
+  return torque == TorqueUnit::told_by_tool && parameter.unit == catalogue::torque_unit &&
+         target.torque_unit.empty() && !Decimal::parse(assignment.text);
 }
 
 /// The numbers in the unit of the parameter, and what was converted.
@@ -101,7 +138,8 @@ Result<Assignment> with_numbers(Assignment assignment, const Target& target) {
 }
 
 /// What stands behind NAME=; what is meant by some of it is known once the tool was read.
-Result<Assignment> with_value(Assignment assignment, const Target& target) {
+Result<Assignment> with_value(Assignment assignment, const Target& target, TorqueUnit torque) {
+  if (waits_for_unit(assignment, target, torque)) return assignment;
   return with_numbers(std::move(assignment), target).and_then([](Assignment made) {
     const Parameter& parameter = made.parameter;
     const bool waits = !parameter.scale_by.empty() || !parameter.part.empty();
@@ -113,26 +151,58 @@ Result<Assignment> with_value(Assignment assignment, const Target& target) {
   });
 }
 
-Result<Assignment> parse_assignment(const std::string& text, const Profile& profile,
-                                    const Target& target, RawWrites raw) {
-  const auto equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    return tl::unexpected(Error{.code = Errc::usage,
-                                .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
-                                .hint = "write it like preset.1.target-torque=2.71"});
-  }
-  TRY_LET(auto parameter, profile.find(text.substr(0, equals)));
+/// What a tool holds is changed by a step once it was read.
+Result<Assignment> with_step(Assignment assignment, const TypedAssignment& typed,
+                             const Target& target, TorqueUnit torque) {
+  const std::string unit = unit_of(assignment.parameter, target);
+  TRY_LET(assignment.step, step_of(typed, assignment.parameter, unit));
+  if (assignment.step) return assignment;
+  return with_value(std::move(assignment), target, torque);
+}
+
+/// What shows the limits that a value has to keep.
+Remedy limits_of(const Parameter& parameter) {
+  return {.right = fmt::format("spindle get TARGET {} --limits", shell_word(parameter.name))};
+}
+
+Result<Assignment> parse_one(const TypedAssignment& typed, Parameter parameter,
+                             const Profile& profile, const Target& target, RawWrites raw,
+                             TorqueUnit torque) {
   TRY(check_access(parameter, profile, raw));
   if (auto fits = catalogue::check_pair(parameter.encoding, profile.link); !fits) {
     fits.error().name = parameter.name;
     fits.error().register_address = parameter.address.value;
     return tl::unexpected(std::move(fits.error()));
   }
-  return with_value({parameter, {}, text.substr(equals + 1)}, target).map_error([&](Error error) {
+  return with_step({parameter, {}, typed.value}, typed, target, torque).map_error([&](Error error) {
     error.name = parameter.name;
     error.register_address = parameter.address.value;
+    if (error.code == Errc::out_of_range) error.remedy = limits_of(parameter);
     return error;
   });
+}
+
+/// A pattern is as many assignments as it has names.
+Result<std::vector<Assignment>> parse_assignment(const std::string& text, const Profile& profile,
+                                                 const Target& target, RawWrites raw,
+                                                 TorqueUnit torque) {
+  TRY_LET(const auto typed, take_apart(text, profile));
+  TRY_LET(auto parameters, parameters_to_set(typed.name, profile));
+  std::vector<Assignment> assignments;
+  for (Parameter& parameter : parameters) {
+    TRY_LET(auto assignment, parse_one(typed, std::move(parameter), profile, target, raw, torque));
+    assignments.push_back(std::move(assignment));
+  }
+  return assignments;
+}
+
+/// The error of a line of a file.
+Error at_place(Error error, const std::string& place) {
+  if (place.empty()) return error;
+  error.message =
+      error.name.empty() ? message_of(error) : fmt::format("{}: {}", error.name, message_of(error));
+  error.name = place;
+  return error;
 }
 
 std::optional<Decimal> number_of(const std::optional<Value>& value) {
@@ -147,6 +217,20 @@ Error assigned_twice(const Parameter& parameter) {
           .register_address = parameter.address.value};
 }
 
+/// Adds what has no register in common with what is there.
+Result<void> add_once(std::vector<Assignment> some, std::vector<Assignment>& to) {
+  for (Assignment& assignment : some) {
+    for (const Assignment& earlier : to) {
+      // Which bits these are is known once the tool was read.
+      if (!earlier.parameter.part.empty() || !assignment.parameter.part.empty()) continue;
+      if (!catalogue::share_bits(earlier.parameter, assignment.parameter)) continue;
+      return tl::unexpected(assigned_twice(assignment.parameter));
+    }
+    to.push_back(std::move(assignment));
+  }
+  return {};
+}
+
 /// The tool's own limits; a parameter whose limits should exist but cannot be read is not written.
 Result<void> check_own_limits(const Assignment& assignment, const device::Reading& reading,
                               const Profile& profile) {
@@ -156,9 +240,30 @@ Result<void> check_own_limits(const Assignment& assignment, const device::Readin
                                      profile);
 }
 
+/// What a step leads to from what the tool holds.
+Result<void> resolve_step(Assignment& assignment, const Value& before) {
+  if (!assignment.step) return {};
+  const auto result = stepped(before, *assignment.step);
+  auto value = result.and_then([&](const Decimal& number) {
+    assignment.text = number.to_string();
+    assignment.converted = step_in_words(before, *assignment.step, number);
+    return catalogue::parse_value(assignment.parameter, assignment.text);
+  });
+  if (!value) {
+    value.error().name = assignment.parameter.name;
+    value.error().register_address = assignment.parameter.address.value;
+    return tl::unexpected(std::move(value.error()));
+  }
+  assignment.value = std::move(*value);
+  return {};
+}
+
 /// Names of bits and steps of a scale as they count on this tool.
 Result<void> resolve_by_tool(Assignment& assignment, const device::Reading& reading) {
-  if (assignment.parameter.bits_by.empty() && assignment.parameter.scale_by.empty()) return {};
+  if (assignment.step) assignment.parameter = reading.parameter;
+  if (assignment.step ||
+      (assignment.parameter.bits_by.empty() && assignment.parameter.scale_by.empty()))
+    return {};
   assignment.parameter = reading.parameter;
   TRY_LET(auto value, catalogue::parse_value(assignment.parameter, assignment.text));
   assignment.value = std::move(value);
@@ -233,7 +338,8 @@ Result<void> check_unchanged(const SetPlan& plan, const SetPlan& now) {
     if (same) continue;
     return tl::unexpected(work::changed_meanwhile(
         fmt::format("{} changed meanwhile from {} to {}", step.assignment.parameter.name,
-                    planned.before->to_string(), step.before->to_string())));
+                    shown_of(step.assignment.parameter, *planned.before),
+                    shown_of(step.assignment.parameter, *step.before))));
   }
   return {};
 }
@@ -260,27 +366,30 @@ Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device) {
 
 bool is_raw(const std::string& assignment) { return assignment.starts_with('@'); }
 
-std::string raw_in_words(const std::vector<std::string>& assignments) {
+std::string raw_in_words(const std::vector<PlacedText>& assignments) {
   std::vector<std::string> raw;
-  std::copy_if(assignments.begin(), assignments.end(), std::back_inserter(raw), is_raw);
+  for (const PlacedText& assignment : assignments) {
+    if (is_raw(assignment.text)) raw.push_back(assignment.text);
+  }
   if (raw.empty()) return {};
   return fmt::format("write {}, of which it may not be known what it does", fmt::join(raw, ", "));
 }
 
-Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
+Result<std::vector<Assignment>> parse_assignments(const std::vector<PlacedText>& texts,
                                                   const Profile& profile, const Target& target,
-                                                  RawWrites raw) {
+                                                  RawWrites raw, TorqueUnit torque) {
   std::vector<Assignment> assignments;
-  for (const std::string& text : texts) {
-    TRY_LET(auto assignment, parse_assignment(text, profile, target, raw));
-    for (const Assignment& earlier : assignments) {
-      // Which bits these are is known once the tool was read.
-      if (!earlier.parameter.part.empty() || !assignment.parameter.part.empty()) continue;
-      if (!catalogue::share_bits(earlier.parameter, assignment.parameter)) continue;
-      return tl::unexpected(assigned_twice(assignment.parameter));
-    }
-    assignments.push_back(std::move(assignment));
+  std::vector<Error> faults;
+  for (const auto& [text, place] : texts) {
+    auto added = parse_assignment(text, profile, target, raw, torque)
+                     .and_then([&](std::vector<Assignment> some) {
+                       return add_once(std::move(some), assignments);
+                     });
+    if (!added && place.empty()) return tl::unexpected(std::move(added.error()));
+    if (!added) faults.push_back(at_place(std::move(added.error()), place));
   }
+  if (!faults.empty()) return tl::unexpected(all_of(std::move(faults)));
+  TRY(check_guarded(assignments));
   return assignments;
 }
 
@@ -295,8 +404,14 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
     const device::Reading& reading = readings[index];
     TRY_LET(const auto before, reading.held());
     TRY(resolve_by_tool(assignments[index], reading));
+    TRY(resolve_step(assignments[index], before));
     auto allowed = check_own_limits(assignments[index], reading, device.profile());
-    if (!allowed) return tl::unexpected(std::move(allowed.error()));
+    if (!allowed) {
+      if (allowed.error().code == Errc::out_of_range) {
+        allowed.error().remedy = limits_of(assignments[index].parameter);
+      }
+      return tl::unexpected(std::move(allowed.error()));
+    }
     steps.push_back({std::move(assignments[index]), before});
   }
   TRY(check_meanings_stay(parameters, steps));
@@ -304,9 +419,41 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   return in_order(std::move(steps));
 }
 
+Result<void> check_undo(const SetPlan& plan, const Undoing& undoing) {
+  const bool is_other = !plan.serial.empty() && !undoing.serial.empty();
+  if (is_other && plan.serial != undoing.serial) {
+    return tl::unexpected(
+        Error{.code = Errc::mismatch,
+              .message = fmt::format("the change was made on serial {}, and this tool is serial {}",
+                                     undoing.serial, plan.serial)});
+  }
+  for (const SetStep& step : plan.steps) {
+    const std::string& name = step.assignment.parameter.name;
+    const auto left = undoing.left.find(name);
+    if (!step.changes() || !step.before || left == undoing.left.end()) continue;
+    const Value& before = *step.before;
+    const std::string present = before.is_number() ? before.number.to_string() : before.exact();
+    if (present == left->second) continue;
+    return tl::unexpected(
+        Error{.code = Errc::mismatch,
+              .message = fmt::format("it was changed again: the tool holds {}, the change left {}",
+                                     present, left->second),
+              .hint = fmt::format("'spindle log {}' shows the changes of this value", name),
+              .name = name});
+  }
+  return {};
+}
+
 Result<std::vector<SetStep>> steps_for_everybody(std::vector<Assignment> assignments) {
   std::vector<SetStep> steps;
   for (Assignment& assignment : assignments) {
+    if (assignment.step) {
+      return tl::unexpected(
+          Error{.code = Errc::usage,
+                .message = "what each tool holds is not known, and none can be asked",
+                .hint = "write the new value behind =",
+                .name = assignment.parameter.name});
+    }
     if (!assignment.parameter.scale_by.empty()) {
       return tl::unexpected(Error{.code = Errc::usage,
                                   .message =

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "assignment.hpp"
 #include "spindle/catalogue/profile.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/commands/commands.hpp"
@@ -17,6 +18,7 @@ struct Assignment {
   catalogue::Value value;
   std::string text;            ///< as typed: names of bits may mean others once the tool was read
   std::string converted = {};  ///< "1.5 kW is 1500 W"; empty: it was typed in its unit
+  std::optional<ValueStep> step = std::nullopt;  ///< it has no value until the tool was read
 };
 
 /// One assignment with what the tool holds now.
@@ -43,14 +45,20 @@ std::string serial_of(const device::Device& device);
 bool is_raw(const std::string& assignment);
 
 /// "write @holding:4=17, of which it may not be known what it does"; empty where none is raw.
-std::string raw_in_words(const std::vector<std::string>& assignments);
+std::string raw_in_words(const std::vector<PlacedText>& assignments);
+
+/// Whether the unit of torques is as the target has it, or will be told by the tool.
+enum class TorqueUnit : std::uint8_t { known, told_by_tool };
 
 /// What can be known from the profile and the target's torque unit: names, access, types, units,
-/// ranges, and that none starts a motor.
-Result<std::vector<Assignment>> parse_assignments(const std::vector<std::string>& texts,
+/// ranges, that none starts a motor, and that what is guarded stands alone. A torque that was typed
+/// with a unit has no value yet where the tool will tell its own. Of those that stand in a file
+/// every fault is told, as one error.
+Result<std::vector<Assignment>> parse_assignments(const std::vector<PlacedText>& texts,
                                                   const catalogue::Profile& profile,
                                                   const Target& target,
-                                                  RawWrites raw = RawWrites::refuse);
+                                                  RawWrites raw = RawWrites::refuse,
+                                                  TorqueUnit torque = TorqueUnit::known);
 
 /// What only the tool can say: its present values, its own limits, and which bits have names. Reads
 /// only.
@@ -60,6 +68,10 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
 /// The plan with what the tool holds now. Reads only. Error `mismatch` where the tool is not the
 /// one that was planned for, or does not hold what it held then.
 Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device);
+
+/// Whether a change can be taken back: the tool is the one that it was made on, and holds what it
+/// left. Error `mismatch`.
+Result<void> check_undo(const SetPlan& plan, const Undoing& undoing);
 
 /// For everybody on a line. Everybody may have another setting, so only names of bits that always
 /// count can be sent.

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "recording.hpp"
 #include "records.hpp"
 
 namespace spindle::commands {
@@ -83,17 +84,18 @@ report::Record change_record(const Parameter& parameter, const std::optional<Val
                              Ending ending, const Value& now, const Target& target,
                              const Clock& clock) {
   const bool planned = ending == Ending::planned;
+  const bool is_secret = parameter.secrecy == catalogue::Secrecy::secret;
   report::Record record{.type = planned ? "plan" : "write",
                         .target = target.shown,
                         .time = clock.wall(),
                         .fields = {}};
   record.fields = {{"name", parameter.name},
                    {"register", number(parameter.address.value)},
-                   {"old", before ? value_cell(*before) : report::Cell(),
-                    before ? before->to_string() : std::string()},
-                   {"new", value_cell(now), now.to_string()},
+                   {"old", before && !is_secret ? value_cell(*before) : report::Cell(),
+                    before ? shown_of(parameter, *before) : std::string()},
+                   {"new", is_secret ? report::Cell() : value_cell(now), shown_of(parameter, now)},
                    {"unit", text_or_null(unit_of(parameter, target))}};
-  if (now.is_rounded()) record.fields.push_back({"typed", typed_cell(now)});
+  if (now.is_rounded() && !is_secret) record.fields.push_back({"typed", typed_cell(now)});
   if (planned) {
     const bool changes = before != now;
     record.fields.push_back({"changes", changes, changes ? "yes" : "no"});
@@ -105,6 +107,10 @@ report::Record change_record(const Parameter& parameter, const std::optional<Val
 report::Record step_record(const SetStep& step, Ending ending, const Value& now,
                            const Target& target, const Clock& clock) {
   return change_record(step.assignment.parameter, step.before, ending, now, target, clock);
+}
+
+report::Record planned_step_record(const SetStep& step, const Target& target, const Clock& clock) {
+  return step_record(step, Ending::planned, step.assignment.value, target, clock);
 }
 
 void SetCounts::add(const SetCounts& other) {
@@ -140,12 +146,31 @@ Summary set_summary(const SetCounts& counts, const std::string& target) {
   return summary;
 }
 
+Result<void> show_set_plans(const std::vector<Planned<SetPlan>>& planned, Context& context) {
+  Listing listing(context, with_target_column(set_plan_columns()));
+  for (const auto& [target, plan] : planned) {
+    for (const SetStep& step : plan.steps) {
+      listing.add(step_record(step, Ending::planned, step.assignment.value, target, context.clock));
+    }
+  }
+  return listing.end();
+}
+
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context) {
   for (const SetStep& step : steps) {
     const Parameter& parameter = step.assignment.parameter;
     if (parameter.risk.empty() || !step.changes()) continue;
     context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name, parameter.risk));
   }
+}
+
+std::string guarded_in_words(const std::vector<SetStep>& steps) {
+  for (const SetStep& step : steps) {
+    const Parameter& parameter = step.assignment.parameter;
+    if (parameter.guarding == catalogue::Guarding::none || !step.changes()) continue;
+    return fmt::format("write {}, which may change what other values mean", parameter.name);
+  }
+  return {};
 }
 
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context) {
@@ -176,11 +201,11 @@ void tell_other_steps(const std::vector<SetStep>& steps, const catalogue::Profil
 void tell_roundings(const std::vector<SetStep>& steps, const Target& target,
                     const Context& context) {
   for (const SetStep& step : steps) {
-    const auto& [parameter, value, text, converted] = step.assignment;
+    const auto& [parameter, value, text, converted, relative] = step.assignment;
     if (!converted.empty()) {
       context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name, converted));
     }
-    if (!value.is_rounded()) continue;
+    if (!value.is_rounded() || parameter.secrecy == catalogue::Secrecy::secret) continue;
     context.renderer.note(fmt::format("{}: {}: {}", target.shown, parameter.name,
                                       catalogue::rounding_in_words(parameter, value)));
   }

@@ -10,6 +10,7 @@
 #include "set_plan.hpp"
 #include "spindle/commands/context.hpp"
 #include "spindle/work/connect.hpp"
+#include "verb.hpp"
 
 namespace spindle::commands {
 
@@ -23,7 +24,8 @@ enum class Ending : std::uint8_t {
   refused,
   unknown,
   rolled_back,
-  sent
+  sent,
+  changed_along  ///< it was not written: the tool changed it when another one was
 };
 
 inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::planned},
@@ -34,7 +36,8 @@ inline constexpr auto ending_words = enum_table<Ending>({{"planned", Ending::pla
                                                          {"refused", Ending::refused},
                                                          {"unknown", Ending::unknown},
                                                          {"rolled-back", Ending::rolled_back},
-                                                         {"sent", Ending::sent}});
+                                                         {"sent", Ending::sent},
+                                                         {"changed-along", Ending::changed_along}});
 Ending ending_of(device::WriteResult result);
 
 std::span<const report::Column> set_plan_columns();
@@ -48,6 +51,9 @@ report::Record change_record(const catalogue::Parameter& parameter,
 /// The same of a step.
 report::Record step_record(const SetStep& step, Ending ending, const catalogue::Value& now,
                            const Target& target, const Clock& clock);
+
+/// What would become of a step.
+report::Record planned_step_record(const SetStep& step, const Target& target, const Clock& clock);
 
 /// What was written, or would be, of one tool or of several.
 struct SetCounts {
@@ -65,8 +71,15 @@ SetCounts counts_of(const std::vector<SetStep>& steps);
 Summary plan_summary(const SetCounts& counts, const std::string& target);
 Summary set_summary(const SetCounts& counts, const std::string& target);
 
+/// What is planned for each tool, in one list.
+Result<void> show_set_plans(const std::vector<Planned<SetPlan>>& planned, Context& context);
+
 /// What a change may cost, before it is made.
 void tell_risks(const std::vector<SetStep>& steps, const Target& target, const Context& context);
+
+/// "write control.torque-unit, which may change what other values mean": what of these is guarded
+/// and would change; empty where nothing is.
+std::string guarded_in_words(const std::vector<SetStep>& steps);
 
 /// When what was written acts, where that is not at once.
 void tell_effects(const std::vector<SetStep>& steps, const Target& target, const Context& context);

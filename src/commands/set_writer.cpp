@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "records.hpp"
+#include "spindle/base/text.hpp"
 #include "storing.hpp"
 
 namespace spindle::commands {
@@ -23,12 +24,52 @@ Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
               .target = tool_->target.shown});
 }
 
+/// What is guarded may change the others, so they are read before and behind it.
+Result<void> SetWriter::look_before(const std::vector<SetStep>& steps) {
+  for (const SetStep& step : steps) {
+    const bool is_guarded = step.assignment.parameter.guarding == catalogue::Guarding::alone;
+    if (is_guarded && step.changes()) guarded_ = &step;
+  }
+  return guarded_ == nullptr ? Result<void>() : bystanders_.read_before();
+}
+
+void SetWriter::look_behind() {
+  if (guarded_ == nullptr || context_->interrupt.signalled()) return;
+  auto changes = bystanders_.read_behind(guarded_->assignment.parameter);
+  if (!changes) {
+    Error error = std::move(changes.error());
+    error.hint = "what else the tool changed is not known: compare it with a backup";
+    return fail(error);
+  }
+  for (const catalogue::Difference& one : changes->values) {
+    listing_.add(
+        change_record(one.parameter, one.a, Ending::changed_along,
+                      one.b.value_or(catalogue::Value{.content = catalogue::Content::none}),
+                      tool_->target, context_->clock));
+  }
+  const auto named = [](const std::string& unit) {
+    return unit.empty() ? std::string("a unit that is not known") : unit;
+  };
+  if (!changes->values.empty()) {
+    context_->renderer.note(
+        fmt::format("{}: the tool changed {} along with {}", tool_->target.shown,
+                    counted(changes->values.size(), "value"), guarded_->assignment.parameter.name));
+  }
+  if (changes->torques > 0) {
+    context_->renderer.note(fmt::format("{}: {} kept their numbers, and are now in {}, not in {}",
+                                        tool_->target.shown, counted(changes->torques, "torque"),
+                                        named(changes->unit_now), named(changes->unit_before)));
+  }
+}
+
 Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
+  TRY(look_before(steps));
   SetCounts& counts = result_.counts;
   work::write_in_passes(
       steps, [&](const SetStep& step) { return write_one(step); },
       [&](const SetStep& step) { give_up(step); });
   counts.left = steps.size() - counts.changed - counts.unchanged - counts.failed;
+  look_behind();
   tell_effects(steps, tool_->target, *context_);
   return end(set_summary(counts, tool_->target.shown));
 }
@@ -49,7 +90,7 @@ void SetWriter::fail(const Error& error) {
 }
 
 void SetWriter::send_one(const SetStep& step) {
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   work::LoggedChange change =
       work::logged(parameter, value, value, ending_words.text(Ending::sent));
   change.old_value.reset();
@@ -74,7 +115,7 @@ work::Step SetWriter::write_one(const SetStep& step) {
     succeed(step, Ending::unchanged, *step.before);
     return work::Step::unchanged;
   }
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   device::Written written = changer_.make(parameter, *step.before, value);
   if (written.done()) {
     Value now = *written.now;
@@ -90,7 +131,7 @@ work::Step SetWriter::write_one(const SetStep& step) {
 }
 
 void SetWriter::give_up(const SetStep& step) {
-  const auto& [parameter, value, text, converted] = step.assignment;
+  const auto& [parameter, value, text, converted, relative] = step.assignment;
   const device::Written& written = refused_.at(&step);
   ++result_.counts.failed;
   note(step, ending_of(written.result), written.now.value_or(value));
@@ -101,7 +142,9 @@ Result<SetResult> SetWriter::end(Summary summary) {
   auto drawn = listing_.end();
   const bool stores = storing_ == Storing::yes && result_.outcome.failed() == 0;
   if (drawn && stores) drawn = store(*tool_, log_, result_.outcome, *context_);
-  if (drawn) drawn = tell(std::move(summary), result_.outcome, *context_);
+  if (drawn) {
+    drawn = tell(with_change(std::move(summary), log_), result_.outcome, *context_);
+  }
   return drawn.map([&] { return result_; });
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <map>
+#include <string_view>
 #include <vector>
 
+#include "bystanders.hpp"
 #include "change_log.hpp"
 #include "set_records.hpp"
 #include "spindle/commands/commands.hpp"
@@ -19,14 +21,15 @@ struct SetResult {
 /// when a signal asks for it. What the tool refuses is tried once more behind the others.
 class SetWriter {
  public:
-  /// All must outlive it.
-  SetWriter(OpenTool& tool, Storing storing, Context& context)
+  /// All must outlive it. `command` is who makes the changes.
+  SetWriter(std::string_view command, OpenTool& tool, Storing storing, Context& context)
       : tool_(&tool),
         storing_(storing),
         context_(&context),
         listing_(context, set_columns()),
-        log_(change_log("set", tool, context)),
-        changer_(tool.device, log_) {}
+        log_(change_log(command, tool, context)),
+        changer_(tool.device, log_),
+        bystanders_(tool, context) {}
   SetWriter(const SetWriter&) = delete;
   SetWriter& operator=(const SetWriter&) = delete;
 
@@ -44,6 +47,8 @@ class SetWriter {
   work::Step write_one(const SetStep& step);
   /// Of a write that did not succeed.
   void give_up(const SetStep& step);
+  Result<void> look_before(const std::vector<SetStep>& steps);
+  void look_behind();
   Result<SetResult> end(Summary summary);
 
   OpenTool* tool_;
@@ -54,6 +59,8 @@ class SetWriter {
   work::Changer changer_;
   std::map<const SetStep*, device::Written> refused_ = {};
   SetResult result_ = {};
+  Bystanders bystanders_;
+  const SetStep* guarded_ = nullptr;  ///< the one step that is written alone; null: none is
 };
 
 }  // namespace spindle::commands

@@ -22,7 +22,8 @@ Result<void> check_sink(const RecordOptions& options, const Context& context) {
   std::optional<files::Sink> sink;
   for (const files::Sink& known : context.tools.sinks) {
     names.push_back(known.name);
-    if (known.name == options.lease) sink = known;
+    if (known.name != options.lease) continue;
+    TRY_LET(sink, files::usable_sink(known, context.tools));
   }
   const bool is_url = options.lease.find("://") != std::string::npos;
   if (!sink && is_url) {

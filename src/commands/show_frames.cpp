@@ -21,15 +21,15 @@ constexpr auto decision_words =
                                 {"asking again", link::Decision::retry},
                                 {"resync", link::Decision::resync},
                                 {"doubt", link::Decision::doubt},
-                                {"proving the answer", link::Decision::proof}});
+                                {"proving the answer", link::Decision::proof},
+                                {"remembered", link::Decision::memory}});
 
 link::Trace frames_as_lines(const std::string& target, const report::Streams& io,
                             const Clock& clock) {
   const auto line = [&io, &clock, target](std::string text) {
     if (io.err_is_ready && !io.err_is_ready()) return;
     text.erase(text.find_last_not_of(' ') + 1);
-    report::say_line(io, report::Severity::informational,
-                     fmt::format("{} {} {}", report::to_text(clock.wall()), target, text));
+    report::say_frame(io, fmt::format("{} {} {}", report::to_text(clock.wall()), target, text));
   };
   return {.bytes =
               [line](link::Direction direction, ByteView bytes) {

@@ -35,6 +35,8 @@ std::string_view why_not_felt(sim::FaultKind kind, const catalogue::Profile& pro
       return sim::abilities_of(profile).pushes ? "" : "it sends nothing unasked";
     case sim::FaultNeed::screwdriver:
       return sim::abilities_of(profile).operated ? "" : "it stores what is written";
+    case sim::FaultNeed::dated:
+      return sim::abilities_of(profile).dated ? "" : "its events have no date";
     case sim::FaultNeed::nothing:
       break;
   }
@@ -59,6 +61,7 @@ std::optional<Error> useless_option(const SimulateOptions& options,
       {"--serial", bm.serial.has_value(), able.identity, no_identity},
       {"--model", bm.tool_model.has_value(), able.identity, no_identity},
       {"--rundown-every", bm.rundown_every.has_value(), able.operated, no_events},
+      {"--event-number", bm.event_number.has_value(), able.operated, no_events},
       {"--busy", options.tool.busy.has_value(), able.configuration, no_motor},
       {"--warning", !options.tool.warnings.empty(), able.warnings, no_warnings},
       {"--alarm", !options.tool.alarms.empty(), able.alarms,
@@ -97,7 +100,7 @@ std::vector<std::string> simulate_options(const catalogue::Profile& profile) {
     if (is_able) options.insert(options.end(), names.begin(), names.end());
   };
   add(able.identity, {"--identity-bytes", "--firmware", "--serial", "--model"});
-  add(able.operated, {"--rundown-every", "--ng-every", "--burst"});
+  add(able.operated, {"--rundown-every", "--ng-every", "--burst", "--event-number"});
   add(able.configuration, {"--busy"});
   add(able.alarms, {"--alarm"});
   add(able.warnings, {"--warning"});

@@ -70,7 +70,9 @@ class StartActionRun final : public ToolRun {
   }
 
   [[nodiscard]] std::vector<report::Column> columns() const override {
-    return news_columns(Tools::one, {tool().profile.get()});
+    const catalogue::Profile* const profile = tool().profile.get();
+    if (context().user.format == report::Format::csv) return exchange_columns({profile});
+    return news_columns({Tools::one, {profile}, {tool().target.torque_unit}});
   }
   [[nodiscard]] work::LoggedChange start_change() const override {
     return {.name = plan_->start.name,
@@ -234,6 +236,14 @@ const std::string& value_of(std::string_view option, const RemoteStartOptions& o
 Result<std::unique_ptr<RunPlan>> plan_start_action(const RemoteStartOptions& options,
                                                    const Profile& profile, const Target& target) {
   TRY_LET(const auto model, device::StartAction::of(profile));
+  if (profile.events && !profile.events->first) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message = "where its last event can be read is not known, so the result of a run "
+                         "cannot be told from an older one",
+              .hint = "start it at the tool, and watch it with 'spindle watch'",
+              .name = profile.id});
+  }
   if (!profile.events || model.start().confirm.empty()) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "a run of this product cannot be followed",

@@ -11,6 +11,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "stored_records.hpp"
+#include "time_field.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -18,21 +19,22 @@ namespace {
 using report::Align;
 using report::Record;
 
-const std::array<report::Column, 9> coverage_columns = {{{"TARGET", "target"},
-                                                         {"SERIAL", "serial"},
-                                                         {"EPOCH", "epoch", Align::right},
-                                                         {"FIRST", "first", Align::right},
-                                                         {"LAST", "last", Align::right},
-                                                         {"ROWS", "rows", Align::right},
-                                                         {"IN GAPS", "in_gaps", Align::right},
-                                                         {"HOLES", "holes", Align::right},
-                                                         {"NUMBERS", "verdict"}}};
+const std::array<report::Column, 9> coverage_columns = {
+    {{"TARGET", "target"},
+     {"SERIAL", "serial"},
+     {"EPOCH", "epoch", Align::right, 0, report::left_out(1)},
+     {"FIRST", "first", Align::right},
+     {"LAST", "last", Align::right},
+     {"ROWS", "rows", Align::right},
+     {"IN GAPS", "in_gaps", Align::right},
+     {"HOLES", "holes", Align::right},
+     {"NUMBERS", "verdict"}}};
 
 const std::array<report::Column, 7> odometer_columns = {
     {{"TARGET", "target"},
      {"SERIAL", "serial"},
-     {"SINCE", "since"},
-     {"UNTIL", "until"},
+     {"SINCE", "since", Align::left, 0, report::wrapped(10)},
+     {"UNTIL", "until", Align::left, 0, report::wrapped(10)},
      {"COUNTED BY TOOL", "counted", Align::right},
      {"STORED", "stored", Align::right},
      {"FASTENINGS", "verdict"}}};
@@ -160,8 +162,8 @@ class StoreCheck {
     std::string verdict = "cannot tell: the tool's total was set back or counts something else";
     if (missing) verdict = *missing == 0 ? "complete" : fmt::format("{} missing", *missing);
     record.fields.insert(record.fields.end(),
-                         {{"since", report::to_text(mileage.since)},
-                          {"until", report::to_text(mileage.until)},
+                         {time_field("since", mileage.since, *context_),
+                          time_field("until", mileage.until, *context_),
                           {"counted", number(mileage.counted)},
                           {"stored", number(mileage.stored)},
                           {"missing", missing ? number(*missing) : report::Cell()},

@@ -9,6 +9,7 @@
 #include "result_stream.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
+#include "stored_curves.hpp"
 #include "stored_records.hpp"
 
 namespace spindle::commands {
@@ -107,6 +108,14 @@ Record preset_record(const store::PresetSettings& settings, const StoredRecords&
   return record;
 }
 
+/// Behind all events: each names its own by serial number, epoch and number.
+Result<void> add_curves(store::Reader& reader, LineSink& sink) {
+  return reader.curves(0, [&](const store::Curve& row) {
+    const auto curve = stored_curve(row);
+    return !curve || sink.add(curve_record(*curve));
+  });
+}
+
 Result<void> add_all(store::Reader& reader, StoredRecords& records, LineSink& sink) {
   for (const store::Place& place : records.places()) sink.add(place_record(place, records));
   TRY_LET(const auto epochs, reader.epochs());
@@ -115,13 +124,14 @@ Result<void> add_all(store::Reader& reader, StoredRecords& records, LineSink& si
   for (const auto& row : settings) sink.add(preset_record(row, records));
   const Selection all;
   ResultStream stream(reader, records, all, Told::all, std::nullopt);
-  return stream.tell_new([&](const Record& record) { return sink.add(record); });
+  TRY(stream.tell_new([&](const Record& record) { return sink.add(record); }));
+  return add_curves(reader, sink);
 }
 
 }  // namespace
 
 Result<Outcome> export_store(const CopyOptions& options, Context& context) {
-  if (context.user.format == report::Format::csv) {
+  if (context.user.format == report::Format::csv || context.user.format == report::Format::yaml) {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "an export is JSON Lines",
                                 .hint = "'spindle results -o csv' writes a table of the results"});

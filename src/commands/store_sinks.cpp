@@ -13,34 +13,35 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/work/store_place.hpp"
+#include "time_field.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using report::Align;
 
-const std::array<report::Column, 6> columns = {{{"SINK", "sink"},
-                                                {"EVENT", "event", Align::right},
-                                                {"WAITING", "waiting", Align::right},
-                                                {"OLDEST", "oldest"},
-                                                {"MOVED", "moved"},
-                                                {"URL", "url"}}};
+const std::array<report::Column, 6> columns = {
+    {{"SINK", "sink"},
+     {"EVENT", "event", Align::right},
+     {"WAITING", "waiting", Align::right},
+     {"OLDEST", "oldest", Align::left, 0, report::wrapped(10)},
+     {"MOVED", "moved", Align::left, 0, report::wrapped(10, 1)},
+     {"URL", "url", Align::left, 0, report::wrapped(20, 2)}}};
 
 report::Record sink_record(const store::SinkRow& sink, const store::Backlog& backlog,
-                           const Clock& clock) {
-  const report::Cell oldest =
-      backlog.oldest ? report::Cell(report::to_text(*backlog.oldest)) : report::Cell();
+                           const Context& context) {
   return {.type = "sink",
           .target = {},
-          .time = clock.wall(),
+          .time = context.clock.wall(),
           .fields = {{"sink", sink.name},
                      {"url", sink.url},
                      {"event", number(sink.positions.event)},
                      {"gap", number(sink.positions.gap)},
                      {"happening", number(sink.positions.happening)},
                      {"waiting", count(backlog.events + backlog.gaps)},
-                     {"oldest", oldest},
-                     {"moved", report::to_text(sink.moved)}}};
+                     backlog.oldest ? time_field("oldest", *backlog.oldest, context)
+                                    : report::Field{"oldest", report::Cell()},
+                     time_field("moved", sink.moved, context)}};
 }
 
 }  // namespace
@@ -51,7 +52,7 @@ Result<Outcome> list_sinks(const StoreOptions& options, Context& context) {
   Listing listing(context, columns);
   for (const store::SinkRow& sink : sinks) {
     TRY_LET(const auto backlog, reader->behind(sink.positions));
-    listing.add(sink_record(sink, backlog, context.clock));
+    listing.add(sink_record(sink, backlog, context));
   }
   Outcome outcome;
   outcome.succeed();

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "records.hpp"
-#include "spindle/base/local_time.hpp"
 #include "spindle/work/event_rows.hpp"
 
 namespace spindle::commands {
@@ -47,38 +46,6 @@ std::string text_of(const Record& record) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", field.key, value);
   }
   return text;
-}
-
-void add_new(std::vector<Column>& columns, Column column) {
-  const bool is_there = std::any_of(columns.begin(), columns.end(),
-                                    [&](const Column& other) { return other.key == column.key; });
-  if (!is_there) columns.push_back(std::move(column));
-}
-
-bool has_unit_column(const catalogue::Parameter& parameter) {
-  return !parameter.unit.empty() && parameter.unit != catalogue::torque_unit;
-}
-
-/// Every field of the profile's events, each with its unit.
-void add_fields(std::vector<Column>& columns, const catalogue::Profile& profile) {
-  const catalogue::EventLayout layout(profile);
-  for (const auto& field : layout.fields()) {
-    add_new(columns, {field.key, field.key});
-    if (field.parameter->name == profile.events->error) {
-      add_new(columns, {field.key, field.key + "_text"});
-    }
-    if (has_unit_column(*field.parameter)) add_new(columns, {field.key, field.key + "_unit"});
-  }
-}
-
-std::vector<Field> units_of(const catalogue::Profile& profile) {
-  std::vector<Field> units;
-  const catalogue::EventLayout layout(profile);
-  for (const auto& field : layout.fields()) {
-    if (!has_unit_column(*field.parameter)) continue;
-    units.push_back(only_shown(field.key + "_unit", field.parameter->unit.to_string()));
-  }
-  return units;
 }
 
 }  // namespace
@@ -136,7 +103,6 @@ StoredRecords::Speaker& StoredRecords::speaker(const store::Place& place) {
   const auto known = shelf_->take(place.profile);
   if (known && (*known)->profile.events) {
     speaker->known = *known;
-    speaker->units = units_of((*known)->profile);
   }
   speaker->is_strange = !known;
   if (!known && told_.insert(place.profile).second) {
@@ -160,14 +126,13 @@ Naming StoredRecords::naming(RowId tool, std::int64_t epoch, RowId id) const {
 Record StoredRecords::event(const store::EventView& row) {
   const store::Place* place = this->place(row.place);
   const Speaker& speaker = this->speaker(place != nullptr ? *place : store::Place());
-  const bool fits = speaker.known != nullptr &&
-                    row.raw.size() == 2 * std::size_t{speaker.known->profile.events->count};
+  const bool fits = speaker.known != nullptr && row.raw.size() % 2 == 0 &&
+                    speaker.known->profile.events->has_form(row.raw.size() / 2);
   Record record = fits ? speaker.records->event(news_of(row), naming(row.tool, row.epoch, row.id))
                        : event_by_columns(row, speaker);
   if (fits && context_->user.format == report::Format::csv) {
-    record.fields.insert(record.fields.end(), speaker.units.begin(), speaker.units.end());
+    speaker.records->add_units(record);
   }
-  record.fields.push_back(only_shown("local_time", to_local_text(row.at, context_->clock)));
   return record;
 }
 
@@ -202,7 +167,6 @@ Record StoredRecords::gap(const store::Gap& row) {
   const Speaker& speaker = this->speaker(place != nullptr ? *place : store::Place());
   Record record =
       speaker.records->gap(work::news_of(row), row.ended, naming(row.tool, row.epoch, row.id));
-  record.fields.push_back(only_shown("local_time", to_local_text(row.ended, context_->clock)));
   return record;
 }
 
@@ -218,20 +182,20 @@ Record StoredRecords::happening(const store::Happening& row) const {
     record.fields.push_back(only_shown("kind", row.type, is_loss ? Tone::bad : Tone::plain));
   }
   record.fields.push_back(only_shown("text", std::move(text)));
-  record.fields.push_back(only_shown("local_time", to_local_text(row.at, context_->clock)));
   return record;
 }
 
 std::vector<Column> StoredRecords::table_columns(const std::vector<const store::Place*>& places,
                                                  Tools tools) {
-  std::vector<const catalogue::Profile*> profiles;
+  NewsSources sources{.tools = tools};
   bool is_any_strange = false;
   for (const store::Place* place : places) {
     const KnownProfile* known = this->known(*place);
-    if (known != nullptr) profiles.push_back(&known->profile);
+    if (known != nullptr) sources.profiles.push_back(&known->profile);
+    if (known != nullptr) sources.torque_units.push_back(place->torque_unit);
     is_any_strange = is_any_strange || speaker(*place).is_strange;
   }
-  std::vector<Column> columns = news_columns(tools, profiles);
+  std::vector<Column> columns = news_columns(sources);
   if (is_any_strange) {
     const auto text = columns.back();
     columns.pop_back();
@@ -244,7 +208,6 @@ std::vector<Column> StoredRecords::table_columns(const std::vector<const store::
     add(store::Column::a3, "TOTAL ANGLE", 11);
     columns.push_back(text);
   }
-  if (context_->io.out_is_terminal) columns.front() = {"TIME", "local_time", Align::left, 29};
   return columns;
 }
 
@@ -257,7 +220,7 @@ std::vector<Column> StoredRecords::all_columns(const std::vector<const store::Pl
   for (const store::Place* place : places) {
     const KnownProfile* known = this->known(*place);
     if (known != nullptr) {
-      add_fields(columns, known->profile);
+      add_event_fields(columns, known->profile);
     } else if (speaker(*place).is_strange) {
       add_new(columns, {"number", "number"});
       for (const auto& [word, column] : store::column_words) {

@@ -54,7 +54,6 @@ class StoredRecords {
   struct Speaker {
     Target target = {};
     const KnownProfile* known = nullptr;
-    std::vector<report::Field> units = {};              ///< of its events' fields, for CSV
     bool is_strange = false;                            ///< its profile is not known any more
     std::optional<NewsRecords> records = std::nullopt;  ///< of gaps also where `known` is null
   };

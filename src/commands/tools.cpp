@@ -17,16 +17,18 @@ namespace {
 using report::Column;
 using report::Record;
 
-const std::array<Column, 6> tool_columns = {{{"NAME", "name"},
-                                             {"URL", "endpoint"},
-                                             {"PROFILE", "profile"},
-                                             {"TORQUE UNIT", "torque_unit"},
-                                             {"GROUPS", "groups"},
-                                             {"VERIFIED", "verified"}}};
+const std::array<Column, 6> tool_columns = {
+    {{"NAME", "name"},
+     {"URL", "endpoint", report::Align::left, 0, report::wrapped(24)},
+     {"PROFILE", "profile"},
+     {"TORQUE UNIT", "torque_unit", report::Align::left, 0, report::left_out(2)},
+     {"GROUPS", "groups", report::Align::left, 0, report::wrapped(12)},
+     {"VERIFIED", "verified", report::Align::left, 0, report::wrapped(12, 1)}}};
 
 std::vector<std::string> groups_of(const files::Tool& tool, const files::Tools& tools) {
   std::vector<std::string> groups;
   for (const auto& [group, members] : tools.groups) {
+    if (tools.faults.contains("@" + group)) continue;
     const bool is_member = std::find(members.begin(), members.end(), tool.name) != members.end();
     if (is_member) groups.push_back(group);
   }
@@ -42,7 +44,8 @@ Record tool_record(const files::Tool& tool, const files::Tools& tools, const Clo
                      {"profile", text_or_null(tool.profile)},
                      {"torque_unit", text_or_null(tool.torque_unit)},
                      {"groups", groups_of(tool, tools)},
-                     {"verified", tool.verified}}};
+                     {"verified", tool.verified},
+                     {"serial", text_or_null(tool.serial)}}};
 }
 
 /// Collects what the file's own rules cannot see: whether URLs, profiles and actions exist.
@@ -96,7 +99,20 @@ Result<Outcome> tools(Context& context) {
   }
   Listing listing(context, tool_columns);
   for (const files::Tool& tool : context.tools.tools) {
+    if (context.tools.faults.contains(tool.name)) continue;
+    const Resolution meant = resolve_each_target({tool.name}, context);
+    for (const Error& fault : meant.faults) {
+      outcome.fail(fault);
+      listing.add(fault);
+    }
+    if (!meant.faults.empty()) continue;
     listing.add(tool_record(tool, context.tools, context.clock));
+  }
+  for (const auto& [entry, fault] : context.tools.faults) {
+    outcome.fail(fault);
+    Error told = fault;
+    if (files::may_name_tools(entry)) told.target = entry;  // else it is a sink's
+    listing.add(told);
   }
   return finish(listing, outcome);
 }

@@ -78,6 +78,12 @@ class Verb {
   /// The columns of a group whose lists are shown while they grow; none: shown at the end.
   [[nodiscard]] virtual std::vector<report::Column> live_columns() const { return {}; }
 
+  /// What a word that was taken for a tool means otherwise, such as "a parameter"; empty: nothing.
+  [[nodiscard]] virtual std::string_view otherwise(const std::string& /*word*/,
+                                                   const catalogue::Profile& /*profile*/) const {
+    return {};
+  }
+
   /// What is meant for a tool of this profile. Asks and tells nothing.
   virtual Result<Plan> plan(const catalogue::Profile& profile, const Target& target) const = 0;
 

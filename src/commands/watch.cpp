@@ -116,7 +116,8 @@ class WatchListener final : public Listener {
 
 Result<Outcome> watch(const WatchOptions& options, Context& context) {
   ProfileShelf shelf(context.profiles);
-  TRY_LET(const auto resolved, resolve_targets(options.targets, context));
+  TRY_LET(auto resolved, resolve_targets(options.targets, context));
+  const std::vector<Error> faults = take_out_faulty(resolved);
   TRY_LET(auto tools, prepare_tools(resolved, options.names, shelf, context));
   for (const WatchedTool& tool : tools) {
     if (auto checked = check_watch(options, tool, shelf, context); !checked) {
@@ -133,7 +134,11 @@ Result<Outcome> watch(const WatchOptions& options, Context& context) {
   TRY_LET(auto memory, Memory::open(options, context));
   std::vector<Target> targets;
   for (const WatchedTool& tool : tools) targets.push_back(tool.target());
-  WatchStream stream(options, tools.size(), columns_for(tools, shelf, options, context), context);
+  std::vector<std::string> names;
+  for (const Target& target : targets) names.push_back(target.shown);
+  WatchStream stream(options, names, columns_for(tools, shelf, options, context), context);
+  if (!stream.is_open()) return stream.finish();
+  for (const Error& fault : faults) stream.fail(fault);
   const auto note = [&](const std::string& sentence) { stream.note(sentence); };
   OwnedLines lines(targets, context, note);
   TRY(let_others_ask(lines, options.gateway, note));

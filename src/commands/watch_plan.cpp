@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "driver.hpp"
+#include "spindle/catalogue/short_name.hpp"
 #include "spindle/device/run_model.hpp"
 
 namespace spindle::commands {
@@ -32,10 +34,23 @@ Result<device::WatchPlan> check_purpose(const WatchOptions& options,
   return plan;
 }
 
+/// What is secret is not shown by the way.
+Result<void> check_secrets(const std::vector<catalogue::Parameter>& values) {
+  for (const catalogue::Parameter& parameter : values) {
+    if (parameter.secrecy == catalogue::Secrecy::open) continue;
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "it is a secret, and no stream shows it",
+                                .hint = "'spindle get --include-secrets' does",
+                                .name = parameter.name});
+  }
+  return {};
+}
+
 /// Why the counter alone cannot be polled instead; empty: it can.
 std::string_view why_not_unarmed(const catalogue::Profile& profile) {
   if (!profile.events) return "it has no events";
   if (!catalogue::sends_unasked(profile)) return "its events are polled, it sends nothing unasked";
+  if (!profile.events->first) return "where its last event can be read is not known";
   return profile.events->arm ? "" : "it sends its events whether they are wanted or not";
 }
 
@@ -78,7 +93,9 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
   const std::vector<std::string> names =
       options.names.empty() ? to_strings(profile.watched) : options.names;
   if (!names.empty()) {
-    TRY_LET(auto values, profile.select(names));
+    TRY_LET(const auto meant, catalogue::meant_by(names, profile));
+    TRY_LET(auto values, profile.select(meant));
+    TRY(check_secrets(values));
     plan.values = std::move(values);
   }
   return check_purpose(options, profile, std::move(plan));
@@ -87,6 +104,10 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
 Result<void> check_watch(const WatchOptions& options, const WatchedTool& tool, ProfileShelf& shelf,
                          const Context& context) {
   if (tool.known() == nullptr) return check_for_any_profile(options, shelf, context);
+  for (const std::string& word : context.user.doubtful) {
+    if (!catalogue::is_meant(word, tool.known()->profile)) continue;
+    return tl::unexpected(doubtful(word, "a parameter", context));
+  }
   return plan_watch(options, tool.known()->profile).map([](const device::WatchPlan&) {});
 }
 

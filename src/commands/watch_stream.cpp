@@ -36,6 +36,17 @@ WatchStream::WatchStream(const WatchOptions& options, std::size_t tools,
       started_(context.clock.now()),
       last_event_(started_) {}
 
+WatchStream::WatchStream(const WatchOptions& options, const std::vector<std::string>& targets,
+                         const std::vector<report::Column>& columns, Context& context)
+    : WatchStream(options, targets.size(), columns, context) {
+  const bool is_wanted = status_.is_shown() && context.io.out_is_terminal &&
+                         context.user.frames == Frames::hidden &&
+                         report::is_table(context.user.format) && listing_.open();
+  if (!is_wanted) return;
+  board_.emplace(targets, columns);
+  show_status();
+}
+
 WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   const std::lock_guard lock(mutex_);
   if (ended_ && !is_only_here(news)) return WatchControl::stop;
@@ -45,9 +56,12 @@ WatchControl WatchStream::tell(const device::WatchEvent& news, Voice& voice) {
   }
   status_.clear();
   tell_dropped(voice);
-  const report::Record record =
-      std::visit([&](const auto& one) { return record_of(one, voice); }, news);
+  report::Record record = std::visit([&](const auto& one) { return record_of(one, voice); }, news);
+  if (context_->user.format == report::Format::csv && record.type == "event") {
+    voice.records->add_units(record);
+  }
   if (records_ == Records::shown) listing_.add(record);
+  note_board(record, voice);
   show_status();
   const bool counted = options_->count > 0 && activity_ >= options_->count;
   if (counted || !listing_.open()) end();
@@ -109,6 +123,7 @@ TimePoint WatchStream::until() {
     end();
   }
   if (ended_) return TimePoint::min();
+  if (board_ && !out_.is_full() && status_.screen() != drawn_on_) show_status();
   TimePoint until = TimePoint::max();
   if (options_->duration) until = started_ + *options_->duration;
   if (options_->idle_timeout) until = std::min(until, last_event_ + *options_->idle_timeout);
@@ -166,6 +181,12 @@ report::Record WatchStream::record_of(const device::PollLag& news, const Voice& 
   return voice.records->lag(news, context_->clock.wall());
 }
 
+/// Thousands of numbers are only written where there is a reader.
+report::Record WatchStream::record_of(const device::ToolCurve& news, const Voice& voice) const {
+  return records_ == Records::shown ? voice.records->curve(news, voice.naming)
+                                    : voice.records->curve_header(news, voice.naming);
+}
+
 report::Record WatchStream::record_of(const device::LinkChange& news, const Voice& voice) {
   note_link(news);
   return voice.records->link(news, context_->clock.wall());
@@ -212,11 +233,25 @@ void WatchStream::tell_dropped(Voice& voice) {
   listing_.add(record);
 }
 
+void WatchStream::note_board(const report::Record& record, const Voice& voice) {
+  if (board_) board_->note(record, voice.records->preset_key());
+}
+
+/// Under the events, which scroll above it.
+void WatchStream::show_board() {
+  drawn_on_ = status_.screen();
+  constexpr std::size_t rows_of_events = 6;
+  const std::size_t rows = drawn_on_.rows;
+  const std::size_t most = rows > 2 * rows_of_events ? rows - rows_of_events : (rows + 1) / 2;
+  status_.show(board_->lines(most, drawn_on_.columns, context_->io.color));
+}
+
 /// Under the stream, where both are one terminal.
 void WatchStream::show_status() {
   const bool alone = context_->user.frames == Frames::hidden;
   if (!context_->io.out_is_terminal || !alone) return;
   out_.flush();
+  if (board_) return show_board();
   status_.show(fmt::format("{} of {} connected, {}, {} NG", connected_, counted(tools_, "tool"),
                            counted(counts_.ok + counts_.ng, "result"), counts_.ng));
 }

@@ -11,6 +11,7 @@
 #include "patient_out.hpp"
 #include "progress.hpp"
 #include "spindle/commands/commands.hpp"
+#include "watch_board.hpp"
 
 namespace spindle::commands {
 
@@ -38,6 +39,9 @@ class WatchStream {
   WatchStream(const WatchOptions& options, std::size_t tools,
               const std::vector<report::Column>& columns, Context& context,
               Records records = Records::shown);
+  /// The same of tools that stay the same, each of which has a line of its own on a terminal.
+  WatchStream(const WatchOptions& options, const std::vector<std::string>& targets,
+              const std::vector<report::Column>& columns, Context& context);
   WatchStream(const WatchStream&) = delete;
   WatchStream& operator=(const WatchStream&) = delete;
 
@@ -59,6 +63,9 @@ class WatchStream {
 
   /// When to end, as far as is known now; asks, too, whether the output still has a reader.
   TimePoint until();
+
+  /// Whether there is a reader, and the columns are there that were asked for.
+  [[nodiscard]] bool is_open() const { return listing_.open(); }
 
   /// The end of the whole, with its summary, once every tool has left.
   Result<Outcome> finish();
@@ -82,12 +89,15 @@ class WatchStream {
   report::Record record_of(const device::PolledValue& news, const Voice& voice);
   report::Record record_of(const device::EventGap& news, const Voice& voice);
   report::Record record_of(const device::PollLag& news, const Voice& voice);
+  [[nodiscard]] report::Record record_of(const device::ToolCurve& news, const Voice& voice) const;
   report::Record record_of(const device::LinkChange& news, const Voice& voice);
   void note_link(const device::LinkChange& news);
   void note_activity();
   void drop(const device::WatchEvent& news, Dropped& dropped);
   void tell_dropped(Voice& voice);
+  void note_board(const report::Record& record, const Voice& voice);
   void show_status();
+  void show_board();
   void end();
   Result<Outcome> give_up(std::size_t left);
   [[nodiscard]] std::string sentence() const;
@@ -101,6 +111,8 @@ class WatchStream {
   ProgressLine status_;
   PatientOut out_;
   Listing listing_;
+  std::optional<WatchBoard> board_ = std::nullopt;
+  report::Screen drawn_on_ = {};
   Outcome outcome_ = {};
   TimePoint started_;
   TimePoint last_event_;

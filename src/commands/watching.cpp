@@ -48,17 +48,22 @@ std::vector<report::Column> columns_for(const std::vector<WatchedTool>& tools, P
   const bool is_named = !options.targets.empty() && !names_group(options.targets.front());
   const bool one = tools.size() == 1 && is_named;
   const Tools shown = one ? Tools::one : Tools::several;
+  const bool is_file = context.user.format == report::Format::csv;
   const bool motors = std::all_of(tools.begin(), tools.end(), [](const WatchedTool& tool) {
     return tool.known() != nullptr && device::has_motor(tool.known()->profile) &&
            !tool.known()->profile.events;
   });
-  if (motors) return motor_columns(shown);
-  std::vector<const catalogue::Profile*> profiles;
+  if (motors && !is_file) return motor_columns(shown);
+  NewsSources sources{.tools = shown};
+  bool all_known = true;
   for (const WatchedTool& tool : tools) {
-    if (tool.known() == nullptr) return news_columns(shown, candidates(shelf, context));
-    profiles.push_back(&tool.known()->profile);
+    all_known = all_known && tool.known() != nullptr;
+    if (all_known) sources.profiles.push_back(&tool.known()->profile);
+    const bool has_torque = tool.known() == nullptr || tool.known()->profile.events;
+    if (has_torque) sources.torque_units.push_back(tool.target().torque_unit);
   }
-  return news_columns(shown, profiles);
+  if (!all_known) sources.profiles = candidates(shelf, context);
+  return is_file ? exchange_columns(sources.profiles) : news_columns(sources);
 }
 
 void watch_tool(WatchedTool& tool, const device::OpenTransport& open_transport,

@@ -1,6 +1,7 @@
 #include "spindle/device/device.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <utility>
@@ -86,7 +87,12 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
         {area.table, area.from, static_cast<std::uint16_t>(area.to - area.from + 1)});
   }
   if (catalogue::sends_unasked(profile)) {
-    limits.forbidden_shapes.push_back(read_of(shape_of(*profile.events)));
+    for (const auto& shape : shapes_of(*profile.events)) {
+      limits.forbidden_shapes.push_back(read_of(shape));
+    }
+  }
+  for (const catalogue::UnaskedFrame& frame : profile.link.unasked) {
+    limits.forbidden_shapes.push_back(read_of(shape_of(frame)));
   }
   for (const link::SpontaneousShape& shape : unasked) {
     limits.forbidden_shapes.push_back(read_of(shape));
@@ -97,6 +103,17 @@ link::ReadLimits read_limits(const catalogue::Profile& profile,
     }
   }
   return limits;
+}
+
+/// What no trace shows.
+std::vector<RegisterRange> secrets_of(const catalogue::Profile& profile) {
+  std::vector<RegisterRange> secrets;
+  for (const Parameter& parameter : profile.parameters) {
+    if (parameter.secrecy == catalogue::Secrecy::open) continue;
+    secrets.push_back(range_of(parameter));
+    if (parameter.write_address) secrets.push_back(range_at(parameter, *parameter.write_address));
+  }
+  return secrets;
 }
 
 /// A profile without rules gives more than the standard asks for, because there are devices that do
@@ -116,7 +133,7 @@ link::DemuxRules demux_rules(const catalogue::Profile& profile, modbus::Framing 
   link::DemuxRules rules{.framing = framing,
                          .units = units_of(profile),
                          .transactions = endpoint.transactions.value_or(profile.link.transactions)};
-  if (catalogue::sends_unasked(profile)) rules.spontaneous.push_back(shape_of(*profile.events));
+  if (catalogue::sends_unasked(profile)) rules.spontaneous = shapes_of(*profile.events);
   return rules;
 }
 
@@ -181,6 +198,16 @@ std::string endpoint_beside(const link::Endpoint& endpoint, const LinkOptions& o
   return options.shown.empty() || options.shown == endpoint.text ? std::string() : endpoint.text;
 }
 
+/// The text is the whole serial number; what function 17 says is compared with it.
+void take_serial(std::string serial, catalogue::Identity& identity) {
+  if (serial.empty() || serial == identity.serial) return;
+  if (!identity.serial.empty()) {
+    identity.notes.push_back(fmt::format(
+        "serial number is {} in its registers, and {} by function 17", serial, identity.serial));
+  }
+  identity.serial = std::move(serial);
+}
+
 }  // namespace
 
 modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkSpec& facts) {
@@ -196,8 +223,20 @@ modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::Link
   return facts.framing;
 }
 
-link::SpontaneousShape shape_of(const catalogue::EventSpec& events) {
-  return {events.function, static_cast<std::uint8_t>(2 * events.count)};
+std::vector<link::SpontaneousShape> shapes_of(const catalogue::EventSpec& events) {
+  const auto shape = [&](std::uint16_t count) {
+    return link::SpontaneousShape{events.function, static_cast<std::uint8_t>(2 * count)};
+  };
+  std::vector<link::SpontaneousShape> shapes = {shape(events.count)};
+  for (const catalogue::EventForm& form : events.longer) shapes.push_back(shape(form.count));
+  for (const catalogue::EventFrame& frame : events.frames) {
+    shapes.push_back({.function = frame.function});
+  }
+  return shapes;
+}
+
+link::SpontaneousShape shape_of(const catalogue::UnaskedFrame& frame) {
+  return {frame.function, static_cast<std::uint8_t>(2 * frame.count)};
 }
 
 Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile,
@@ -209,7 +248,9 @@ Device::Device(const link::Endpoint& endpoint, const catalogue::Profile& profile
       session_(std::move(session)),
       retries_(options.retries.value_or(profile.link.retries)),
       limits_(read_limits(*profile_, options.unasked)),
-      client_(*session_, limits_, retries_) {}
+      client_(*session_, limits_, retries_) {
+  session_->hide(secrets_of(*profile_));
+}
 
 Device::~Device() {
   if (session_) session_->drain_late_answer();
@@ -300,6 +341,7 @@ void Device::use(const catalogue::Profile& profile, catalogue::Identity identity
   profile_ = &profile;
   identity_ = std::move(identity);
   session_->set_rules(demux_rules(*profile_, session_->options().rules.framing, at_));
+  session_->hide(secrets_of(*profile_));
   limits_ = read_limits(*profile_, {});
   client_ = link::Client(*session_, limits_, retries_);
   registers_known_ = true;
@@ -317,27 +359,62 @@ Result<void> Device::require_known_registers() {
   registers_known_ = judgement == catalogue::Judgement::fits;
   identity_text_ =
       fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
-  if (registers_known_) {
-    identity_ = std::move(identity);
-    return {};
-  }
+  if (!registers_known_) return tl::unexpected(misfit(judgement, identity));
+  identity_ = std::move(identity);
+  return ask_more();
+}
+
+Error Device::misfit(catalogue::Judgement judgement, const catalogue::Identity& identity) const {
+  const auto& facts = *profile_->identity;
   Error error{.code = Errc::wrong_generation, .target = target_, .endpoint = endpoint_};
-  if (judgement == catalogue::Judgement::other_product) {
-    error.code = Errc::mismatch;
-    error.message = fmt::format("this is not what profile {} describes: {}", profile_->id,
-                                catalogue::misfit(*profile_, identity));
-    error.hint = fmt::format("name its own profile: --profile {}", identity.product_profile);
-    return tl::unexpected(std::move(error));
+  switch (judgement) {
+    case catalogue::Judgement::other_product:
+      error.code = Errc::mismatch;
+      error.message = fmt::format("this is not what profile {} describes: {}", profile_->id,
+                                  catalogue::misfit(*profile_, identity));
+      error.hint = fmt::format("name its own profile: --profile {}", identity.product_profile);
+      break;
+    case catalogue::Judgement::later:
+      error.message = fmt::format("firmware {} has other registers than profile {} (below {})",
+                                  *identity.firmware, profile_->id, facts.firmware_below);
+      break;
+    case catalogue::Judgement::earlier:
+      error.message = fmt::format("firmware {} has other registers than profile {} (from {})",
+                                  *identity.firmware, profile_->id, facts.firmware_from);
+      break;
+    case catalogue::Judgement::unknown:
+    case catalogue::Judgement::fits:
+      error.message = fmt::format(
+          "the tool does not identify itself as profile {} expects, so its registers "
+          "are not known",
+          profile_->id);
+      break;
   }
-  error.message =
-      judgement == catalogue::Judgement::later
-          ? fmt::format("firmware {} has other registers than profile {} (below {})",
-                        *identity.firmware, profile_->id, facts.firmware_below)
-          : fmt::format(
-                "the tool does not identify itself as profile {} expects, so its registers "
-                "are not known",
-                profile_->id);
-  return tl::unexpected(std::move(error));
+  return error;
+}
+
+Result<void> Device::ask_more() {
+  if (!identity_ || !profile_->identity || !profile_->identity->has_more()) return {};
+  const auto& facts = *profile_->identity;
+  std::vector<std::string> names = {facts.model_from, facts.serial_from};
+  for (const catalogue::Text& name : facts.version_from) names.push_back(name);
+  std::erase(names, "");
+  TRY_LET(const auto parameters, profile_->select(names));
+  TRY_LET(const auto readings, read_each(parameters, Limits::skip));
+  const auto told = [&](std::string_view name) -> std::string {
+    for (const Reading& reading : readings) {
+      const bool is_meant = !name.empty() && reading.parameter.name == name;
+      if (is_meant && reading.value) return reading.value->to_string();
+    }
+    return {};
+  };
+  if (auto model = told(facts.model_from); !model.empty()) identity_->tool_model = model;
+  take_serial(told(facts.serial_from), *identity_);
+  std::vector<std::string> numbers;
+  for (const catalogue::Text& name : facts.version_from) numbers.push_back(told(name));
+  const bool is_whole = std::find(numbers.begin(), numbers.end(), "") == numbers.end();
+  if (is_whole) identity_->version = fmt::format("{}", fmt::join(numbers, "."));
+  return {};
 }
 
 Result<std::vector<Reading>> Device::read_each(const std::vector<Parameter>& parameters,
@@ -506,15 +583,28 @@ Result<std::uint16_t> Device::event_number() {
 
 Result<Registers> Device::event_block() {
   const catalogue::EventSpec& events = *profile_->events;
+  const unsigned firmware = identity_ ? identity_->firmware.value_or(0) : 0;
+  const std::uint16_t longest = events.count_for(firmware);
+  if (longest > events.count && !has_usual_events_) {
+    auto block = event_registers(longest);
+    if (block || block.error().code != Errc::exception_response) return block;
+    has_usual_events_ = true;
+  }
+  return event_registers(events.count);
+}
+
+Result<Registers> Device::event_registers(std::uint16_t count) {
+  const catalogue::EventSpec& events = *profile_->events;
   const auto table = catalogue::table_of(events);
-  // What is read in one piece looks like a frame that was sent unasked.
-  const unsigned unlike = catalogue::sends_unasked(*profile_) ? events.count - 1U : events.count;
-  const unsigned most = std::clamp<unsigned>(profile_->link.max_read, 1, std::max(unlike, 1U));
+  // What is read in one piece of such a size looks like a frame that was sent unasked.
+  const bool may_resemble = catalogue::sends_unasked(*profile_);
   Registers block;
-  while (block.size() < events.count) {
-    const auto left = static_cast<unsigned>(events.count - block.size());
-    const auto first = static_cast<std::uint16_t>(events.first + block.size());
-    auto part = read_raw({table, first, static_cast<std::uint16_t>(std::min(left, most))});
+  while (block.size() < count) {
+    const auto left = static_cast<unsigned>(count - block.size());
+    unsigned size = std::clamp<unsigned>(profile_->link.max_read, 1, left);
+    while (size > 1 && may_resemble && events.has_form(size)) --size;
+    const auto first = static_cast<std::uint16_t>(*events.first + block.size());
+    auto part = read_raw({table, first, static_cast<std::uint16_t>(size)});
     if (!part) return part;
     block.insert(block.end(), part->begin(), part->end());
   }
@@ -523,7 +613,7 @@ Result<Registers> Device::event_block() {
 
 Result<std::optional<Registers>> Device::last_event() {
   TRY_LET(const auto number, profile_->find(profile_->events->number));
-  const std::size_t number_at = number.address.value - profile_->events->first;
+  const std::size_t number_at = number.address.value - *profile_->events->first;
   for (int attempt = 0; attempt < max_event_reads; ++attempt) {
     TRY_LET(auto block, event_block());
     TRY_LET(const auto again, event_number());

@@ -106,10 +106,11 @@ Error without_proof(Error reading) {
 }
 
 /// It is not known what became of a write without an answer that cannot be read back either.
-Error without_knowledge(Error write, const Value& before, const Value& value) {
+Error without_knowledge(Error write, const Parameter& parameter, const Value& before,
+                        const Value& value) {
   if (is_interruption(write)) return write;
   write.hint = fmt::format("whether it was written is not known: it holds {} or {}; read it again",
-                           before.to_string(), value.to_string());
+                           shown_of(parameter, before), shown_of(parameter, value));
   return write;
 }
 
@@ -125,6 +126,7 @@ bool is_refusal(const Error& error) {
 /// order of their registers.
 Result<void> Device::write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
                                      const Registers& registers) {
+  TRY(profile_->may_write(table, first, registers.size()));
   for (const modbus::Pdu& request : write_requests(table, first, registers, profile_->link)) {
     TRY(client_.write(request));
   }
@@ -207,7 +209,7 @@ Written Device::refused(Error error, const Parameter& parameter, const Value& be
   }
   if (*now == before) return {WriteResult::refused, *now, std::move(error)};
   if (*now == value) return {WriteResult::written, *now};
-  error.message += fmt::format("; it was written in part and holds {}", now->to_string());
+  error.message += fmt::format("; it was written in part and holds {}", shown_of(parameter, *now));
   return {WriteResult::coerced, *now, std::move(error)};
 }
 
@@ -215,21 +217,22 @@ Written Device::judged(const Parameter& parameter, const Value& before, const Va
                        const Result<void>& sent, const Result<Value>& now) const {
   if (!now) {
     const bool by_reading = sent || is_interruption(now.error());
-    return {
-        WriteResult::unknown, std::nullopt,
-        by_reading ? without_proof(now.error()) : without_knowledge(sent.error(), before, value),
-        Doubt::may_act_late};
+    return {WriteResult::unknown, std::nullopt,
+            by_reading ? without_proof(now.error())
+                       : without_knowledge(sent.error(), parameter, before, value),
+            Doubt::may_act_late};
   }
   if (*now == value) return {WriteResult::written, *now};
   const bool same = *now == before;
-  const std::string holds = fmt::format("{} holds {}", same ? "still" : "now", now->to_string());
+  const std::string holds =
+      fmt::format("{} holds {}", same ? "still" : "now", shown_of(parameter, *now));
   Error error;
   if (sent) {
-    error =
-        about({.code = Errc::mismatch,
-               .message = fmt::format("the tool acknowledged {} but {}", value.to_string(), holds),
-               .hint = "is the tool running, locked, or set to refuse changes?"},
-              parameter.name, parameter.address);
+    error = about({.code = Errc::mismatch,
+                   .message = fmt::format("the tool acknowledged {} but {}",
+                                          shown_of(parameter, value), holds),
+                   .hint = "is the tool running, locked, or set to refuse changes?"},
+                  parameter.name, parameter.address);
   } else {
     error = sent.error();
     error.message = fmt::format("{}; it {}", message_of(error), holds);
@@ -485,6 +488,7 @@ Result<void> Device::broadcast_word(modbus::RegisterAddress address, std::uint16
 
 Result<void> Device::broadcast_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
                                          const Registers& registers) {
+  TRY(profile_->may_write(table, first, registers.size()));
   for (const modbus::Pdu& request : write_requests(table, first, registers, profile_->link)) {
     auto sent = session_->broadcast(request);
     if (!sent) return tl::unexpected(located(std::move(sent.error())));

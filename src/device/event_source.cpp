@@ -6,7 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "spindle/base/text.hpp"
+#include "spindle/catalogue/curve.hpp"
 #include "spindle/catalogue/event_layout.hpp"
+#include "spindle/device/curve_collector.hpp"
 #include "spindle/device/event_tracker.hpp"
 #include "spindle/modbus/pdu.hpp"
 
@@ -72,14 +75,34 @@ std::string_view reason_of(Sequence novelty, EventOrigin origin) {
   return "the tool's event counter jumped";
 }
 
+/// What a tool pushes because it was armed comes within this time. What comes later has happened.
+constexpr Duration held_comes_within = std::chrono::seconds(1);
+
+/// Frames that cannot be what they say they are are told at once, then this often.
+constexpr Duration bad_frames_told_every = std::chrono::minutes(1);
+
+/// A frame that came unasked, as it was understood.
+struct Heard {
+  catalogue::PushedFrame frame = {};
+  std::optional<std::uint16_t> number = std::nullopt;  ///< of the event in it
+  TimePoint arrival = {};
+  WallTime wall = {};
+};
+
 /// A tool that counts its events: polled, and its frames heard where it sends any.
 class CounterSource : public EventSource {
  public:
   CounterSource(const catalogue::Profile& profile, Clock& clock, Tell tell)
-      : layout_(profile), clock_(&clock), tell_(std::move(tell)) {}
+      : layout_(profile),
+        frames_(profile),
+        clock_(&clock),
+        tell_(std::move(tell)),
+        curves_(frames_, [this](const ToolCurve& curve) { tell_(curve); }),
+        has_place_(profile.events->first.has_value()) {}
 
   Result<void> attach(Device& device, Duration unseen) override;
   void forget() override {
+    curves_.flush();
     tracker_ = {};
     first_.reset();
   }
@@ -87,31 +110,50 @@ class CounterSource : public EventSource {
   [[nodiscard]] bool polls() const override { return true; }
   Result<void> poll() override;
   void handle(const link::Spontaneous& frame) override {
-    judge(EventOrigin::push, modbus::registers_of(frame.pdu), frame.wall);
+    if (auto heard = understand(frame)) hear(std::move(*heard));
   }
-  void handle_waiting() override {
-    for (const link::Spontaneous& frame : take_waiting()) handle(frame);
+  void handle_waiting() override;
+  [[nodiscard]] TimePoint next_due() const override { return curves_.next_due(); }
+  Result<void> run_due(const Ask& /*ask*/) override {
+    curves_.run_due(clock_->now());
+    return {};
+  }
+  void disarm() override {
+    handle_waiting();
+    curves_.flush();
   }
 
  protected:
   /// Makes the tool send its events, between the reading of its counter and that of its last event.
   virtual Result<void> arm() { return {}; }
+  /// Until when an event that is pushed may be one that the tool held before it was connected.
+  [[nodiscard]] virtual TimePoint held_until() const { return TimePoint::min(); }
   [[nodiscard]] Device& device() const { return *device_; }
   [[nodiscard]] Clock& clock() const { return *clock_; }
+  /// Whether the last event can be read.
+  [[nodiscard]] bool has_place() const { return has_place_; }
 
  private:
   enum class Fetched : std::uint8_t { yes, too_fast };
 
-  [[nodiscard]] std::uint16_t number_of(const link::Spontaneous& frame) const {
-    return layout_.number_of(modbus::registers_of(frame.pdu));
-  }
+  Result<void> attach_unread(Duration unseen);
   Result<Fetched> fetch_last(EventOrigin origin);
-  std::vector<link::Spontaneous> take_waiting();
+  std::optional<Heard> understand(const link::Spontaneous& frame);
+  std::vector<Heard> take_waiting();
+  void hear(Heard heard);
   void judge(EventOrigin origin, const Registers& block, WallTime time);
+  void judge_unread_first(const Registers& block, WallTime time);
+  void note_bad(const link::Spontaneous& frame, const std::string& why);
 
   catalogue::EventLayout layout_;
+  catalogue::EventFrames frames_;
   Clock* clock_;
   Tell tell_;
+  CurveCollector curves_;
+  bool has_place_ = true;
+  bool was_away_ = false;  ///< the next event is the first behind a new connection
+  std::size_t bad_frames_ = 0;
+  std::optional<TimePoint> bad_told_at_ = std::nullopt;
   Device* device_ = nullptr;
   EventTracker tracker_ = {};
   /// How long the tool was not listened to behind the last event that was recalled.
@@ -123,6 +165,8 @@ class CounterSource : public EventSource {
 void CounterSource::recall(std::optional<LastEvent> last) {
   tells_first_ = !last;
   if (!last) return;
+  if (last->block && !layout_.fits(*last->block)) last->block.reset();
+  if (last->block) last->block = layout_.key_of(*last->block);
   tracker_.set_last(last->number, std::move(last->block));
   unseen_ = last->unseen;
 }
@@ -131,6 +175,8 @@ void CounterSource::recall(std::optional<LastEvent> last) {
 /// happens in between is either pushed or fetched.
 Result<void> CounterSource::attach(Device& device, Duration unseen) {
   device_ = &device;
+  curves_.flush();  // the rest of it went the old connection's way
+  if (!has_place_) return attach_unread(unseen);
   if (tracker_.last()) {
     tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
   } else {
@@ -140,6 +186,15 @@ Result<void> CounterSource::attach(Device& device, Duration unseen) {
     take_waiting();  // pushed before the counter was read, so they are old
   }
   return arm().and_then([this] { return fetch_last(EventOrigin::catch_up).map([](Fetched) {}); });
+}
+
+/// Where the last event cannot be read, all that is known is pushed.
+Result<void> CounterSource::attach_unread(Duration unseen) {
+  if (tracker_.last()) {
+    tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
+    was_away_ = true;
+  }
+  return arm();
 }
 
 /// Fetches the event of a counter that has changed; one that runs away is told as it was seen.
@@ -164,37 +219,104 @@ Result<void> CounterSource::poll() {
 Result<CounterSource::Fetched> CounterSource::fetch_last(EventOrigin origin) {
   const auto block = device_->last_event();
   const WallTime fetched = clock_->wall();
-  const auto pushed = take_waiting();
+  auto pushed = take_waiting();
   const bool read = block && *block;
-  const bool needed =
-      read && std::none_of(pushed.begin(), pushed.end(), [&](const link::Spontaneous& frame) {
-        return number_of(frame) == layout_.number_of(**block);
-      });
+  const bool needed = read && std::none_of(pushed.begin(), pushed.end(), [&](const Heard& heard) {
+                        return heard.number == layout_.number_of(**block);
+                      });
   auto next = pushed.begin();
   for (; needed && next != pushed.end(); ++next) {
-    if (!is_before(number_of(*next), layout_.number_of(**block))) break;
-    handle(*next);
+    if (next->number && !is_before(*next->number, layout_.number_of(**block))) break;
+    hear(std::move(*next));
   }
   if (needed) judge(origin, **block, fetched);
-  for (; next != pushed.end(); ++next) handle(*next);
+  for (; next != pushed.end(); ++next) hear(std::move(*next));
   if (!block) return tl::unexpected(block.error());
   return read ? Fetched::yes : Fetched::too_fast;
 }
 
-std::vector<link::Spontaneous> CounterSource::take_waiting() {
-  std::vector<link::Spontaneous> waiting;
+/// One after the other, so that a flood of curves is never in memory as a whole.
+void CounterSource::handle_waiting() {
+  for (std::size_t taken = 0; taken < max_taken; ++taken) {
+    const auto frame = device_->session().next_spontaneous(clock_->now());
+    if (!frame || !*frame) return;  // a broken line is noticed by the next who uses it
+    handle(**frame);
+  }
+}
+
+std::vector<Heard> CounterSource::take_waiting() {
+  std::vector<Heard> waiting;
   while (waiting.size() < max_taken) {
     auto frame = device_->session().next_spontaneous(clock_->now());
     if (!frame || !*frame) break;  // a broken line is noticed by the next who uses it
-    waiting.push_back(std::move(**frame));
+    if (auto heard = understand(**frame)) waiting.push_back(std::move(*heard));
   }
   return waiting;
+}
+
+std::optional<Heard> CounterSource::understand(const link::Spontaneous& frame) {
+  auto decoded = frames_.decode(frame.pdu);
+  if (!decoded) {
+    note_bad(frame, decoded.error());
+    return std::nullopt;
+  }
+  Heard heard = {.frame = std::move(*decoded), .arrival = frame.arrival, .wall = frame.wall};
+  if (heard.frame.block) heard.number = layout_.number_of(*heard.frame.block);
+  return heard;
+}
+
+void CounterSource::hear(Heard heard) {
+  if (!heard.frame.block) {
+    for (auto& part : heard.frame.channels) {
+      curves_.take_part(std::move(part), heard.arrival, heard.wall);
+    }
+    return;
+  }
+  const Registers& block = *heard.frame.block;
+  const Registers key = layout_.key_of(block);
+  curves_.close_before(key);
+  judge(EventOrigin::push, block, heard.wall);
+  curves_.take_event(*heard.number, key, block, std::move(heard.frame.channels), heard.arrival,
+                     heard.wall);
+}
+
+/// What cannot be understood is said, though a line that is full of it says so once in a while.
+void CounterSource::note_bad(const link::Spontaneous& frame, const std::string& why) {
+  ++bad_frames_;
+  const TimePoint now = clock_->now();
+  if (bad_told_at_ && now < *bad_told_at_ + bad_frames_told_every) return;
+  bad_told_at_ = now;
+  const std::size_t frames = std::exchange(bad_frames_, 0);
+  const std::string reason = fmt::format(
+      "{} that came unasked could not be understood; the last has function 0x{:02X}, but {}",
+      counted(frames, "frame"), frame.pdu.function, why);
+  if (frames_.holds_event(frame.pdu.function)) {
+    tell_(EventGap{.missed = std::nullopt, .reason = reason});
+  } else {
+    tell_(ToolCurve{.time = frame.wall, .is_whole = false, .trouble = reason});
+  }
+}
+
+/// The first event of a tool whose last one cannot be read. What comes while it may answer to the
+/// arming may be an old one; what comes later has just happened.
+void CounterSource::judge_unread_first(const Registers& block, WallTime time) {
+  const std::uint16_t number = layout_.number_of(block);
+  tracker_.track(number, layout_.key_of(block));
+  if (EventTracker::is_blank(layout_.key_of(block))) return;
+  const bool is_held = clock_->now() < held_until();
+  tell_(ToolEvent{.source = EventOrigin::push,
+                  .block = block,
+                  .time = time,
+                  .standing = is_held ? Standing::first : Standing::result,
+                  .number = number,
+                  .sequence = is_held ? Sequence::baseline : Sequence::next});
 }
 
 void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime time) {
   const std::uint16_t number = layout_.number_of(block);
   const std::optional<std::uint16_t> last = tracker_.last();
-  const Tracked tracked = tracker_.track(number, block);
+  if (!has_place_ && !last) return judge_unread_first(block, time);
+  const Tracked tracked = tracker_.track(number, layout_.key_of(block));
   const bool is_first = std::exchange(first_, std::nullopt) == number &&
                         tracked.novelty == Sequence::repeat && !EventTracker::is_blank(block);
   if (is_first) {
@@ -210,7 +332,8 @@ void CounterSource::judge(EventOrigin origin, const Registers& block, WallTime t
   const bool restarted = tracked.novelty == Sequence::restart;
   const bool pushed = origin == EventOrigin::push;
   const bool is_none = restarted && number == 0 && (!pushed || EventTracker::is_blank(block));
-  if (const auto reason = reason_of(tracked.novelty, origin); !reason.empty()) {
+  const EventOrigin learned = std::exchange(was_away_, false) ? EventOrigin::catch_up : origin;
+  if (const auto reason = reason_of(tracked.novelty, learned); !reason.empty()) {
     tell_(EventGap{.missed = missed_of(tracked),
                    .reason = std::string(reason),
                    .after = last,
@@ -232,13 +355,21 @@ class PushSource final : public CounterSource {
   PushSource(const catalogue::Profile& profile, Clock& clock, Tell tell)
       : CounterSource(profile, clock, std::move(tell)), arming_(profile.events->arm) {}
 
+  [[nodiscard]] std::string_view caveat() const override {
+    return has_place() ? std::string_view()
+                       : "where its last event can be read is not known, so what it does while it "
+                         "is not connected shows only by the number of the next event";
+  }
   [[nodiscard]] bool polls() const override { return false; }
-  [[nodiscard]] TimePoint next_due() const override { return arm_due_; }
+  [[nodiscard]] TimePoint next_due() const override {
+    return std::min(arm_due_, CounterSource::next_due());
+  }
   Result<void> run_due(const Ask& ask) override;
   void disarm() override;
 
  protected:
   Result<void> arm() override;
+  [[nodiscard]] TimePoint held_until() const override { return held_until_; }
 
  private:
   void plan_next() {
@@ -247,6 +378,7 @@ class PushSource final : public CounterSource {
 
   std::optional<catalogue::Arming> arming_;
   TimePoint arm_due_ = TimePoint::max();
+  TimePoint held_until_ = TimePoint::min();
 };
 
 Result<void> PushSource::arm() {
@@ -254,10 +386,13 @@ Result<void> PushSource::arm() {
   auto armed = device().switch_events(EventOutput::on);
   // One lost answer is no reason to give up a connection.
   const bool again = !armed && link::is_lost_answer(armed.error());
-  return again ? device().switch_events(EventOutput::on) : armed;
+  if (again) armed = device().switch_events(EventOutput::on);
+  held_until_ = clock().now() + held_comes_within;
+  return armed;
 }
 
 Result<void> PushSource::run_due(const Ask& ask) {
+  TRY(CounterSource::run_due(ask));
   if (clock().now() < arm_due_) return {};
   plan_next();
   return ask([this] { return device().switch_events(EventOutput::on); });
@@ -270,7 +405,7 @@ void PushSource::disarm() {
     const auto ignored = device().switch_events(EventOutput::off);
     static_cast<void>(ignored);
   }
-  handle_waiting();
+  CounterSource::disarm();
 }
 
 /// A tool that says by a flag that there is a result. Reading clears it, so whatever becomes of the

@@ -19,8 +19,11 @@ constexpr std::uint32_t numbers = 65536;
 constexpr std::int64_t soon_reached = 256;
 constexpr Duration fastest_event = std::chrono::milliseconds(100);
 
+/// As far as both go: one may have been read where the longer one was refused.
 bool are_equal(RegisterView one, RegisterView other) {
-  return std::equal(one.begin(), one.end(), other.begin(), other.end());
+  const std::size_t size = std::min(one.size(), other.size());
+  const RegisterView begin = one.first(size);
+  return std::equal(begin.begin(), begin.end(), other.begin());
 }
 
 }  // namespace

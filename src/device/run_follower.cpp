@@ -34,6 +34,15 @@ RunFollower::RunFollower(Device& device, const catalogue::Action& start, Clock& 
       answer_timeout_(device.session().options().answer_timeout) {}
 
 Result<void> RunFollower::prepare() {
+  if (!device_->profile().events->first) {
+    return tl::unexpected(
+        Error{.code = Errc::usage,
+              .message =
+                  "where its last event can be read is not known, so the result of this run cannot "
+                  "be told from an older one",
+              .hint = "start it at the tool, and watch it with 'spindle watch'",
+              .name = start_->name});
+  }
   if (device_->profile().events->number.empty()) {
     return tl::unexpected(
         Error{.code = Errc::usage,

@@ -27,6 +27,7 @@ std::string line_of(const catalogue::SnapshotIdentity& identity) {
   if (!identity.model.empty()) line += fmt::format("model: {}, ", quoted(identity.model));
   if (identity.model_code) line += fmt::format("model-code: {}, ", *identity.model_code);
   if (!identity.serial.empty()) line += fmt::format("serial: {}, ", quoted(identity.serial));
+  if (!identity.version.empty()) line += fmt::format("version: {}, ", quoted(identity.version));
   if (identity.firmware) line += fmt::format("firmware: {}, ", *identity.firmware);
   return line + fmt::format("raw: {}}}\n", quoted(to_hex(identity.raw)));
 }

@@ -15,6 +15,7 @@ inline constexpr Field<catalogue::SnapshotIdentity> identity_fields[] = {
     field<&catalogue::SnapshotIdentity::model>("model"),
     field_as<std::uint16_t, &catalogue::SnapshotIdentity::model_code>("model-code"),
     field<&catalogue::SnapshotIdentity::serial>("serial"),
+    field<&catalogue::SnapshotIdentity::version>("version"),
     field_as<std::uint16_t, &catalogue::SnapshotIdentity::firmware>("firmware"),
     custom("raw", Need::optional, "bytes in hexadecimal digits", read_identity_bytes),
 };

@@ -41,9 +41,6 @@ bool read_value(const YamlNode& node, catalogue::Range& target, const Asked& ask
   return range.has_value();
 }
 
-template <>
-constexpr std::string_view value_name<catalogue::List<catalogue::Label>> = "text by number";
-
 bool read_value(const YamlNode& node, catalogue::List<catalogue::Label>& target,
                 const Asked& asked) {
   std::vector<catalogue::Label> labels;
@@ -270,6 +267,12 @@ void read_secret(const YamlNode& node, Parameter& parameter, const Asked& asked)
   if (secret) parameter.secrecy = catalogue::Secrecy::secret;
 }
 
+void read_guarded(const YamlNode& node, Parameter& parameter, const Asked& asked) {
+  bool guarded = false;
+  read_value(node, guarded, asked);
+  if (guarded) parameter.guarding = catalogue::Guarding::alone;
+}
+
 constexpr Field<Parameter> parameter_fields[] = {
     custom("name", Need::required, "text", read_name),
     field<&Parameter::title>("title", Need::required),
@@ -325,6 +328,7 @@ constexpr Field<Parameter> parameter_fields[] = {
     field<&Parameter::note>("note").shared(),
     word<clone_words, &Parameter::cloning>("clone", Need::optional, "value of clone").shared(),
     custom("secret", Need::optional, "true | false", read_secret).shared(),
+    custom("guarded", Need::optional, "true | false", read_guarded).shared(),
 };
 
 constexpr Field<Template> template_fields[] = {
@@ -638,6 +642,29 @@ void read_parameters(const YamlNode& written, ProfileDraft& draft, const Asked& 
       std::vector<Template> entries;
       read_entry(node, nullptr, draft, entries, findings);
       add_entries(entries, draft, findings);
+    }
+  }
+}
+
+/// Their registers are none of the product's, so they stand apart from its parameters.
+void read_event_fields(const YamlNode& written, ProfileDraft& draft, const Asked& asked) {
+  ProfileDraft apart;
+  apart.profile.link = draft.profile.link;
+  apart.top = draft.top;
+  apart.layers = draft.layers;
+  apart.read_parameters = std::move(draft.event_fields);
+  const Origin base = {.entry = &written, .layer = draft.layers == 0 ? 0 : draft.layers - 1};
+  apart.parameters.assign(apart.read_parameters.size(), base);
+  for (std::size_t i = 0; i < apart.read_parameters.size(); ++i) {
+    apart.parameter_index.emplace(apart.read_parameters[i].name, i);
+  }
+  read_parameters(written, apart, asked);
+  draft.incomplete = draft.incomplete || apart.incomplete;
+  for (std::size_t i = 0; i < apart.read_parameters.size(); ++i) {
+    if (apart.parameters[i].sound) {
+      draft.event_fields.push_back(std::move(apart.read_parameters[i]));
+    } else {
+      draft.half_read.insert(apart.read_parameters[i].name);
     }
   }
 }

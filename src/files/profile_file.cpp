@@ -156,6 +156,11 @@ constexpr Field<SerialSpec> serial_fields[] = {
     field<&SerialSpec::broadcast_pause>("broadcast-pause"),
 };
 
+constexpr Field<catalogue::UnaskedFrame> unasked_fields[] = {
+    field<&catalogue::UnaskedFrame::function>("function", Need::required),
+    field<&catalogue::UnaskedFrame::count>("count", Need::required),
+};
+
 constexpr Field<LinkSpec> link_fields[] = {
     word<framing_words, &LinkSpec::framing>("framing", Need::inherited),
     field<&LinkSpec::port>("port"),
@@ -183,6 +188,7 @@ constexpr Field<LinkSpec> link_fields[] = {
     map_of<serial_fields, &LinkSpec::serial>("serial"),
     field<&LinkSpec::contiguous>("contiguous").with(keys_of<areas_fields>),
     field<&LinkSpec::absent>("absent").with(keys_of<areas_fields>),
+    list_of<unasked_fields, &LinkSpec::unasked>("unasked"),
 };
 
 // ---- identity ----
@@ -198,6 +204,22 @@ constexpr Field<IdentitySpec> total_fields[] = {
     field<&IdentitySpec::total_bytes>("from-bytes", Need::inherited),
     field<&IdentitySpec::total>("at", Need::inherited),
 };
+
+constexpr Field<catalogue::FirmwareCaution> caution_fields[] = {
+    range<&catalogue::FirmwareCaution::from, &catalogue::FirmwareCaution::to>("firmware",
+                                                                              Need::required),
+    field<&catalogue::FirmwareCaution::text>("text", Need::required),
+};
+
+constexpr Field<IdentitySpec> told_fields[] = {
+    field<&IdentitySpec::model_from>("model"),
+    field<&IdentitySpec::serial_from>("serial"),
+    field<&IdentitySpec::version_from>("version"),
+};
+
+void read_told(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
+  read_map(told_fields, node, identity, asked.findings);
+}
 
 void read_long_serial(const YamlNode& node, IdentitySpec& identity, const Asked& asked) {
   read_map(long_serial_fields, node, identity, asked.findings, identity.long_serial_bytes != 0);
@@ -217,8 +239,11 @@ constexpr Field<IdentitySpec> identity_fields[] = {
     custom("long-serial", Need::optional, "map", read_long_serial)
         .with(keys_of<long_serial_fields>),
     custom("total", Need::optional, "map", read_total).with(keys_of<total_fields>),
-    field<&IdentitySpec::models>("models", Need::inherited),
+    field<&IdentitySpec::models>("models"),
+    field<&IdentitySpec::firmware_from>("firmware-from"),
     field<&IdentitySpec::firmware_below>("firmware-below"),
+    list_of<caution_fields, &IdentitySpec::cautions>("cautions"),
+    custom("told-by", Need::optional, "map", read_told).with(keys_of<told_fields>),
 };
 
 // ---- events, limits, numbered ----
@@ -248,6 +273,12 @@ constexpr Field<catalogue::EventSetting> setting_fields[] = {
     field<&catalogue::EventSetting::parameter>("parameter", Need::required),
 };
 
+constexpr Field<catalogue::EventForm> form_fields[] = {
+    field<&catalogue::EventForm::count>("count", Need::required),
+    field<&catalogue::EventForm::parameters>("parameters", Need::required),
+    field<&catalogue::EventForm::firmware_from>("firmware-from"),
+};
+
 std::optional<catalogue::EventKind> to_kind(const std::string& name, const SourceLocation& at,
                                             Diagnostics& findings) {
   const auto kind = catalogue::event_kind_words.find(name);
@@ -268,11 +299,47 @@ void read_kinds(const YamlNode& node, EventSpec& events, const Asked& asked) {
   events.kinds = std::move(kinds);
 }
 
+constexpr Field<catalogue::EventFrame> frame_fields[] = {
+    field<&catalogue::EventFrame::function>("function", Need::required),
+    word<catalogue::frame_content_words, &catalogue::EventFrame::holds>("holds", Need::required,
+                                                                        "content"),
+};
+
+constexpr Field<catalogue::CurveChannel> channel_fields[] = {
+    field<&catalogue::CurveChannel::type>("type", Need::required),
+    field<&catalogue::CurveChannel::count>("count", Need::required),
+};
+
+constexpr Field<catalogue::CurveType> curve_type_fields[] = {
+    field<&catalogue::CurveType::number>("number", Need::required),
+    word<catalogue::curve_quantity_words, &catalogue::CurveType::is>("is", Need::required,
+                                                                     "quantity"),
+    field<&catalogue::CurveType::unit>("unit"),
+};
+
+constexpr Field<catalogue::CurveSpec> curve_fields[] = {
+    list_of<channel_fields, &catalogue::CurveSpec::channels>("channels", Need::required),
+    list_of<curve_type_fields, &catalogue::CurveSpec::types>("types", Need::required),
+    field<&catalogue::CurveSpec::sampling>("sampling"),
+    field<&catalogue::CurveSpec::most>("most", Need::required),
+    field<&catalogue::CurveSpec::steps>("steps"),
+    field<&catalogue::CurveSpec::first_step>("first-step"),
+    field<&catalogue::CurveSpec::step_types>("step-types"),
+};
+
+constexpr Field<catalogue::BlockSearch> search_fields[] = {
+    field<&catalogue::BlockSearch::name>("name", Need::inherited),
+    field<&catalogue::BlockSearch::title>("title"),
+    field<&catalogue::BlockSearch::count>("count", Need::inherited),
+    range<&catalogue::BlockSearch::from, &catalogue::BlockSearch::to>("registers", Need::inherited),
+    field<&catalogue::BlockSearch::step>("step", Need::inherited),
+};
+
 constexpr Field<EventSpec> event_fields[] = {
     word<source_words, &EventSpec::model>("source", Need::optional, "source of events"),
     map_of<arm_fields, &EventSpec::arm>("arm"),
     field<&EventSpec::function>("function", Need::inherited),
-    field<&EventSpec::first>("first", Need::inherited),
+    field_as<std::uint16_t, &EventSpec::first>("first"),
     field<&EventSpec::count>("count", Need::inherited),
     field<&EventSpec::number>("number"),
     field<&EventSpec::flag>("flag"),
@@ -283,6 +350,51 @@ constexpr Field<EventSpec> event_fields[] = {
     field<&EventSpec::interval>("interval"),
     field<&EventSpec::preset>("preset"),
     list_of<setting_fields, &EventSpec::settings>("settings"),
+    list_of<form_fields, &EventSpec::longer>("longer"),
+    list_of<frame_fields, &EventSpec::frames>("frames"),
+    field<&EventSpec::identity>("told-apart-by"),
+    field<&EventSpec::torque_unit>("torque-unit"),
+    map_of<curve_fields, &EventSpec::curves>("curves"),
+    map_of<search_fields, &EventSpec::search>("search"),
+};
+
+// ---- how tools are found, and what they can show ----
+
+constexpr Field<catalogue::DiscoverySpec> discovery_fields[] = {
+    field<&catalogue::DiscoverySpec::group>("group", Need::inherited),
+    field<&catalogue::DiscoverySpec::port>("port", Need::inherited),
+    field<&catalogue::DiscoverySpec::ask>("ask", Need::inherited),
+    field<&catalogue::DiscoverySpec::answer>("answer", Need::inherited),
+    field<&catalogue::DiscoverySpec::bytes>("bytes", Need::inherited),
+    field<&catalogue::DiscoverySpec::every>("every"),
+    field<&catalogue::DiscoverySpec::serial>("serial"),
+    field<&catalogue::DiscoverySpec::model>("model"),
+    field<&catalogue::DiscoverySpec::address>("address"),
+    field<&catalogue::DiscoverySpec::tool_port>("tool-port"),
+    field<&catalogue::DiscoverySpec::mac>("mac"),
+    field<&catalogue::DiscoverySpec::firmware>("firmware"),
+    field<&catalogue::DiscoverySpec::in_use>("in-use"),
+    field<&catalogue::DiscoverySpec::kind>("kind"),
+    field<&catalogue::DiscoverySpec::kinds>("kinds"),
+};
+
+constexpr Field<catalogue::LearnedAction> learned_action_fields[] = {
+    field<&catalogue::LearnedAction::name>("name", Need::required),
+    field<&catalogue::LearnedAction::title>("title", Need::required),
+    field<&catalogue::LearnedAction::follows>("follows", Need::required),
+    word<catalogue::learned_by_words, &catalogue::LearnedAction::by>("by", Need::optional,
+                                                                     "way to show itself"),
+    field<&catalogue::LearnedAction::deed>("deed", Need::required),
+    range<&catalogue::LearnedAction::minimum, &catalogue::LearnedAction::maximum>("range"),
+    field<&catalogue::LearnedAction::labels>("labels"),
+    word<catalogue::hazard_words, &catalogue::LearnedAction::hazard>("hazard", Need::required),
+    field<&catalogue::LearnedAction::check>("check", Need::required),
+};
+
+constexpr Field<catalogue::LearnSpec> learn_fields[] = {
+    word<modbus::table_words, &catalogue::LearnSpec::table>("table"),
+    range<&catalogue::LearnSpec::from, &catalogue::LearnSpec::to>("registers", Need::inherited),
+    list_of<learned_action_fields, &catalogue::LearnSpec::actions>("actions", Need::inherited),
 };
 
 constexpr Field<catalogue::LimitSpec> limit_fields[] = {
@@ -381,8 +493,10 @@ constexpr Field<ProfileDraft> common_fields[] = {
 };
 
 constexpr Field<ProfileDraft> list_fields[] = {
+    word<catalogue::writes_words, &ProfileDraft::profile, &Profile::writes>("writes"),
     field<&ProfileDraft::profile, &Profile::exceptions>("exceptions").with(code_list_keys),
     custom("parameters", Need::optional, "list of maps", read_parameters).with(parameter_keys),
+    custom("event-fields", Need::optional, "list of maps", read_event_fields),
     custom("actions", Need::optional, "list of maps", read_actions).with(action_keys),
 };
 
@@ -437,6 +551,11 @@ constexpr Section sections[] = {
         field<&ProfileDraft::profile, &Profile::alarm_reset>("alarm-reset"),
         &ProfileDraft::alarm_reset),
     map_section<&Profile::unlock, unlock_fields>("unlock", &ProfileDraft::unlock),
+    section<&Profile::torque_unit_from>(
+        field<&ProfileDraft::profile, &Profile::torque_unit_from>("torque-unit"),
+        &ProfileDraft::torque_unit),
+    map_section<&Profile::discovery, discovery_fields>("discovery", &ProfileDraft::discovery),
+    map_section<&Profile::learn, learn_fields>("learn", &ProfileDraft::learn),
 };
 
 /// Reads a section where it is there, and remembers where it stands.
@@ -600,6 +719,7 @@ void ProfileDraft::begin_with(const catalogue::Profile& base, const YamlNode& no
   profile = base;
   read_parameters.assign(base.parameters.begin(), base.parameters.end());
   read_actions.assign(base.actions.begin(), base.actions.end());
+  if (base.events) event_fields.assign(base.events->fields.begin(), base.events->fields.end());
   parameters.assign(read_parameters.size(), origin);
   actions.assign(read_actions.size(), origin);
   for (std::size_t i = 0; i < read_parameters.size(); ++i) {
@@ -626,6 +746,25 @@ void ProfileDraft::finish() {
   for (const Section& section : sections) {
     if (!(this->*section.origin).sound) section.drop(profile);
   }
+  if (profile.events) finish_event_fields(*profile.events);
+}
+
+/// Where the place of the block is known, its parameters are parameters like all others.
+void ProfileDraft::finish_event_fields(EventSpec& spec) {
+  spec.fields = std::exchange(event_fields, {});
+  if (!spec.first) return;
+  std::vector<catalogue::Parameter> all(profile.parameters.begin(), profile.parameters.end());
+  for (catalogue::Parameter field : spec.fields) {
+    const unsigned address = unsigned{*spec.first} + field.address.value;
+    if (address > last_register || !parameter_index.try_emplace(field.name, all.size()).second) {
+      continue;
+    }
+    field.table = catalogue::table_of(spec);
+    field.address = {static_cast<std::uint16_t>(address)};
+    all.push_back(std::move(field));
+    parameters.push_back(events);
+  }
+  profile.parameters = std::move(all);
 }
 
 ProfileHead read_head(const YamlNode& document, Diagnostics& findings) {

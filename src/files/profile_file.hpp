@@ -32,6 +32,7 @@ struct ProfileDraft {
   catalogue::Profile profile;
   std::vector<catalogue::Parameter> read_parameters;
   std::vector<catalogue::Action> read_actions;
+  std::vector<catalogue::Parameter> event_fields;  ///< registers from the first one of the block
   std::size_t layers = 0;
   std::vector<Origin> parameters;  ///< side by side with read_parameters
   std::vector<Origin> actions;     ///< side by side with read_actions
@@ -47,6 +48,9 @@ struct ProfileDraft {
   Origin watched = {};
   Origin alarm_reset = {};
   Origin unlock = {};
+  Origin torque_unit = {};
+  Origin discovery = {};
+  Origin learn = {};
   // Of the layer that is read now.
   Numbering numbering = Numbering::address;
   std::vector<std::string> dropped = {};
@@ -65,6 +69,8 @@ struct ProfileDraft {
   /// Completes the profile. Leaves out every entry and section in which something was wrong, so
   /// that rules speak of what could be read. Positions of the others stay valid.
   void finish();
+
+  void finish_event_fields(catalogue::EventSpec& spec);
 
   /// Whether a name is that of no parameter, as far as can be known.
   [[nodiscard]] bool lacks(const std::string& name) const {

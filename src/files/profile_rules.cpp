@@ -10,6 +10,7 @@
 #include "spindle/base/duration.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/danger.hpp"
+#include "spindle/catalogue/unit.hpp"
 #include "spindle/catalogue/value.hpp"
 #include "spindle/catalogue/write_order.hpp"
 
@@ -368,6 +369,44 @@ void secrets_are_stored(const ProfileDraft& draft, Diagnostics& findings) {
   });
 }
 
+/// What is written alone waits for no other value, and no other waits for it.
+void guarded_stand_alone(const ProfileDraft& draft, Diagnostics& findings) {
+  for_each_parameter(draft, [&](const Parameter& parameter, const Origin& origin) {
+    if (parameter.guarding == catalogue::Guarding::none) return;
+    if (parameter.access == Access::read_only) {
+      findings.add_once(origin.of("guarded"),
+                        fmt::format("{}: what is read-only is never written, so 'guarded' says "
+                                    "nothing",
+                                    parameter.name));
+    } else if (!parameter.before.empty() || !parameter.after.empty() ||
+               !parameter.scale_by.empty()) {
+      findings.add_once(origin.of("guarded"),
+                        fmt::format("{}: what is guarded is written alone, so it has no 'before', "
+                                    "'after' or 'scale-from'",
+                                    parameter.name));
+    }
+  });
+}
+
+void torque_unit_is_known(const ProfileDraft& draft, Diagnostics& findings) {
+  const std::string name = draft.profile.torque_unit_from;
+  if (name.empty()) return;
+  if (draft.lacks(name)) {
+    findings.add_once(draft.torque_unit.entry->at, no_such_parameter(draft, name));
+  }
+  const Parameter* parameter = parameter_named(draft, name);
+  if (parameter == nullptr) return;
+  if (parameter->labels.empty()) {
+    findings.add_once(draft.torque_unit.entry->at,
+                      fmt::format("{} has no labels that are units", name));
+  }
+  for (const Label& label : parameter->labels) {
+    if (catalogue::is_torque(label.text)) continue;
+    findings.add_once(draft.torque_unit.entry->at,
+                      fmt::format("{}: '{}' is no unit of torque that is known", name, label.text));
+  }
+}
+
 /// The first thing wrong with a list of labels; empty when it is good.
 std::string fault_of(const catalogue::List<Label>& labels, const Parameter& parameter) {
   Parameter earlier = parameter;
@@ -551,20 +590,79 @@ void identity_slices_fit(const ProfileDraft& draft, Diagnostics& findings) {
   check("total", facts.total, facts.total_bytes);
 }
 
+/// Without a table of models a tool is known by what its serial number says it is.
+void identity_tells_products(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.identity) return;
+  const catalogue::IdentitySpec& facts = *draft.profile.identity;
+  const bool has_products = !facts.products.empty() && facts.long_serial_bytes != 0;
+  const bool has_firmware = facts.firmware_from != 0 || facts.firmware_below != 0;
+  if (facts.models.empty() && !(has_products && has_firmware)) {
+    findings.add_once(draft.identity.of("models"),
+                      "key 'models' is missing; without it a tool is known by 'products' of its "
+                      "'long-serial' and by 'firmware-from' or 'firmware-below'");
+  }
+  if (facts.firmware_below != 0 && facts.firmware_from >= facts.firmware_below) {
+    findings.add_once(draft.identity.of("firmware-from"),
+                      fmt::format("there is no firmware from {} below {}", facts.firmware_from,
+                                  facts.firmware_below));
+  }
+}
+
+/// What a tool says of itself beside its identity are parameters.
+void identity_is_told_by_parameters(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.identity) return;
+  const catalogue::IdentitySpec& facts = *draft.profile.identity;
+  const auto check = [&](const std::string& name, bool is_text) {
+    if (name.empty()) return;
+    if (draft.lacks(name)) {
+      findings.add_once(draft.identity.of("told-by"), no_such_parameter(draft, name));
+    }
+    const Parameter* parameter = parameter_named(draft, name);
+    if (parameter == nullptr) return;
+    const bool fits = is_text ? parameter->encoding.kind == catalogue::Kind::text
+                              : parameter->encoding.is_integer();
+    if (fits && parameter->reading == catalogue::Reading::harmless) return;
+    findings.add_once(draft.identity.of("told-by"),
+                      fmt::format("{} is no {}", name, is_text ? "text" : "whole number"));
+  };
+  check(facts.model_from, true);
+  check(facts.serial_from, true);
+  for (const catalogue::Text& name : facts.version_from) check(name, false);
+}
+
+void unasked_frames_are_answers(const ProfileDraft& draft, Diagnostics& findings) {
+  for (const catalogue::UnaskedFrame& frame : draft.profile.link.unasked) {
+    constexpr auto holding =
+        static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers);
+    constexpr auto input = static_cast<std::uint8_t>(modbus::FunctionCode::read_input_registers);
+    if (frame.function != holding && frame.function != input) {
+      findings.add_once(draft.link.of("unasked"),
+                        "frames that come unasked look like answers to function 3 or 4");
+    } else if (frame.count < 2 || frame.count > modbus::max_read_count) {
+      findings.add_once(draft.link.of("unasked"),
+                        fmt::format("a frame that comes unasked holds 2 to {} registers",
+                                    modbus::max_read_count));
+    }
+  }
+}
+
+/// Whether an event block is the answer to a read of one of the two tables of registers.
+bool is_block_read(const catalogue::EventSpec& events) {
+  using modbus::FunctionCode;
+  return events.function == static_cast<std::uint8_t>(FunctionCode::read_holding_registers) ||
+         events.function == static_cast<std::uint8_t>(FunctionCode::read_input_registers);
+}
+
 void event_block_is_legal(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
   const catalogue::EventSpec& events = *draft.profile.events;
-  const auto is = [&](modbus::FunctionCode code) {
-    return events.function == static_cast<std::uint8_t>(code);
-  };
-  if (!is(modbus::FunctionCode::read_holding_registers) &&
-      !is(modbus::FunctionCode::read_input_registers)) {
+  if (!is_block_read(events)) {
     findings.add_once(draft.events.of("function"), "events come as answers to function 3 or 4");
   }
   if (events.count < 1 || events.count > modbus::max_read_count) {
     findings.add_once(draft.events.of("count"),
                       fmt::format("an answer holds 1 to {} registers", modbus::max_read_count));
-  } else if (events.first + events.count - 1U > last_register) {
+  } else if (events.first.value_or(0) + events.count - 1U > last_register) {
     findings.add_once(draft.events.of("count"), "the event block reaches behind the last register");
   }
 }
@@ -578,6 +676,11 @@ void event_source_is_complete(const ProfileDraft& draft, Diagnostics& findings) 
   const auto add = [&](std::string_view key, std::string message) {
     findings.add_once(draft.events.of(key), std::move(message));
   };
+  if (!events.first && events.fields.empty()) {
+    add("first", "key 'first' is missing");
+  } else if (!events.first && !pushes) {
+    add("source", "only an event block that is pushed has no known place");
+  }
   if (!flags && events.number.empty()) add("number", "key 'number' is missing");
   if (flags && events.flag.empty()) add("flag", "key 'flag' is missing");
   if (!flags && !events.flag.empty()) add("flag", "a flag needs 'source: flag'");
@@ -628,9 +731,9 @@ std::string other_reader(const ProfileDraft& draft, const Span& span) {
       }
     }
   }
-  if (const auto& events = profile.events) {
-    const unsigned last = events->first + std::max<unsigned>(events->count, 1) - 1U;
-    if (share(span, catalogue::table_of(*events), events->first, last)) {
+  if (const auto& events = profile.events; events && events->first) {
+    const unsigned last = *events->first + std::max<unsigned>(events->count, 1) - 1U;
+    if (share(span, catalogue::table_of(*events), *events->first, last)) {
       return "it stands in the event block";
     }
   }
@@ -673,28 +776,131 @@ void consumed_registers_have_one_reader(const ProfileDraft& draft, Diagnostics& 
   }
 }
 
+/// A parameter of an event block whose place is not known; null: there is none.
+const Parameter* event_field_named(const catalogue::EventSpec& events, std::string_view name) {
+  const auto found = std::find_if(events.fields.begin(), events.fields.end(),
+                                  [&](const Parameter& field) { return field.name == name; });
+  return found == events.fields.end() ? nullptr : &*found;
+}
+
+/// Says of a name that it is no parameter of the event block.
+void check_event_name(const ProfileDraft& draft, std::string_view key, const std::string& name,
+                      Diagnostics& findings) {
+  if (name.empty()) return;
+  const catalogue::EventSpec& events = *draft.profile.events;
+  const auto add = [&](std::string message) {
+    findings.add_once(draft.events.of(key), std::move(message));
+  };
+  if (!events.first) {
+    const Parameter* field = event_field_named(events, name);
+    const bool is_unread = draft.incomplete || draft.half_read.contains(name);
+    if (field == nullptr && !is_unread) add(fmt::format("'{}' is none of the event fields", name));
+    if (field == nullptr) return;
+    const Span span = span_of(*field, 0);
+    if (span.last >= events.count) add(fmt::format("{} is outside the event block", name));
+    return;
+  }
+  const Parameter* parameter = parameter_named(draft, name);
+  if (draft.lacks(name)) add(no_such_parameter(draft, name));
+  if (parameter == nullptr || !is_block_read(events)) return;
+  const Span span = span_of(*parameter, 0);
+  const unsigned end = unsigned{*events.first} + events.count;
+  if (span.table == catalogue::table_of(events) && span.first >= *events.first && span.last < end) {
+    return;
+  }
+  add(fmt::format("{} is outside the event block", name));
+}
+
 void event_fields_are_in_the_block(const ProfileDraft& draft, Diagnostics& findings) {
   if (!draft.profile.events) return;
   const catalogue::EventSpec& events = *draft.profile.events;
-  const auto table =
-      events.function == static_cast<std::uint8_t>(modbus::FunctionCode::read_holding_registers)
-          ? RegisterTable::holding
-          : RegisterTable::input;
   const auto check = [&](std::string_view key, const std::string& name) {
-    if (name.empty()) return;
-    const Parameter* parameter = parameter_named(draft, name);
-    if (draft.lacks(name)) findings.add_once(draft.events.of(key), no_such_parameter(draft, name));
-    if (parameter == nullptr) return;
-    const Span span = span_of(*parameter, 0);
-    const unsigned end = unsigned{events.first} + events.count;
-    if (span.table == table && span.first >= events.first && span.last < end) return;
-    findings.add_once(draft.events.of(key), fmt::format("{} is outside the event block", name));
+    check_event_name(draft, key, name, findings);
   };
   check("number", events.number);
   check("kind", events.kind);
   check("error", events.error);
   check("preset", events.preset);
+  check("torque-unit", events.torque_unit);
+  for (const catalogue::Text& name : events.identity) check("told-apart-by", name);
   for (const catalogue::EventColumn& column : events.columns) check("columns", column.parameter);
+  if (!events.first) {
+    for (const Parameter& field : events.fields) check("count", field.name);
+  }
+}
+
+void event_frames_are_long_ones(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.events) return;
+  const catalogue::EventSpec& events = *draft.profile.events;
+  for (const catalogue::EventFrame& frame : events.frames) {
+    if (!modbus::is_counted_by_words(frame.function)) {
+      findings.add_once(draft.events.of("frames"),
+                        "functions whose data begin with their own length are 100 to 110");
+    }
+    if (frame.holds != catalogue::FrameContent::event && !events.curves) {
+      findings.add_once(draft.events.of("frames"), "frames with samples need 'curves'");
+    }
+  }
+  if (!events.frames.empty() && events.model != catalogue::EventModel::push) {
+    findings.add_once(draft.events.of("frames"),
+                      "only a tool that sends events unasked has frames: 'source: push'");
+  }
+}
+
+void curves_are_in_the_block(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.events || !draft.profile.events->curves) return;
+  const catalogue::EventSpec& events = *draft.profile.events;
+  const catalogue::CurveSpec& curves = *events.curves;
+  check_event_name(draft, "curves", curves.sampling, findings);
+  for (const catalogue::CurveChannel& channel : curves.channels) {
+    check_event_name(draft, "curves", channel.type, findings);
+    check_event_name(draft, "curves", channel.count, findings);
+  }
+  constexpr std::size_t sample_size = 4;
+  const std::size_t bytes =
+      2 * std::size_t{events.count} + sample_size * curves.most * curves.channels.size();
+  constexpr std::size_t head = 10;
+  if (bytes + head > modbus::max_long_adu_size) {
+    findings.add_once(draft.events.of("curves"),
+                      fmt::format("an event with all its samples has {} bytes, a frame at most {}",
+                                  bytes, modbus::max_long_adu_size - head));
+  }
+  if (curves.first_step + 2U * curves.steps > events.count) {
+    findings.add_once(draft.events.of("curves"), "the steps are outside the event block");
+  }
+}
+
+/// What stands behind the usual registers is read-only, and in the form that has it.
+void event_forms_are_longer(const ProfileDraft& draft, Diagnostics& findings) {
+  if (!draft.profile.events || draft.profile.events->longer.empty()) return;
+  const catalogue::EventSpec& events = *draft.profile.events;
+  const auto add = [&](std::string message) {
+    findings.add_once(draft.events.of("longer"), std::move(message));
+  };
+  if (!events.first) return add("an event block whose place is not known has one form");
+  for (const catalogue::EventForm& form : events.longer) {
+    const unsigned end = unsigned{*events.first} + form.count;
+    if (form.count <= events.count || form.count > modbus::max_read_count ||
+        end > last_register + 1U) {
+      add(
+          fmt::format("a longer form of the event block holds more than {} registers, and at "
+                      "most {}",
+                      events.count, modbus::max_read_count));
+    }
+    bool is_empty = true;
+    for (const Parameter& parameter : draft.profile.parameters) {
+      if (events.form_of(parameter) != &form) continue;
+      is_empty = false;
+      const Span span = span_of(parameter, 0);
+      const bool is_inside = span.first >= unsigned{*events.first} + events.count &&
+                             span.last < end && parameter.access == Access::read_only;
+      if (!is_inside) {
+        add(fmt::format("{} does not stand in the last {} of {} registers, read-only",
+                        parameter.name, form.count - events.count, form.count));
+      }
+    }
+    if (is_empty) add(fmt::format("no parameter of the table is like '{}'", form.parameters));
+  }
 }
 
 void event_settings_are_parameters(const ProfileDraft& draft, Diagnostics& findings) {
@@ -790,7 +996,7 @@ void read_only_has_no_hazard(const ProfileDraft& draft, Diagnostics& findings) {
 
 using Rule = void (*)(const ProfileDraft&, Diagnostics&);
 
-constexpr std::array<Rule, 37> rules = {
+constexpr std::array<Rule, 45> rules = {
     id_is_the_file_name,
     names_have_the_pattern,
     names_are_no_numbers,
@@ -808,6 +1014,8 @@ constexpr std::array<Rule, 37> rules = {
     settling_ends,
     read_only_has_no_hazard,
     secrets_are_stored,
+    guarded_stand_alone,
+    torque_unit_is_known,
     defaults_fit,
     labels_are_unique,
     entries_have_a_source,
@@ -817,11 +1025,17 @@ constexpr std::array<Rule, 37> rules = {
     effects_are_of_values,
     link_is_usable,
     identity_slices_fit,
+    identity_tells_products,
+    identity_is_told_by_parameters,
+    unasked_frames_are_answers,
     event_block_is_legal,
     event_source_is_complete,
     event_flag_is_consumed,
     consumed_registers_have_one_reader,
     event_fields_are_in_the_block,
+    event_forms_are_longer,
+    event_frames_are_long_ones,
+    curves_are_in_the_block,
     event_settings_are_parameters,
     arming_is_no_parameter,
     alarm_reset_is_an_action,
@@ -878,6 +1092,7 @@ void check_rules(const ProfileDraft& draft, Diagnostics& findings) {
   for (const Rule rule : rules) rule(draft, findings);
   check_drive_rules(draft, findings);
   check_run_rules(draft, findings);
+  check_finding_rules(draft, findings);
 }
 
 }  // namespace spindle::files

@@ -16,6 +16,8 @@ void check_rules(const ProfileDraft& draft, Diagnostics& findings);
 /// section `run`: part of check_rules().
 void check_drive_rules(const ProfileDraft& draft, Diagnostics& findings);
 void check_run_rules(const ProfileDraft& draft, Diagnostics& findings);
+/// Those of how tools are found, of what is searched for on them, and of what they can show.
+void check_finding_rules(const ProfileDraft& draft, Diagnostics& findings);
 
 /// What may move a tool and is guarded by nothing but a refusal: no reason not to load a profile,
 /// so only a check pays for it.

@@ -332,7 +332,8 @@ Result<Located> locate(std::string_view name_or_file, const Places& places) {
   return tl::unexpected(Error{.code = Errc::unknown_name,
                               .message = "no such profile",
                               .hint = std::move(hint),
-                              .name = std::string(name_or_file)});
+                              .name = std::string(name_or_file),
+                              .remedy = remedy_for(name_or_file, ids, "spindle profile list")});
 }
 
 /// A profile's files, read, with what was found wrong in them so far.
@@ -354,8 +355,8 @@ struct OpenChain {
   [[nodiscard]] Result<void> check() const {
     if (findings.empty()) return {};
     Error error = findings.error();
-    error.hint = fmt::format("{} lists every fault",
-                             shown_command("spindle profile check " + shell_word(path)));
+    error.remedy.right = "spindle profile check " + shell_word(path);
+    error.hint = fmt::format("{} lists every fault", shown_command(error.remedy.right));
     return tl::unexpected(std::move(error));
   }
 };
@@ -373,7 +374,8 @@ Error only_a_base(std::string_view name) {
   return {.code = Errc::bad_file,
           .message = "is only a base for other profiles",
           .hint = "'spindle profile list' shows those of products",
-          .name = std::string(name)};
+          .name = std::string(name),
+          .remedy = {.right = "spindle profile list"}};
 }
 
 Result<AnyProfile> load_file(const std::string& path, const Places& places) {

@@ -128,6 +128,7 @@ constexpr Field<Tool> tool_fields[] = {
     custom("retries", Need::optional, "number 0..100", read_retries),
     word<modbus::transaction_words, &Tool::transactions>("transaction"),
     custom("verified", Need::optional, "list of text", read_verified),
+    field<&Tool::serial>("serial"),
     custom("limits", Need::optional, "map of preset to text", read_limits),
 };
 
@@ -169,6 +170,7 @@ void read_group(const YamlEntry& entry, Tools& tools, Diagnostics& findings) {
 }
 
 void read_tool_map(const YamlNode& node, Tools& tools, const Asked& asked) {
+  if (node.kind == YamlNode::Kind::nothing) return;  // all of them may be comments
   expect(node, YamlNode::Kind::map, asked.findings);
   for (const YamlEntry& entry : node.entries) {
     tools.tools.push_back(read_tool(entry, asked.findings));
@@ -274,9 +276,35 @@ std::string profile_beside(const std::string& tools_file, std::string profile) {
   return names_profile_file(profile) ? beside(tools_file, std::move(profile)) : profile;
 }
 
+using Position = std::pair<std::size_t, std::size_t>;  ///< line and column
+
+Position position_of(const SourceLocation& at) { return {at.line, at.column}; }
+
+/// Where the last value begins that is part of this one.
+Position last_position(const YamlNode& node) {
+  if (!node.items.empty()) return last_position(node.items.back());
+  if (!node.entries.empty()) return last_position(node.entries.back().value);
+  return position_of(node.at);
+}
+
+/// The entry of the file that has its place there, as Tools::faults names it; empty: none has.
+std::string entry_at(const YamlNode& document, const Position& place) {
+  constexpr std::pair<std::string_view, std::string_view> kinds[] = {
+      {"tools", ""}, {"groups", "@"}, {"sinks", "sink "}};
+  for (const auto& [kind, prefix] : kinds) {
+    const YamlNode* entries = document.find(kind);
+    if (entries == nullptr) continue;
+    for (const YamlEntry& entry : entries->entries) {
+      const bool is_here =
+          position_of(entry.key_at) <= place && place <= last_position(entry.value);
+      if (is_here) return std::string(prefix) + entry.key;
+    }
+  }
+  return {};
+}
+
 /// Everything that can be read, with what is wrong.
-Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
-  TRY_LET(const auto text, disk.read_trusted(path));
+Tools read_tools(std::string_view text, const std::string& path, Diagnostics& findings) {
   const std::size_t file = findings.add_file(path);
   const std::vector<YamlNode> documents = parse_yaml(text, file, Documents::all, findings);
   Tools tools;
@@ -290,13 +318,26 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
   }
   if (documents.empty() && findings.empty()) findings.add({file, 1, 1}, "the file is empty");
   if (documents.size() > 1) findings.add(documents[1].at, "a second document has no meaning here");
+  for (const Diagnostic& finding : findings.list()) {
+    const std::string entry =
+        documents.empty() ? "" : entry_at(documents.front(), {finding.line, finding.column});
+    tools.faults.try_emplace(entry, Error{.code = Errc::bad_file, .message = finding.to_string()});
+  }
   return tools;
+}
+
+Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnostics& findings) {
+  TRY_LET(const auto text, disk.read_trusted(path));
+  return read_tools(text, path, findings);
 }
 
 /// What is said of a file that has these faults.
 Error refusal_of(const Diagnostics& findings) {
   Error error = findings.error();
-  if (findings.list().size() > 1) error.hint = "'spindle tools --check' lists every fault";
+  if (findings.list().size() > 1) {
+    error.hint = "'spindle tools --check' lists every fault";
+    error.remedy.right = "spindle tools --check";
+  }
   return error;
 }
 
@@ -326,11 +367,38 @@ Result<Tools> load_tools(const std::string& path, const Disk& disk) {
   return tl::unexpected(refusal_of(findings));
 }
 
+Result<Tools> usable_tools(const std::string& path, const Disk& disk) {
+  TRY_LET(const auto text, disk.read_trusted(path));
+  return parse_tools(text, path);
+}
+
+Result<Tools> parse_tools(std::string_view text, const std::string& path) {
+  Diagnostics findings;
+  Tools tools = read_tools(text, path, findings);
+  if (tools.faults.contains("")) return tl::unexpected(refusal_of(findings));
+  return tools;
+}
+
+Result<Tools> without_faults(Tools tools) {
+  if (tools.faults.empty()) return tools;
+  return tl::unexpected(tools.faults.begin()->second);
+}
+
+Result<Sink> usable_sink(const Sink& sink, const Tools& tools) {
+  const auto fault = tools.faults.find("sink " + sink.name);
+  if (fault == tools.faults.end()) return sink;
+  Error error = fault->second;
+  error.name = sink.name;
+  error.hint = "until it is mended, this entry is not used";
+  return tl::unexpected(std::move(error));
+}
+
 Tools salvage_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
   auto tools = read_tools_file(path, disk, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
   if (!findings.empty()) tools->left_out = refusal_of(findings);
+  tools->faults.clear();
   return std::move(*tools);
 }
 

@@ -16,7 +16,7 @@ namespace {
 Result<files::Sink> named_or_url(const std::string& text, const files::Tools& tools) {
   std::vector<std::string> names;
   for (const files::Sink& sink : tools.sinks) {
-    if (sink.name == text) return sink;
+    if (sink.name == text) return files::usable_sink(sink, tools);
     names.push_back(sink.name);
   }
   if (text.find("://") != std::string::npos) {

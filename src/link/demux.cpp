@@ -7,11 +7,7 @@ namespace {
 
 bool is_spontaneous(const modbus::Pdu& pdu, const DemuxRules& rules) {
   return std::any_of(rules.spontaneous.begin(), rules.spontaneous.end(),
-                     [&](const SpontaneousShape& shape) {
-                       return pdu.function == shape.function && !pdu.data.empty() &&
-                              pdu.data.front() == shape.byte_count &&
-                              pdu.data.size() == std::size_t{1} + shape.byte_count;
-                     });
+                     [&](const SpontaneousShape& shape) { return has_shape(pdu, shape); });
 }
 
 bool is_addressed(const modbus::Adu& outstanding, const modbus::Adu& received,
@@ -30,6 +26,13 @@ bool is_unit_taken(const modbus::Adu& outstanding, const modbus::Adu& received,
 }
 
 }  // namespace
+
+bool has_shape(const modbus::Pdu& pdu, const SpontaneousShape& shape) {
+  if (pdu.function != shape.function) return false;
+  if (shape.is_long()) return true;
+  return !pdu.data.empty() && pdu.data.front() == shape.byte_count &&
+         pdu.data.size() == std::size_t{1} + shape.byte_count;
+}
 
 bool has_ids(const DemuxRules& rules) {
   return rules.framing == modbus::Framing::tcp &&

@@ -19,8 +19,6 @@ namespace {
 
 constexpr std::uint8_t max_serial_unit = 247;  // Modbus over Serial Line 1.02, 2.2
 
-// A longer silence is a slip of the pen; answers themselves take less.
-
 Error bad_target(std::string_view url, std::string message, std::string hint = {}) {
   return Error{.code = Errc::bad_target,
                .message = std::move(message),
@@ -72,7 +70,11 @@ Result<Parts> take_apart(std::string_view url) {
   }
   std::string hint = suggestion(name, scheme_names());
   if (hint.empty()) hint = forms;
-  return tl::unexpected(bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint));
+  Error error = bad_target(url, fmt::format("unknown kind of target '{}:'", name), hint);
+  if (const auto meant = closest(name, scheme_names())) {
+    error.remedy = {std::string(url), std::string(url).replace(0, colon, *meant)};
+  }
+  return tl::unexpected(std::move(error));
 }
 
 Result<void> parse_port(Endpoint& endpoint, std::string_view text) {
@@ -357,22 +359,83 @@ Result<void> apply_option(Endpoint& endpoint, std::string_view item,
   }
   std::string hint = suggestion(name, names);
   if (hint.empty()) hint = fmt::format("here there is {}", fmt::join(names, ", "));
-  return tl::unexpected(bad_target(endpoint.text, fmt::format("unknown option '{}'", name), hint));
+  Error error = bad_target(endpoint.text, fmt::format("unknown option '{}'", name), hint);
+  if (const auto meant = closest(name, names)) {
+    std::string mended = endpoint.text;
+    mended.replace(mended.rfind(name), name.size(), *meant);
+    error.remedy = {endpoint.text, std::move(mended)};
+  }
+  return tl::unexpected(std::move(error));
+}
+
+/// Whether it begins with "WORD:".
+bool has_scheme(std::string_view text) {
+  const auto colon = text.find(':');
+  if (colon == std::string_view::npos || colon == 0) return false;
+  const std::string_view word = text.substr(0, colon);
+  return std::all_of(word.begin(), word.end(), [](char c) {
+    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '+';
+  });
+}
+
+bool is_known_scheme(std::string_view word) {
+  return std::any_of(schemes.begin(), schemes.end(),
+                     [&](const Scheme& scheme) { return scheme.name == word; });
+}
+
+bool is_number(std::string_view text) { return parse_unsigned(text, 65'535).has_value(); }
+
+bool is_ipv4_address(std::string_view host) {
+  const auto bytes = split(host, '.');
+  return bytes.size() == 4 && std::all_of(bytes.begin(), bytes.end(), is_number);
+}
+
+/// HOST:PORT, an IPv4 address alone, or an IPv6 address in brackets.
+bool is_bare_host(std::string_view text) {
+  const auto last = text.rfind(':');
+  if (text.starts_with('[')) {
+    const auto bracket = text.find(']');
+    return bracket != std::string_view::npos && is_ipv6_address(text.substr(1, bracket - 1));
+  }
+  if (last == std::string_view::npos) return is_ipv4_address(text);
+  const std::string_view host = text.substr(0, last);
+  if (is_known_scheme(host) || !is_number(text.substr(last + 1))) return false;
+  return !host.empty() && std::all_of(host.begin(), host.end(), is_host_character);
+}
+
+/// The device of a serial port by the name that a kernel or another system gives it; COM1 is the
+/// first port of the board, which Linux counts from 0. Empty: it is no such name.
+std::string bare_port(std::string_view text) {
+  if (text.starts_with("/dev/")) return std::string(text);
+  for (const std::string_view kind : {"ttyUSB", "ttyACM", "ttyS", "ttyAMA"}) {
+    if (text.starts_with(kind) && is_number(text.substr(kind.size()))) {
+      return fmt::format("/dev/{}", text);
+    }
+  }
+  if (!text.starts_with("COM")) return {};
+  const auto number = parse_unsigned(text.substr(3), 256);
+  return number && *number > 0 ? fmt::format("/dev/ttyS{}", *number - 1) : std::string();
+}
+
+/// The URL that is meant by an address or a serial port without a scheme; empty where it is none.
+std::string url_of_bare(std::string_view text) {
+  const auto question = std::min(text.find('?'), text.size());
+  const std::string_view place = text.substr(0, question);
+  const std::string_view query = text.substr(question);
+  if (is_bare_host(place)) return fmt::format("tcp://{}", text);
+  const std::string port = bare_port(place);
+  return port.empty() ? port : fmt::format("rtu://{}{}", port, query);
 }
 
 }  // namespace
 
 bool looks_like_url(std::string_view text) {
-  const auto colon = text.find(':');
-  if (colon == std::string_view::npos || colon == 0) return false;
-  for (const char c : text.substr(0, colon)) {
-    if (std::isalpha(static_cast<unsigned char>(c)) == 0 && c != '+') return false;
-  }
-  return true;
+  return has_scheme(text) || !url_of_bare(text).empty();
 }
 
 Result<Endpoint> parse_endpoint(std::string_view url) {
-  TRY_LET(const auto parts, take_apart(url));
+  const std::string bare = url_of_bare(url);
+  TRY_LET(const auto parts, take_apart(bare.empty() ? url : std::string_view(bare)));
   Endpoint endpoint;
   endpoint.text = url;
   endpoint.medium = parts.scheme->medium;

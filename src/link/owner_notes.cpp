@@ -281,7 +281,7 @@ std::optional<OwnerNote> decode_owner_note(ByteView packet) {
 }
 
 std::optional<modbus::Adu> one_frame(ByteView packet) {
-  auto found = modbus::deframe(modbus::Framing::tcp, modbus::Role::server, packet);
+  auto found = modbus::deframe(modbus::Framing::tcp, modbus::Role::client, packet);
   auto* const frame = std::get_if<modbus::Deframed>(&found);
   if (frame == nullptr || frame->consumed != packet.size() || frame->protocol != 0) {
     return std::nullopt;

@@ -15,6 +15,10 @@ namespace {
 
 // Events are taken at once where they are watched; this bounds memory elsewhere.
 constexpr std::size_t max_queued = 4096;
+constexpr std::size_t max_queued_bytes = 4U << 20U;
+
+// A curve is many times as long as an answer.
+constexpr std::size_t most_received = 4096;
 
 // A tool that answers at all has long done so; a user who pressed Ctrl-C hardly notices.
 constexpr Duration longest_settling = std::chrono::milliseconds(250);
@@ -221,7 +225,9 @@ Session::~Session() {
   if (!unanswered_.empty() && now < doubtful_until_) {
     transport_->leave_late(std::max(doubtful_until_, now + least_doubt_left));
   }
-  if (trace_.bytes) trace_.bytes(Direction::received, {});
+  if (!trace_.bytes) return;
+  if (const Bytes rest = veil_.rest(); !rest.empty()) trace_.bytes(Direction::received, rest);
+  trace_.bytes(Direction::received, {});
 }
 
 /// The line is ours as long as this lives. Who has it next keeps the silence that we owe, and goes
@@ -309,7 +315,7 @@ void Session::go_on_with(const Transport::Dialogue& dialogue) {
 /// Frames that came in the turn of another session come before all that comes in this one.
 void Session::hear_what_others_heard(Bytes frames) {
   if (frames.empty()) return;
-  if (trace_.bytes) trace_.bytes(Direction::received, frames);
+  show_received(frames);
   buffer_ = std::move(frames);
   torn_ = 0;
   static_cast<void>(sort_buffered(nullptr));  // what is no frame shows when the line is used
@@ -690,7 +696,7 @@ Result<modbus::Pdu> Session::exchange(const modbus::Pdu& request) {
 }
 
 void Session::tell_retry(const modbus::Pdu& request) const {
-  decide(Decision::retry, modbus::explain_request(request));
+  decide(Decision::retry, modbus::explain_request(veil_.request(request)));
 }
 
 Result<modbus::Pdu> Session::send_and_await(Outstanding& outstanding) {
@@ -790,6 +796,7 @@ Result<std::optional<Spontaneous>> Session::next_spontaneous(TimePoint deadline)
   }
   std::optional<Spontaneous> oldest = std::move(queue_.front());
   queue_.pop_front();
+  queued_bytes_ -= oldest->pdu.data.size();
   return oldest;
 }
 
@@ -797,7 +804,12 @@ Result<void> Session::send(const modbus::Adu& adu, ByteView bytes) {
   ++counters_.requests;
   sent_.assign(bytes.begin(), bytes.end());
   came_.clear();
-  if (trace_.bytes) trace_.bytes(Direction::sent, bytes);
+  const Bytes rest = veil_.rest();
+  const Bytes shown = veil_.request(options_.rules.framing, adu);
+  if (trace_.bytes) {
+    if (!rest.empty()) trace_.bytes(Direction::received, rest);
+    trace_.bytes(Direction::sent, shown);
+  }
   decide(Decision::request, adu);
   const TimePoint began = clock_->now();
   auto sent = transport_->send(bytes, began + options_.answer_timeout);
@@ -842,11 +854,11 @@ void Session::strip_echo(Outstanding& outstanding) {
 
 /// Appends what has arrived; false at the deadline.
 Result<bool> Session::fill(TimePoint deadline) {
-  std::array<std::uint8_t, 2 * modbus::max_adu_size> chunk;  // NOLINT: filled by receive()
+  std::array<std::uint8_t, most_received> chunk;  // NOLINT: filled by receive()
   TRY_LET(auto count, transport_->receive(chunk, deadline));
   if (count == 0) return false;
   const ByteView bytes = ByteView(chunk).first(count);
-  if (trace_.bytes) trace_.bytes(Direction::received, bytes);
+  show_received(bytes);
   if (came_.size() < modbus::max_adu_size) came_.insert(came_.end(), bytes.begin(), bytes.end());
   last_activity_ = std::max(last_activity_, clock_->now());
   buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
@@ -1013,11 +1025,13 @@ void Session::keep(const modbus::Pdu& pdu) {
   ++counters_.spontaneous;
   Spontaneous frame{.pdu = pdu, .arrival = clock_->now(), .wall = clock_->wall()};
   if (handle_spontaneous_) return handle_spontaneous_(frame);
-  if (queue_.size() == max_queued) {
+  queued_bytes_ += frame.pdu.data.size();
+  queue_.push_back(std::move(frame));
+  while (queue_.size() > max_queued || queued_bytes_ > max_queued_bytes) {
+    queued_bytes_ -= queue_.front().pdu.data.size();
     queue_.pop_front();
     ++counters_.overflowed;
   }
-  queue_.push_back(std::move(frame));
 }
 
 /// RTU: returns when the line was silent for the gap. What arrives meanwhile answers nothing.
@@ -1155,11 +1169,11 @@ Error Session::timeout_error(const Outstanding& outstanding) const {
     return with_evidence(std::move(error), outstanding);
   }
   error.code = Errc::incomplete_answer;
-  error.message = fmt::format("only part of an answer to '{}' came ({})", tried, to_hex(buffer_));
+  error.message = fmt::format("only part of an answer to '{}' came ({})", tried, describe_buffer());
   if (is_rtu() && buffer_.size() >= whole_answer_size(outstanding.request.pdu, buffer_)) {
     error.code = Errc::bad_checksum;
     error.message =
-        fmt::format("no answer to '{}' with a right checksum ({})", tried, to_hex(buffer_));
+        fmt::format("no answer to '{}' with a right checksum ({})", tried, describe_buffer());
   }
   return error;
 }
@@ -1198,15 +1212,24 @@ std::string Session::describe_address(const modbus::Adu& adu) const {
 
 std::string Session::describe_frame(const modbus::Adu& adu) const {
   return fmt::format("{}, function {:02X}, data {}", describe_address(adu), adu.pdu.function,
-                     to_hex(adu.pdu.data));
+                     to_hex(veil_.response(adu.pdu).data));
+}
+
+std::string Session::describe_buffer() const {
+  return veil_.is_drawn() ? counted(buffer_.size(), "byte") : to_hex(buffer_);
+}
+
+void Session::show_received(ByteView bytes) {
+  const Bytes shown = veil_.received(options_.rules.framing, bytes);
+  if (trace_.bytes && !shown.empty()) trace_.bytes(Direction::received, shown);
 }
 
 void Session::decide(Decision decision, const modbus::Adu& adu) const {
   if (!trace_.decision) return;
   const bool is_ours = decision == Decision::request || decision == Decision::echo;
   decide(decision, fmt::format("{}: {}", describe_address(adu),
-                               is_ours ? modbus::explain_request(adu.pdu)
-                                       : modbus::explain_response(adu.pdu)));
+                               is_ours ? modbus::explain_request(veil_.request(adu.pdu))
+                                       : modbus::explain_response(veil_.response(adu.pdu))));
 }
 
 void Session::decide(Decision decision, std::string_view text) const {

@@ -15,6 +15,8 @@ constexpr std::size_t mbap_length_at = 4;  // the length field counts what stand
 constexpr std::size_t mbap_length_end = 6;
 constexpr std::size_t min_mbap_length = 2;  // unit and function
 constexpr std::size_t max_mbap_length = 1 + max_pdu_size;
+constexpr std::size_t max_mbap_length_of_long = max_long_adu_size - mbap_length_end;
+constexpr std::size_t long_head = mbap_size + 1 + 2;  // with the length of the data
 
 constexpr std::size_t rtu_head = 2;  // unit and function
 constexpr std::size_t crc_size = 2;
@@ -48,7 +50,26 @@ Bytes frame_rtu(const Adu& adu) {
   return bytes;
 }
 
-Deframing deframe_tcp(ByteView buffered) {
+/// How the header's length and the bytes behind it fit together.
+enum class Size : std::uint8_t { fits, open, impossible };
+
+/// A frame that is longer than the standard's says so twice: its function is one of the
+/// user-defined, and its data begin with their own length.
+Size judge_long(ByteView buffered, std::size_t length) {
+  if (length > max_mbap_length_of_long) return Size::impossible;
+  if (buffered.size() <= mbap_size) return Size::open;
+  if (!is_counted_by_words(buffered[mbap_size])) return Size::impossible;
+  if (buffered.size() < long_head) return Size::open;
+  return get_u16(buffered, mbap_size + 1) + min_mbap_length + 2 == length ? Size::fits
+                                                                          : Size::impossible;
+}
+
+Size judge_size(ByteView buffered, std::size_t length) {
+  if (length < min_mbap_length) return Size::impossible;
+  return length <= max_mbap_length ? Size::fits : judge_long(buffered, length);
+}
+
+Deframing deframe_tcp(Role role, ByteView buffered) {
   // Only the low byte of the protocol identifier may be used by a tool for an id of its own.
   if (buffered.size() > 2 && buffered[2] != 0) {
     return Junk{buffered.size(),
@@ -56,7 +77,11 @@ Deframing deframe_tcp(ByteView buffered) {
   }
   if (buffered.size() < mbap_length_end) return NeedMore{};
   const std::size_t length = get_u16(buffered, mbap_length_at);
-  if (length < min_mbap_length || length > max_mbap_length) {
+  const bool is_long = length > max_mbap_length;
+  const Size size =
+      is_long && role == Role::server ? Size::impossible : judge_size(buffered, length);
+  if (size == Size::open) return NeedMore{};
+  if (size == Size::impossible) {
     return Junk{buffered.size(),
                 fmt::format("no Modbus TCP header: length {} is not within {} to {}", length,
                             min_mbap_length, max_mbap_length)};
@@ -197,7 +222,7 @@ Bytes frame(Framing framing, const Adu& adu) {
 }
 
 Deframing deframe(Framing framing, Role role, ByteView buffered) {
-  return framing == Framing::tcp ? deframe_tcp(buffered) : deframe_rtu(role, buffered);
+  return framing == Framing::tcp ? deframe_tcp(role, buffered) : deframe_rtu(role, buffered);
 }
 
 }  // namespace spindle::modbus

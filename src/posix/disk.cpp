@@ -133,7 +133,8 @@ class TemporaryFile {
   void look_like(const fs::path& other) const {
     struct stat about = {};
     if (::stat(other.c_str(), &about) != 0) return;
-    // Rights that cannot be kept are no reason to fail.
+    // An owner and rights that cannot be kept are no reason to fail.
+    static_cast<void>(::fchown(file_.number(), about.st_uid, about.st_gid));
     static_cast<void>(::fchmod(file_.number(), about.st_mode & (S_IRWXU | S_IRWXG | S_IRWXO)));
   }
 
@@ -192,14 +193,39 @@ Result<void> write_file(const std::string& named, std::string_view text, Overwri
   return {};
 }
 
-/// Waits until no other program adds a line, but never long: one that is suspended keeps its lock.
-void lock_for_a_while(const Descriptor& file) {
-  constexpr int most_tries = 50;
+/// Waits until no other program has the lock of a file, but never long: one that is suspended keeps
+/// it. False where it has it still.
+bool lock_for_a_while(const Descriptor& file, int most_tries) {
   constexpr int pause_ms = 2;
   for (int tried = 0; tried < most_tries; ++tried) {
-    if (::flock(file.number(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+    if (::flock(file.number(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return true;
     ::poll(nullptr, 0, pause_ms);
   }
+  return false;
+}
+
+bool is_file_of_this_name(const Descriptor& file, const std::string& path) {
+  struct stat opened = {};
+  struct stat named = {};
+  return ::fstat(file.number(), &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
+/// The lock is one of the file and not of its name, so that the file that is replaced has to be the
+/// one that was locked.
+Result<bool> replace_file(const std::string& path, std::string_view expected,
+                          std::string_view text) {
+  constexpr int most_tries = 5000;  // a disk may be slow
+  for (unsigned attempt = 0; attempt < most_attempts; ++attempt) {
+    const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (!file.valid()) return tl::unexpected(unreadable(path, errno));
+    if (!lock_for_a_while(file, most_tries)) return tl::unexpected(unwritable(path, EBUSY));
+    if (!is_file_of_this_name(file, path)) continue;  // another program has just replaced it
+    TRY_LET(const auto held, read_file(path));
+    if (held != expected) return false;
+    return write_file(path, text, Overwrite::allow, Privacy::usual).map([] { return true; });
+  }
+  return tl::unexpected(unwritable(path, EBUSY));
 }
 
 /// Whether a crash or a full disk cut the last line off; one that is just being written gets its
@@ -216,7 +242,8 @@ Result<void> append(const std::string& path, std::string_view text,
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NONBLOCK, usual_file));
   if (!file.valid()) return tl::unexpected(unwritable(path, errno));
-  lock_for_a_while(file);
+  constexpr int most_tries = 50;
+  static_cast<void>(lock_for_a_while(file, most_tries));
   std::string added(text);
   if (begins_new_line(file)) added.insert(added.begin(), '\n');
   const int code = write_whole(file.number(), added, WhenFull::fail);
@@ -287,7 +314,8 @@ Disk disk_with(const Trust& trust) {
       .user = user_name,
       .process = [] { return static_cast<std::uint64_t>(::getpid()); },
       .read_trusted = [trust](const std::string& path) { return read_trusted_file(path, trust); },
-      .read_secret = read_secret_file};
+      .read_secret = read_secret_file,
+      .replace = replace_file};
 }
 
 }  // namespace

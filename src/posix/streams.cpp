@@ -119,10 +119,20 @@ bool err_is_journal() {
   return std::to_string(about.st_dev) + ":" + std::to_string(about.st_ino) == value;
 }
 
-std::size_t err_columns() {
+namespace {
+
+winsize window_of(int descriptor) {
   winsize size = {};
-  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+  return ::ioctl(descriptor, TIOCGWINSZ, &size) == 0 ? size : winsize();
 }
+
+}  // namespace
+
+std::size_t err_columns() { return window_of(STDERR_FILENO).ws_col; }
+
+std::size_t err_rows() { return window_of(STDERR_FILENO).ws_row; }
+
+std::size_t out_columns() { return window_of(STDOUT_FILENO).ws_col; }
 
 bool out_is_open() {
   pollfd reader = {STDOUT_FILENO, 0, 0};

@@ -24,12 +24,15 @@ void append_csv_field(std::string& out, std::string_view text) {
 
 class CsvRenderer final : public PlainRenderer {
  public:
-  using PlainRenderer::PlainRenderer;
+  CsvRenderer(Streams& streams, const Look& look)
+      : PlainRenderer(streams, look.verbosity), look_(look) {}
 
   Result<void> begin(std::span<const Column> columns) override {
+    TRY_LET(const auto chosen, chosen_columns(columns, look_));
     std::vector<std::string> keys;
-    keys.reserve(columns.size());
-    for (const Column& column : columns) keys.push_back(column.key);
+    keys.reserve(chosen.size() + 1);
+    for (const Column& column : chosen) keys.push_back(column.key);
+    if (look_.columns.empty()) name_target(keys);
     if (keys == keys_) return {};
     keys_ = std::move(keys);
     return write_line([](std::string_view key) { return std::string(key); });
@@ -45,6 +48,13 @@ class CsvRenderer final : public PlainRenderer {
   Result<void> end() override { return {}; }
 
  private:
+  /// One tool has the same columns as several.
+  static void name_target(std::vector<std::string>& keys) {
+    if (std::find(keys.begin(), keys.end(), "target") != keys.end()) return;
+    const bool has_time = !keys.empty() && keys.front() == "time";
+    keys.insert(keys.begin() + (has_time ? 1 : 0), "target");
+  }
+
   template <typename TextOfKey>
   Result<void> write_line(TextOfKey text_of) {
     line_.clear();
@@ -56,6 +66,7 @@ class CsvRenderer final : public PlainRenderer {
     return lines_.write(line_);
   }
 
+  Look look_;
   std::vector<std::string> keys_;
   std::string line_;
   LineWriter lines_{streams(), line_end};
@@ -63,8 +74,8 @@ class CsvRenderer final : public PlainRenderer {
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Verbosity verbosity) {
-  return std::make_unique<CsvRenderer>(streams, verbosity);
+std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, const Look& look) {
+  return std::make_unique<CsvRenderer>(streams, look);
 }
 
 }  // namespace spindle::report

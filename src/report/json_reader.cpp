@@ -29,8 +29,10 @@ class JsonReader {
  public:
   explicit JsonReader(std::string_view text) : rest_(text) {}
 
-  std::optional<Record> read(WallTime time) {
-    Record record{.type = {}, .target = {}, .time = time, .fields = {}};
+  /// Where no time is given, that of the record is a field.
+  std::optional<Record> read(std::optional<WallTime> time) {
+    keeps_time_ = !time;
+    Record record{.type = {}, .target = {}, .time = time.value_or(WallTime()), .fields = {}};
     expect('{');
     do {
       std::string key = text();
@@ -44,9 +46,9 @@ class JsonReader {
   }
 
  private:
-  static void add(Record& record, std::string key, Cell value) {
+  void add(Record& record, std::string key, Cell value) const {
     const auto* words = std::get_if<std::string>(&value);
-    if (key == "schema" || key == "time") return;
+    if (key == "schema" || (key == "time" && !keeps_time_)) return;
     if (key == "type") {
       if (words != nullptr) record.type = *words;
     } else if (key == "target") {
@@ -165,6 +167,7 @@ class JsonReader {
   }
 
   std::string_view rest_;
+  bool keeps_time_ = false;
   bool is_wrong_ = false;
 };
 
@@ -173,5 +176,7 @@ class JsonReader {
 std::optional<Record> record_of(std::string_view json, WallTime time) {
   return JsonReader(json).read(time);
 }
+
+std::optional<Record> record_of(std::string_view json) { return JsonReader(json).read({}); }
 
 }  // namespace spindle::report

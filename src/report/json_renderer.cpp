@@ -32,7 +32,12 @@ class JsonRenderer final : public Renderer {
   }
 
   Result<void> error(const Error& error, WallTime time) override {
-    Result<void> written = record(error_record(error, time));
+    Record told = error_record(error, time);
+    if (std::string command = command_to_try(error, streams_.typed); !command.empty()) {
+      told.fields.push_back({"try", std::move(command)});
+    }
+    if (!error.details.empty()) told.fields.push_back({"details", Texts(error.details)});
+    Result<void> written = record(told);
     say_error(streams_, error);
     return written;
   }

@@ -59,6 +59,8 @@ std::string to_json(const Record& record) {
   return text;
 }
 
+void append_json(std::string& out, const Cell& cell) { std::visit(AppendCell{out}, cell); }
+
 void append_json(std::string& out, const Record& record) {
   out += R"({"schema":"spindle/1","type":)";
   append_json_string(out, record.type);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -15,6 +16,7 @@ using std::chrono::seconds;
 constexpr Duration shortest_between_drawings = std::chrono::milliseconds(100);
 constexpr Duration shortest_for_a_pace = seconds(1);
 constexpr std::size_t usual_columns = 80;
+constexpr std::size_t usual_rows = 24;
 // ECMA-48: to the first column, and erase to the end of the line.
 constexpr std::string_view wipe_line = "\r\x1b[K";
 
@@ -101,6 +103,18 @@ void Progress::show(std::string_view text) {
   draw(text);
 }
 
+void Progress::show(std::span<const ScreenLine> lines) {
+  if (!is_shown_) return;
+  const std::lock_guard lock(mutex_);
+  std::string text;
+  for (const ScreenLine& line : lines) {
+    if (!text.empty()) text += '\n';
+    text += line.text;
+  }
+  put(text, lines);
+  drawn_at_ = clock_->now();
+}
+
 void Progress::refresh(std::string_view text) {
   if (!is_shown_) return;
   const std::lock_guard lock(mutex_);
@@ -132,23 +146,42 @@ std::size_t Progress::room() const {
   return (columns > 1 ? columns : usual_columns) - 1;
 }
 
+Screen Progress::screen() const {
+  const std::size_t rows = streams_->err_rows ? streams_->err_rows() : 0;
+  constexpr std::size_t echo = 2;  // "^C"
+  const std::size_t columns = room();
+  return {columns > 2 * echo ? columns - echo : columns, rows > 0 ? rows : usual_rows};
+}
+
 bool Progress::is_due() const {
-  return !is_drawn_ || clock_->now() - drawn_at_ >= shortest_between_drawings;
+  return drawn_.empty() || clock_->now() - drawn_at_ >= shortest_between_drawings;
 }
 
 void Progress::draw(std::string_view text) {
-  put(fitted(printable(text, LineBreaks::fold), room(), Keep::beginning));
+  const ScreenLine line = screen_line(text, room());
+  put(line.text, {&line, 1});
   drawn_at_ = clock_->now();
 }
 
 void Progress::wipe() {
-  if (is_drawn_) put("");
+  if (!drawn_.empty()) put({}, {});
 }
 
-void Progress::put(std::string_view text) {
+/// A terminal that became narrower has put what did not fit any more into further rows.
+std::string Progress::wiping() const {
+  const std::size_t columns = room() + 1;
+  std::size_t rows = 0;
+  for (const std::size_t width : drawn_)
+    rows += std::max<std::size_t>((width + columns - 1) / columns, 1);
+  if (rows <= 1) return std::string(wipe_line);
+  return fmt::format("\r\x1b[{}A\x1b[J", rows - 1);
+}
+
+void Progress::put(std::string_view text, std::span<const ScreenLine> lines) {
   if (streams_->err_is_ready && !streams_->err_is_ready()) return;
-  err_(std::string(wipe_line).append(text));
-  is_drawn_ = !text.empty();
+  err_(wiping().append(text));
+  drawn_.clear();
+  for (const ScreenLine& line : lines) drawn_.push_back(line.width);
 }
 
 }  // namespace spindle::report

@@ -1,20 +1,85 @@
 #include "spindle/report/renderer.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
 #include "display.hpp"
 #include "renderers.hpp"
+#include "spindle/base/text.hpp"
 
 namespace spindle::report {
+namespace {
 
-std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity) {
-  switch (format) {
+const std::string indent = "  ";
+
+/// As people read it: the cause, what can be pasted, and what else would help.
+std::string sentences_of(const Error& error, const std::string& command, std::size_t columns) {
+  const std::string hint = hint_of(error);
+  std::string cause = printable("spindle: " + cause_of(error), LineBreaks::fold);
+  std::string whole =
+      hint.empty() ? cause : printable("spindle: " + describe(error), LineBreaks::fold);
+  const bool is_short = display_width(whole) <= columns;
+  std::string text = wrapped(is_short ? whole : cause, columns);
+  if (!command.empty())
+    text += fmt::format("\n{}try: {}", indent, printable(command, LineBreaks::fold));
+  const bool is_said =
+      !command.empty() && hint == fmt::format("did you mean '{}'?", error.remedy.right);
+  if (!is_short && !hint.empty() && !is_said)
+    text += "\n" + wrapped(indent + printable(hint, LineBreaks::fold), columns);
+  for (const std::string& detail : error.details) {
+    text += "\n" + wrapped(indent + printable(detail, LineBreaks::fold), columns);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::size_t columns_of(const Streams& streams) {
+  constexpr std::size_t widest = 100;
+  constexpr std::size_t narrowest = 40;
+  const std::size_t shown =
+      streams.err_is_terminal && streams.err_columns ? streams.err_columns() : 0;
+  return shown >= narrowest && shown < widest ? shown : widest;
+}
+
+std::string wrapped(std::string_view text, std::size_t columns) {
+  std::string lines;
+  std::size_t width = 0;
+  const auto begin = std::min(text.find_first_not_of(' '), text.size());
+  std::string word(text.substr(0, begin));
+  for (const std::string_view next : split(text.substr(begin), ' ')) {
+    word += next;
+    const std::size_t wide = display_width(word);
+    const bool fits = width == 0 || width + 1 + wide <= columns;
+    if (width > 0) lines += fits ? " " : "\n" + indent;
+    width = width == 0 ? wide : fits ? width + 1 + wide : indent.size() + wide;
+    lines += std::exchange(word, {});
+  }
+  return lines;
+}
+
+std::unique_ptr<Renderer> make_renderer(const Look& look, Streams& streams) {
+  switch (look.format) {
     case Format::json:
-      return make_json_renderer(streams, verbosity);
+      return make_json_renderer(streams, look.verbosity);
+    case Format::yaml:
+      return make_yaml_renderer(streams, look.verbosity);
     case Format::csv:
-      return make_csv_renderer(streams, verbosity);
+      return make_csv_renderer(streams, look);
+    case Format::value:
+      return make_value_renderer(streams, look);
     case Format::table:
+    case Format::wide:
+    case Format::svg:
       break;
   }
-  return make_table_renderer(streams, verbosity);
+  return make_table_renderer(streams, look);
+}
+
+std::unique_ptr<Renderer> make_renderer(Format format, Streams& streams, Verbosity verbosity) {
+  return make_renderer({.format = format, .verbosity = verbosity}, streams);
 }
 
 Record error_record(const Error& error, WallTime time) {
@@ -47,14 +112,22 @@ Result<void> LineWriter::write(std::string_view line) {
 }
 
 void say_line(const Streams& streams, Severity severity, std::string_view text) {
-  std::string line;
-  if (streams.err_is_journal)
-    line = {'<', static_cast<char>('0' + static_cast<int>(severity)), '>'};
-  streams.err(line + printable(text, LineBreaks::fold) + "\n");
+  const std::string line = printable(text, LineBreaks::fold);
+  if (!streams.err_is_journal) return streams.err(wrapped(line, columns_of(streams)) + "\n");
+  streams.err(fmt::format("<{}>{}\n", static_cast<int>(severity), line));
+}
+
+void say_frame(const Streams& streams, std::string_view text) {
+  if (streams.err_is_journal) return say_line(streams, Severity::informational, text);
+  streams.err(printable(text, LineBreaks::fold) + "\n");
 }
 
 void say_error(const Streams& streams, const Error& error) {
-  say_line(streams, Severity::error, "spindle: " + describe(error));
+  if (streams.err_is_journal) {
+    return say_line(streams, Severity::error, "spindle: " + describe(error));
+  }
+  streams.err(sentences_of(error, command_to_try(error, streams.typed), columns_of(streams)) +
+              "\n");
 }
 
 void say_warning(const Streams& streams, std::string_view sentence) {

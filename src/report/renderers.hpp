@@ -7,9 +7,15 @@
 
 namespace spindle::report {
 
-std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Verbosity verbosity);
+std::unique_ptr<Renderer> make_table_renderer(Streams& streams, const Look& look);
 std::unique_ptr<Renderer> make_json_renderer(Streams& streams, Verbosity verbosity);
-std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, Verbosity verbosity);
+std::unique_ptr<Renderer> make_yaml_renderer(Streams& streams, Verbosity verbosity);
+std::unique_ptr<Renderer> make_csv_renderer(Streams& streams, const Look& look);
+std::unique_ptr<Renderer> make_value_renderer(Streams& streams, const Look& look);
+
+/// Those of a list that are wanted: the ones that were asked for by key or title, in that order;
+/// else all, or all that are always shown. Error `usage` that lists them where one is not there.
+Result<std::vector<Column>> chosen_columns(std::span<const Column> columns, const Look& look);
 
 /// Lines for programs. The first one begins on a line of its own, also in a file whose last line a
 /// crash or a full disk cut off.

@@ -2,73 +2,32 @@
 #include <numeric>
 
 #include "display.hpp"
+#include "layout.hpp"
 #include "renderers.hpp"
+#include "spindle/base/local_time.hpp"
 
 namespace spindle::report {
 namespace {
 
-/// A cell of a table. What stands in it is part of one text for all cells.
-struct Drawn {
-  std::size_t begin = 0;
-  std::size_t size = 0;
-  std::size_t width = 0;  ///< cells of a terminal
-  Tone tone = Tone::plain;
-
-  [[nodiscard]] std::string_view in(std::string_view texts) const {
-    return texts.substr(begin, size);
-  }
-};
-using Row = std::span<const Drawn>;
-
-Drawn append_drawn(std::string& texts, std::string_view text, Tone tone) {
-  Drawn drawn{.begin = texts.size(), .tone = tone};
-  drawn.width = append_cells(texts, text);
-  drawn.size = texts.size() - drawn.begin;
-  return drawn;
-}
-
-constexpr std::string_view gap = "  ";
 constexpr std::string_view bold = "\x1b[1m";
-constexpr std::string_view green = "\x1b[32m";
-constexpr std::string_view red = "\x1b[31m";
 constexpr std::string_view plain = "\x1b[0m";
-
-void append_colored(std::string& line, std::string_view text, Tone tone, Color color) {
-  const bool is_colored = color != Color::off && tone != Tone::plain;
-  if (is_colored) line += tone == Tone::good ? green : red;
-  line += text;
-  if (is_colored) line += plain;
-}
-
-/// Appends a line without spaces at its end.
-void draw(Row row, std::string_view texts, std::span<const Column> columns,
-          std::span<const std::size_t> widths, Color color, std::string& out) {
-  std::size_t used = row.size();
-  while (used > 0 && row[used - 1].size == 0) --used;
-  for (std::size_t index = 0; index < used; ++index) {
-    if (index != 0) out += gap;
-    const std::size_t width = row[index].width;
-    const std::size_t padding = widths[index] > width ? widths[index] - width : 0;
-    const bool is_right = columns[index].align == Align::right;
-    if (is_right) out.append(padding, ' ');
-    append_colored(out, row[index].in(texts), row[index].tone, color);
-    if (!is_right && index + 1 < used) out.append(padding, ' ');
-  }
-  out.erase(out.find_last_not_of(' ') + 1);
-  out += '\n';
-}
 
 class TableRenderer final : public PlainRenderer {
  public:
-  using PlainRenderer::PlainRenderer;
+  TableRenderer(Streams& streams, const Look& look)
+      : PlainRenderer(streams, look.verbosity), look_(look) {}
 
   Result<void> begin(std::span<const Column> columns) override {
     TRY(end());
-    columns_.assign(columns.begin(), columns.end());
-    widths_.clear();
+    TRY_LET(auto chosen, chosen_columns(columns, look_));
+    columns_ = std::move(chosen);
+    natural_ = {};
+    natural_.are_empty.assign(columns_.size(), !is_live());
     places_.assign(columns_.size(), 0);
     for (const Column& column : columns_) {
-      widths_.push_back(std::max(column.width, display_width(column.title)));
+      const std::size_t width =
+          is_local(column) && column.width > 0 ? local_time_width : column.width;
+      natural_.widths.push_back(std::max(width, display_width(column.title)));
     }
     if (heading_ == Heading::drawn) heading_ = Heading::another;
     return {};
@@ -78,6 +37,10 @@ class TableRenderer final : public PlainRenderer {
     std::string made;
     for (std::size_t index = 0; index < columns_.size(); ++index) {
       const Field* const field = find_field(record, index);
+      if (is_local(columns_[index])) {
+        add_local_time(record, columns_[index], field);
+        continue;
+      }
       cells_.push_back(append_drawn(texts_, shown_text(record, columns_[index].key, field, made),
                                     field == nullptr ? Tone::plain : field->tone));
     }
@@ -87,8 +50,9 @@ class TableRenderer final : public PlainRenderer {
   Result<void> end() override {
     if (is_live()) return {};
     for (std::size_t at = 0; at < cells_.size(); ++at) {
-      std::size_t& width = widths_[at % widths_.size()];
-      width = std::max(width, cells_[at].width);
+      const std::size_t column = at % columns_.size();
+      natural_.widths[column] = std::max(natural_.widths[column], cells_[at].width);
+      if (cells_[at].width > 0) natural_.are_empty[column] = false;
     }
     return flush();
   }
@@ -103,6 +67,29 @@ class TableRenderer final : public PlainRenderer {
                                             [](const Column& column) { return column.width > 0; });
   }
 
+  /// Whether the times of a column are those of the user's zone.
+  [[nodiscard]] bool is_local(const Column& column) {
+    return look_.clock != nullptr && streams().out_is_terminal && is_time(column);
+  }
+
+  /// Text that is no time stands as it is.
+  void add_local_time(const Record& record, const Column& column, const Field* field) {
+    std::string made;
+    const std::string_view text = shown_text(record, column.key, field, made);
+    const bool is_own = field == nullptr && column.key == "time";
+    const auto time =
+        is_own || text.empty() ? Result<WallTime>(record.time) : parse_time(text, *look_.clock);
+    const bool is_told = time && (is_own || !text.empty());
+    const std::string local = is_told ? to_local_text(*time, *look_.clock) : std::string(text);
+    cells_.push_back(append_drawn(texts_, local, Tone::plain));
+  }
+
+  /// Cells of a row that the table has to fit in; 0: as many as it takes.
+  [[nodiscard]] std::size_t room() {
+    const bool fits = streams().out_is_terminal && look_.format != Format::wide;
+    return fits && streams().out_columns ? streams().out_columns() : 0;
+  }
+
   /// The field of a column. Records of one table have most fields at the same places.
   const Field* find_field(const Record& record, std::size_t column) {
     const std::string& key = columns_[column].key;
@@ -115,28 +102,35 @@ class TableRenderer final : public PlainRenderer {
     return field;
   }
 
-  void add_header(std::string& text) {
+  void add_header(const Table& table, std::string& text) {
     std::string texts;
     std::vector<Drawn> titles;
     for (const Column& column : columns_) {
       titles.push_back(append_drawn(texts, column.title, Tone::plain));
     }
-    const bool is_bold = streams().color != Color::off;
+    const bool is_bold = table.color != Color::off;
     if (is_bold) text += bold;
-    draw(titles, texts, columns_, widths_, Color::off, text);
+    draw_row(titles, texts, table, RowKind::head, text);
     if (is_bold) text.insert(text.size() - 1, plain);
   }
 
   Result<void> flush() {
     if (cells_.empty()) return {};
+    // A terminal may have another width by now.
+    if (const std::size_t now = room(); heading_ != Heading::drawn || now != layout_.room) {
+      if (heading_ == Heading::drawn) heading_ = Heading::another;
+      layout_ = lay_out(columns_, natural_, now);
+    }
+    const Table table{columns_, layout_, streams().color, look_.clock != nullptr};
     const std::size_t rows = cells_.size() / columns_.size();
+    const auto& widths = layout_.widths;
     std::string text;
-    text.reserve((rows + 1) * std::accumulate(widths_.begin(), widths_.end(), std::size_t{}));
+    text.reserve((rows + 1) * std::accumulate(widths.begin(), widths.end(), std::size_t{}));
     if (heading_ == Heading::another) text += '\n';
-    if (heading_ != Heading::drawn) add_header(text);
+    if (heading_ != Heading::drawn) add_header(table, text);
     for (std::size_t row = 0; row < rows; ++row) {
-      draw(Row(cells_).subspan(row * columns_.size(), columns_.size()), texts_, columns_, widths_,
-           streams().color, text);
+      draw_row(Row(cells_).subspan(row * columns_.size(), columns_.size()), texts_, table,
+               RowKind::record, text);
     }
     cells_.clear();
     texts_.clear();
@@ -144,18 +138,20 @@ class TableRenderer final : public PlainRenderer {
     return streams().out(text);
   }
 
+  Look look_;
   std::vector<Column> columns_;
-  std::vector<std::size_t> widths_;
+  Natural natural_;
   std::vector<std::size_t> places_;  ///< where the field of a column stood in the last record
   std::vector<Drawn> cells_;         ///< row by row
   std::string texts_;                ///< of the cells
+  Layout layout_;                    ///< as it was drawn last
   Heading heading_ = Heading::first;
 };
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_table_renderer(Streams& streams, Verbosity verbosity) {
-  return std::make_unique<TableRenderer>(streams, verbosity);
+std::unique_ptr<Renderer> make_table_renderer(Streams& streams, const Look& look) {
+  return std::make_unique<TableRenderer>(streams, look);
 }
 
 }  // namespace spindle::report

@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "spindle/catalogue/value.hpp"
+
 namespace spindle::sim {
 namespace {
 
@@ -39,6 +41,8 @@ BmUnit::BmUnit(const catalogue::Profile& profile, const catalogue::SimulationSpe
     : Unit(profile, start, address, options, RegisterBank::Commands::write_only),
       stopped_error_(start.stopped_error),
       screws_(word("status.screws-remaining")) {
+  if (options.event_number) bank().set("event.number", *options.event_number);
+  put_barcode();
   constexpr std::array<std::pair<std::string_view, Handler>, 5> handlers = {{
       {"alarm-reset", &BmUnit::reset_alarm},
       {"lock", &BmUnit::lock},
@@ -56,6 +60,17 @@ BmUnit::BmUnit(const catalogue::Profile& profile, const catalogue::SimulationSpe
     if (selects && word("status.preset") == 0) bank().set("status.preset", action.minimum);
   }
   show_ready();
+}
+
+/// Of a tool whose events have one.
+void BmUnit::put_barcode() {
+  const auto place = bank().find("event.plus.barcode");
+  if (!place) return;
+  catalogue::Parameter parameter;
+  parameter.encoding = place->encoding;
+  const auto registers =
+      catalogue::encode(parameter, {.content = catalogue::Content::text, .text = "WO-1234"});
+  if (registers) bank().put(*place, *registers);
 }
 
 // ---- remote inputs ----

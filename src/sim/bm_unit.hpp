@@ -53,6 +53,7 @@ class BmUnit final : public Unit {
   [[nodiscard]] std::optional<TimePoint> next_step() const override;
   void step(TimePoint now) override { finish_run(now); }
 
+  void put_barcode();
   void reset_alarm(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void lock(const catalogue::Action& action, std::uint16_t value, TimePoint now);
   void start_or_stop(const catalogue::Action& action, std::uint16_t value, TimePoint now);

@@ -52,6 +52,9 @@ class Bus final : public SimulatedBus {
              return unit->address() == asked.value;
            });
   }
+  [[nodiscard]] modbus::UnitId answering_unit(modbus::UnitId asked) const override {
+    return units_.empty() ? asked : units_.front()->answers_as(asked);
+  }
   [[nodiscard]] Duration required_gap() const override { return gap_; }
   [[nodiscard]] Duration answer_delay(modbus::UnitId asked) const override {
     for (const auto& unit : units_) {

@@ -100,6 +100,10 @@ constexpr std::array kinds = {
     KindInfo{FaultKind::reset_neighbour, "reset-neighbour", Argument::number, 1, 1, word_limit,
              "reset-neighbour[=N]",
              "a write is stored, and the register N (1) behind it becomes 0"},
+    KindInfo{FaultKind::zero_date, "zero-date", Argument::none, 0, 0, 0, "zero-date",
+             "an event has no date (firmware 4000 and later)"},
+    KindInfo{FaultKind::not_a_number, "not-a-number", Argument::none, 0, 0, 0, "not-a-number",
+             "the torque of an event is no number (firmware 4000 and later)"},
 };
 
 const KindInfo& info_of(FaultKind kind) {
@@ -135,7 +139,9 @@ Result<const KindInfo*> find_kind(std::string_view text, std::string_view name) 
   for (const KindInfo& info : kinds) names.emplace_back(info.name);
   std::string hint = suggestion(name, names);
   if (hint.empty()) hint = "'spindle simulate --help' lists them";
-  return tl::unexpected(bad(text, "there is none of that name", std::move(hint)));
+  Error error = bad(text, "there is none of that name", std::move(hint));
+  error.remedy.right = "spindle simulate --help";
+  return tl::unexpected(std::move(error));
 }
 
 Result<void> parse_argument(Fault& fault, const KindInfo& row, std::string_view text,
@@ -202,6 +208,9 @@ FaultNeed need_of(FaultKind kind) {
     case FaultKind::store_other:
     case FaultKind::reset_neighbour:
       return FaultNeed::screwdriver;
+    case FaultKind::zero_date:
+    case FaultKind::not_a_number:
+      return FaultNeed::dated;
     default:
       return FaultNeed::nothing;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "spindle/catalogue/identity.hpp"
 #include "spindle/modbus/types.hpp"
 
 namespace spindle::sim {
@@ -84,6 +85,13 @@ Bytes make_identity(const std::optional<IdentitySpec>& facts,
     put_serial(*facts, identity, get_serial(*facts, start.identity, written));
   }
   return identity;
+}
+
+unsigned firmware_of(const std::optional<IdentitySpec>& facts,
+                     const catalogue::SimulationSpec& start, const DeviceOptions& options) {
+  if (!facts) return 0;
+  return catalogue::decode_identity(*facts, make_identity(facts, start, options))
+      .firmware.value_or(0);
 }
 
 }  // namespace spindle::sim

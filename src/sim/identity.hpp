@@ -13,4 +13,8 @@ namespace spindle::sim {
 Bytes make_identity(const std::optional<catalogue::IdentitySpec>& facts,
                     const catalogue::SimulationSpec& start, const DeviceOptions& options);
 
+/// The firmware that this identity says; 0 where it says none.
+unsigned firmware_of(const std::optional<catalogue::IdentitySpec>& facts,
+                     const catalogue::SimulationSpec& start, const DeviceOptions& options);
+
 }  // namespace spindle::sim

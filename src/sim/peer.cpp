@@ -15,6 +15,9 @@ using modbus::FunctionCode;
 using std::chrono::milliseconds;
 
 constexpr Duration piece_distance = milliseconds(1);
+// What is longer than a frame of the standard comes over a wireless link as this, with pauses.
+constexpr std::size_t wireless_segment = 1460;
+constexpr Duration wireless_pause = milliseconds(20);
 constexpr Duration longest_hold = milliseconds(50);
 
 // Where no gap is kept, what has waited so long for its rest is a torn frame.
@@ -325,7 +328,7 @@ std::optional<modbus::Pdu> Peer::respond(const modbus::Adu& request, const Fault
 
 void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
   const ActiveFaults active(*faults_, counter_->value + 1);
-  unit_ = request.unit;
+  unit_ = server_->answering_unit(request.unit);
   const auto response = respond(request, active.find(FaultKind::exception), now);
   const bool broadcast = framing_ == Framing::rtu && request.unit == modbus::UnitId{};
   if (!response && !broadcast) {
@@ -335,7 +338,7 @@ void Peer::answer(const modbus::Adu& request, TimePoint heard, TimePoint now) {
   if (!response || broadcast) return;
   ++counter_->value;
 
-  const modbus::Adu right{request.transaction, request.unit, *response};
+  const modbus::Adu right{request.transaction, unit_, *response};
   Bytes bytes;
   if (framing_ == Framing::rtu) bytes = foreign_bytes(right, active.find(FaultKind::foreign));
   append(bytes, event_bytes(active.find(FaultKind::push_before), request.transaction));
@@ -378,7 +381,17 @@ Bytes Peer::event_bytes(const Fault* fault, modbus::TransactionId pending) {
 
 void Peer::push(const modbus::Pdu& pdu, TimePoint now) {
   if (closing_) return;
-  enqueue({.due = now, .pieces = {modbus::frame(framing_, {{push_transaction_++}, unit_, pdu})}});
+  const Bytes bytes = modbus::frame(framing_, {{push_transaction_++}, unit_, pdu});
+  const bool is_long = bytes.size() > modbus::max_adu_size;
+  // Frames leave in their order, however long one before takes.
+  const TimePoint due = std::max(now, pushes_in_order_from_);
+  Message message{
+      .due = due,
+      .pieces = is_long ? pieces_of(bytes, wireless_segment) : pieces_of(bytes, bytes.size()),
+      .distance = is_long ? wireless_pause : piece_distance};
+  pushes_in_order_from_ =
+      due + wireless_pause * static_cast<std::int64_t>(is_long ? message.pieces.size() : 0);
+  enqueue(std::move(message));
 }
 
 void Peer::disconnect(TimePoint now) {
@@ -433,7 +446,7 @@ Bytes Peer::take(TimePoint now) {
   front.begun = true;
   if (line_) line_->spoke(now);
   if (!front.pieces.empty()) {
-    front.due += piece_distance;
+    front.due += front.distance;
   } else if (front.ending == Ending::stay) {
     outbox_.pop_front();
   }

@@ -417,7 +417,7 @@ void RegisterBank::add_command(const catalogue::Action& action, bool even_pairs,
 }
 
 void RegisterBank::add_events(const catalogue::EventSpec& facts) {
-  tables_.of(catalogue::table_of(facts)).add(facts.first, facts.count);
+  if (facts.first) tables_.of(catalogue::table_of(facts)).add(*facts.first, facts.count);
   if (!facts.arm) return;
   const Place arm{.address = facts.arm->address};
   if (cells_at(arm.table, arm.address).empty()) add({.place = arm, .writable = true});

@@ -20,7 +20,7 @@ Unit::Unit(const catalogue::Profile& profile, const catalogue::SimulationSpec& s
     : address_(address),
       link_(profile.link),
       bank_(profile, start, commands),
-      events_(profile, bank_),
+      events_(profile, bank_, firmware_of(profile.identity, start, options)),
       store_(options.faults),
       identity_(make_identity(profile.identity, start, options)),
       limit_exception_(start.limit_exception),

@@ -33,6 +33,9 @@ class Unit {
   /// Time between a query and its answer, the gap not counted.
   [[nodiscard]] virtual Duration waiting_time() const { return {}; }
 
+  /// The unit identifier of its answers to this one, on a network.
+  [[nodiscard]] virtual modbus::UnitId answers_as(modbus::UnitId asked) const { return asked; }
+
   void advance(TimePoint now);
   [[nodiscard]] std::optional<TimePoint> next_change() const;
 
@@ -45,7 +48,7 @@ class Unit {
   [[nodiscard]] const EventBlock& events() const { return events_; }
 
   /// An event occurs, which says what the start state has for its kind, in turn.
-  void happen(catalogue::EventKind kind, TimePoint now);
+  virtual void happen(catalogue::EventKind kind, TimePoint now);
   /// The operator works, with so many results at once. Whether the device let him.
   virtual bool operate(Rundown outcome, unsigned results, TimePoint now);
   virtual void raise_alarm(std::int64_t code, TimePoint now) = 0;

@@ -40,6 +40,10 @@ constexpr auto rules = std::to_array<Rule>({
      "WHERE previous.tool = epoch.tool AND previous.ordinal = epoch.ordinal - 1)"},
     {"epoch {}: it is the first one and does not say so, or says so and is not",
      "SELECT ordinal FROM epoch WHERE (ordinal = 0) <> (reason = 'first')"},
+    {"curve of event {}: its bytes are no whole samples",
+     "SELECT event FROM curve WHERE length(samples) % 4"},
+    {"curve of event {}: what its channels are is no JSON",
+     "SELECT event FROM curve WHERE NOT json_valid(channels)"},
     {"place {}: it has no url", "SELECT id FROM place WHERE url = ''"},
 });
 

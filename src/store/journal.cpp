@@ -103,7 +103,11 @@ Journal::Journal(Connection& connection)
                       "SELECT id FROM happening WHERE at = ?1 AND tool IS ?2 AND type = ?3 "
                       "AND json = ?4"),
       insert_happening_(connection,
-                        "INSERT INTO happening (at, tool, type, json) VALUES (?1, ?2, ?3, ?4)") {}
+                        "INSERT INTO happening (at, tool, type, json) VALUES (?1, ?2, ?3, ?4)"),
+      insert_curve_(connection,
+                    "INSERT INTO curve (event, interval_us, channels, samples) "
+                    "SELECT id, ?4, ?5, ?6 FROM event WHERE tool = ?1 AND epoch = ?2 AND "
+                    "number = ?3 ON CONFLICT DO NOTHING") {}
 
 std::optional<RowId> Journal::find_tool(const ToolName& name) {
   Rows rows = find_tool_.query(name.maker, name.serial);
@@ -254,6 +258,18 @@ Stored Journal::store(const Happening& happening) {
   }
   insert_happening_.run(happening.at, happening.tool, happening.type, happening.json);
   return {.as = Stored::As::row, .id = new_row()};
+}
+
+Stored Journal::store(const NewCurve& entry) {
+  const auto epoch = last_.newest_epoch(entry.tool);
+  if (!epoch) return {.as = Stored::As::known};
+  const Curve& curve = entry.curve;
+  insert_curve_.run(entry.tool, *epoch, entry.number, curve.interval_us,
+                    std::string_view(curve.channels), ByteView(curve.samples));
+  const bool is_new = !connection_.failed() && sqlite3_changes(connection_.handle()) > 0;
+  return {.as = is_new ? Stored::As::row : Stored::As::known,
+          .id = is_new ? new_row() : 0,
+          .epoch = *epoch};
 }
 
 Stored Journal::store(const Seen& seen) {

@@ -28,6 +28,7 @@ class Journal {
   Stored store(const PresetSettings& settings);
   Stored store(const Happening& happening);
   Stored store(const Seen& seen);
+  Stored store(const NewCurve& entry);
 
  private:
   /// A row whose number an event has.
@@ -62,6 +63,7 @@ class Journal {
   Statement insert_settings_;
   Statement find_happening_;
   Statement insert_happening_;
+  Statement insert_curve_;
 };
 
 }  // namespace spindle::store

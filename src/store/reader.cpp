@@ -147,6 +147,20 @@ Gap read_gap(const Rows& rows) {
           .reason = std::string(rows.text(9))};
 }
 
+constexpr std::string_view curve_query =
+    "SELECT curve.event, epoch, at, interval_us, channels, samples FROM curve "
+    "JOIN event ON event.id = curve.event ";
+
+Curve read_curve(const Rows& rows) {
+  const ByteView samples = rows.bytes(5);
+  return {.event = rows.integer(0),
+          .epoch = rows.integer(1),
+          .at = rows.time(2),
+          .interval_us = rows.integer(3),
+          .channels = std::string(rows.text(4)),
+          .samples = Bytes(samples.begin(), samples.end())};
+}
+
 Statement happening_query(Connection& connection, const Filter& filter) {
   Selection selection("id, tool, at, type, json", "happening");
   selection.require_one_of("tool", filter.tools);
@@ -246,6 +260,28 @@ class FileReader : public Reader {
         read_event(rows, columns, event);
         if (!take(event)) break;
       }
+    }
+    return connection_->outcome();
+  }
+
+  Result<std::optional<Curve>> curve(RowId event) override {
+    std::optional<Curve> found;
+    Statement statement(*connection_, fmt::format("{}WHERE curve.event = ?1", curve_query));
+    {
+      Rows rows = statement.query(event);
+      if (rows.next()) found = read_curve(rows);
+    }
+    TRY(connection_->outcome());
+    return found;
+  }
+
+  Result<void> curves(RowId after, const std::function<bool(const Curve&)>& take) override {
+    Statement statement(*connection_,
+                        fmt::format("{}WHERE curve.event > ?1 ORDER BY curve.event", curve_query));
+    {
+      Rows rows = statement.query(after);
+      bool goes_on = true;
+      while (goes_on && rows.next()) goes_on = take(read_curve(rows));
     }
     return connection_->outcome();
   }

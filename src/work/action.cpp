@@ -69,7 +69,7 @@ device::ActionResult in_words_of_actions(device::StopResult result) {
 catalogue::Secrecy secrecy_of(const Action& action, const Profile& profile) {
   catalogue::Parameter written;
   written.address = action.address;
-  return profile.with_secrecy(std::move(written)).secrecy;
+  return profile.marked(std::move(written)).secrecy;
 }
 
 Result<device::ActionResult> perform_action(const ActionRequest& request, OpenTool& tool,

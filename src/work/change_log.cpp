@@ -18,6 +18,14 @@ std::optional<files::LoggedValue> logged_value(const catalogue::Value& value) {
   return value.exact();
 }
 
+/// Short enough to be typed: of ten thousand commands, two have the same with a chance of one in a
+/// hundred, and then both are named where one is meant. FNV-1a, 64 bits folded to 32.
+std::string short_id(std::string_view text) {
+  std::uint64_t number = 0xCBF29CE484222325U;
+  for (const char c : text) number = (number ^ static_cast<unsigned char>(c)) * 0x100000001B3U;
+  return fmt::format("{:08x}", static_cast<std::uint32_t>(number ^ (number >> 32U)));
+}
+
 }  // namespace
 
 LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
@@ -31,10 +39,13 @@ LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Valu
   return change;
 }
 
-/// Two programs never make the same id, and one program never for the same tool.
 std::string ChangeLog::begin(LoggedChange change) {
-  const std::string id = fmt::format("{:x}-{:x}-{}", disk_->process(),
-                                     clock_->wall().time_since_epoch().count(), ++begun_);
+  if (run_.empty()) {
+    run_ = short_id(fmt::format("{} {} {} {}", disk_->process(),
+                                clock_->wall().time_since_epoch().count(), options_.target,
+                                options_.command));
+  }
+  const std::string id = fmt::format("{}-{}", run_, ++begun_);
   change.result = files::begun;
   add(change, id);
   return id;

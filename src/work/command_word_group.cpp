@@ -54,13 +54,17 @@ Result<std::string> WordSetup::group_in_words() {
                      tool().target.shown, *own_parent);
 }
 
-/// The other drivers of the tools file on the same line.
+/// The other drivers of the tools file on the same line; also those whose entries have a fault, as
+/// they turn all the same.
 std::vector<Target> WordSetup::neighbours() const {
   std::vector<Target> found;
   const std::string line = shared_line(tool().target.endpoint);
   if (line.empty()) return found;
-  for (const files::Tool& known : environment().tools.tools) {
-    for (Target& other : resolve_each_target({known.name}, environment()).targets) {
+  files::Tools tools = environment().tools;
+  tools.faults.clear();
+  const Environment all = with_tools(environment(), tools);
+  for (const files::Tool& known : tools.tools) {
+    for (Target& other : resolve_each_target({known.name}, all).targets) {
       const auto& unit = other.endpoint.unit;
       const bool is_other =
           unit && unit->value != 0 && unit->value != tool().device.session().options().unit.value;

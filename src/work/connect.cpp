@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "spindle/base/text.hpp"
 #include "spindle/work/identification.hpp"
 #include "spindle/work/simulated_tool.hpp"
+#include "spindle/work/tool_memory.hpp"
 #include "spindle/work/trace.hpp"
 
 namespace spindle::work {
@@ -17,7 +20,13 @@ namespace {
 std::vector<link::SpontaneousShape> unasked_shapes(const Environment& environment) {
   std::vector<link::SpontaneousShape> shapes;
   for (const catalogue::Profile& profile : environment.profiles.load_all()) {
-    if (catalogue::sends_unasked(profile)) shapes.push_back(device::shape_of(*profile.events));
+    if (catalogue::sends_unasked(profile)) {
+      const auto of_events = device::shapes_of(*profile.events);
+      shapes.insert(shapes.end(), of_events.begin(), of_events.end());
+    }
+    for (const catalogue::UnaskedFrame& frame : profile.link.unasked) {
+      shapes.push_back(device::shape_of(frame));
+    }
   }
   return shapes;
 }
@@ -85,29 +94,93 @@ Result<void> check_transactions(const Target& target, const catalogue::Profile& 
       target));
 }
 
-/// A tool whose profile was not named: ask it, and go on with what its answer fits.
-Result<void> find_profile(OpenTool& tool, const Environment& environment) {
-  auto answer = ask_identity(tool);
-  if (!answer) return tl::unexpected(std::move(answer.error()));
-  TRY_LET(auto identification, match_identity(*answer, {}, environment));
-  if (identification.candidates.empty()) {
-    const bool later = identification.generation == catalogue::Generation::later;
-    return tl::unexpected(
-        with_target(unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
-                                    fmt::format("no profile fits what the tool says of itself: {}",
-                                                fmt::join(identification.identity.notes, "; "))),
-                    tool.target));
-  }
-  const auto told_apart = check_transactions(tool.target, *identification.matched);
-  if (!told_apart) return tl::unexpected(told_apart.error());
+/// What the answer fits no profile.
+Error no_profile(const OpenTool& tool, const Identification& identification) {
+  const bool later = identification.generation == catalogue::Generation::later;
+  return with_target(unknown_product(later ? Errc::wrong_generation : Errc::mismatch,
+                                     fmt::format("no profile fits what the tool says of itself: {}",
+                                                 fmt::join(identification.identity.notes, "; "))),
+                     tool.target);
+}
+
+/// Goes on with the profile that was found.
+Result<void> use_found(OpenTool& tool, Identification identification, Need need) {
+  TRY(check_transactions(tool.target, *identification.matched));
   // Products that their answer does not tell apart share the register map of their common base.
   tool.profile = std::make_unique<const catalogue::Profile>(std::move(*identification.matched));
   tool.device.use(*tool.profile, std::move(identification.identity));
-  return {};
+  return need == Need::stop ? Result<void>() : tool.device.ask_more();
+}
+
+/// A tool whose profile was not named: ask it, and go on with what its answer fits.
+Result<void> find_profile(OpenTool& tool, Need need, const Environment& environment) {
+  auto answer = ask_identity(tool);
+  if (!answer) return tl::unexpected(std::move(answer.error()));
+  TRY_LET(auto identification, match_identity(*answer, {}, environment));
+  if (identification.candidates.empty()) return tl::unexpected(no_profile(tool, identification));
+  return use_found(tool, std::move(identification), need);
+}
+
+/// A tool that can say what it is may not take every write. What cannot is what the user says.
+Result<void> recognise(OpenTool& tool, const Environment& environment) {
+  if (!tool.target.profile.empty()) return tool.device.require_known_registers();
+  if (tool.target.endpoint.medium != link::Medium::tcp) return {};
+  const auto answer = tool.device.report_server_id();
+  constexpr std::array silent = {Errc::exception_response, Errc::no_answer, Errc::closed,
+                                 Errc::reset};
+  const bool says_nothing =
+      !answer && std::find(silent.begin(), silent.end(), answer.error().code) != silent.end();
+  if (says_nothing) return {};
+  if (!answer) return tl::unexpected(answer.error());
+  TRY_LET(auto identification, match_identity(*answer, {}, environment));
+  if (!identification.candidates.empty()) {
+    return use_found(tool, std::move(identification), Need::raw_writes);
+  }
+  if (identification.generation != catalogue::Generation::later) return {};
+  return tl::unexpected(no_profile(tool, identification));
+}
+
+bool has_secrets(const catalogue::Profile& profile) {
+  return std::any_of(
+      profile.parameters.begin(), profile.parameters.end(),
+      [](const auto& parameter) { return parameter.secrecy == catalogue::Secrecy::secret; });
+}
+
+/// Whatever profile was named: a tool that can say what it is keeps its secrets. What cannot is
+/// read as the user says.
+Result<void> learn_secrets(OpenTool& tool, const Environment& environment) {
+  if (tool.target.endpoint.medium != link::Medium::tcp || has_secrets(*tool.profile)) return {};
+  const auto answer = tool.device.report_server_id();
+  if (!answer) return {};
+  TRY_LET(auto identification, match_identity(*answer, {}, environment));
+  const bool is_known = !identification.candidates.empty() && has_secrets(*identification.matched);
+  return is_known ? use_found(tool, std::move(identification), Need::stop) : Result<void>();
+}
+
+/// What the tool itself says of the unit of its torques is what counts.
+Result<void> take_torque_unit(OpenTool& tool) {
+  const std::string said = tool.target.torque_unit;
+  const auto read = read_torque_unit(tool);
+  if (!read && read.error().code != Errc::exception_response) return read;
+  if (!read || said.empty() || said == tool.target.torque_unit) return {};
+  return tl::unexpected(with_target(
+      Error{.code = Errc::mismatch,
+            .message = fmt::format("the tools file says that its torques are in {}, and the tool "
+                                   "that they are in {}",
+                                   said,
+                                   tool.target.torque_unit.empty() ? "a unit that is not known"
+                                                                   : tool.target.torque_unit),
+            .hint = "leave 'torque-unit' out of the tools file: this tool says it itself"},
+      tool.target));
 }
 
 /// The port that was tried was not chosen when neither URL nor profile names one.
-std::string other_port_hint(const Environment& environment) {
+std::string other_port_hint(const Target& target, const Environment& environment) {
+  const auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
+  if (seen && *seen) {
+    return fmt::format("no port is named, and serial number {} was seen at port {}: add :{}",
+                       (*seen)->serial, (*seen)->port, (*seen)->port);
+  }
   for (const files::ProfileEntry& entry : environment.profiles.list()) {
     const auto profile = environment.profiles.load(entry.id);
     if (!profile || profile->link.port == catalogue::LinkSpec().port) continue;
@@ -124,6 +197,7 @@ bool is_wrong_port(const Error& error) {
 }  // namespace
 
 Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment) {
+  if (!target.fault.empty()) return tl::unexpected(fault_of(target));
   if (target.profile.empty()) return catalogue::Profile();
   auto profile = environment.profiles.load(target.profile);
   if (!profile) profile.error().asked_of = target.shown;
@@ -166,6 +240,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
                                       const Environment& environment,
                                       SimulatedOperator simulated_operator,
                                       link::SessionOptions::LateAnswers late_answers) {
+  if (!target.fault.empty()) return tl::unexpected(fault_of(target));
   TRY(check_addressing(target, profile));
   TRY(check_transactions(target, profile));
   device::LinkOptions options = link_options(target, profile, environment);
@@ -175,7 +250,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
       with_simulated_tools(environment, simulated_options(simulated_operator)), environment.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {
-    device.error().hint = other_port_hint(environment);
+    device.error().hint = other_port_hint(target, environment);
   }
   return device;
 }
@@ -189,14 +264,129 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
   return OpenTool{std::move(resolved), std::move(kept), std::move(device)};
 }
 
-Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
-                           const Environment& environment) {
+namespace {
+
+Result<OpenTool> open_as_named(const Target& target, catalogue::Profile profile, Need need,
+                               const Environment& environment) {
   auto tool = connect(target, std::move(profile), environment);
   if (!tool || need == Need::raw_registers) return tool;
-  auto known = target.profile.empty() ? find_profile(*tool, environment)
-                                      : tool->device.require_known_registers();
+  if (need == Need::raw_secrets) {
+    TRY(learn_secrets(*tool, environment));
+    return tool;
+  }
+  auto known = [&] {
+    if (need == Need::raw_writes) return recognise(*tool, environment);
+    return target.profile.empty() ? find_profile(*tool, need, environment)
+                                  : tool->device.require_known_registers();
+  }();
+  if (known && need != Need::stop) known = take_torque_unit(*tool);
   if (!known) return tl::unexpected(std::move(known.error()));
   return tool;
+}
+
+/// For people who ask for every decision.
+void tell_memory(const Target& target, const std::string& sentence,
+                 const Environment& environment) {
+  if (!environment.show_frames) return;
+  const link::Trace trace = environment.show_frames(target.shown);
+  if (trace.decision) trace.decision(link::Decision::memory, sentence);
+}
+
+/// What was last seen behind a host whose port is not named. It only says where to ask.
+std::optional<SeenTool> recall_place(const Target& target, Need need,
+                                     const Environment& environment) {
+  const bool is_proven = need == Need::named_registers || need == Need::stop;
+  const bool is_open = target.endpoint.medium == link::Medium::tcp && !target.endpoint.port &&
+                       target.profile.empty() && target.fault.empty();
+  if (!is_proven || !is_open) return std::nullopt;
+  auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
+  if (seen) return std::move(*seen);
+  tell_memory(target, fmt::format("nothing: {}", describe(seen.error())), environment);
+  return std::nullopt;
+}
+
+/// The tool where it was seen, if it is the same one still; empty: another one answers there.
+Result<std::optional<OpenTool>> open_where_seen(const Target& target, const SeenTool& seen,
+                                                Need need, const Environment& environment) {
+  const ToolMemory memory(environment.disk, environment.cache_folder);
+  Target there = target;
+  there.endpoint.port = seen.port;
+  there.endpoint.text = link::to_url(there.endpoint);
+  auto tool = open_as_named(there, catalogue::Profile(), need, environment);
+  if (!tool && tool.error().status() != ExitStatus::mismatch) {
+    tool.error().hint =
+        fmt::format("serial number {} was seen there before ({}); name a port to ask elsewhere",
+                    seen.serial, memory.path());
+    return tl::unexpected(with_target(std::move(tool.error()), there));
+  }
+  const auto serial = tool && tool->device.identity() ? tool->device.identity()->serial : "";
+  if (serial == seen.serial) {
+    tell_memory(target,
+                fmt::format("port {}, profile {} and serial number {}, from {}; the tool says the "
+                            "same",
+                            seen.port, seen.profile, seen.serial, memory.path()),
+                environment);
+    return std::optional(std::move(*tool));
+  }
+  tell_memory(target,
+              fmt::format("serial number {} at port {}, from {}; another one answers, so this is "
+                          "forgotten",
+                          seen.serial, seen.port, memory.path()),
+              environment);
+  static_cast<void>(memory.forget(seen));  // it is a cache
+  return std::nullopt;
+}
+
+}  // namespace
+
+void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
+                   const std::string& profile, const Environment& environment) {
+  const link::Endpoint& endpoint = tool.target.endpoint;
+  const bool is_by_file = tool.target.profile == profile && environment.common.profile.empty();
+  if (endpoint.medium != link::Medium::tcp || !endpoint.port || is_by_file) return;
+  if (profile.empty() || files::names_profile_file(profile)) return;
+  SeenTool seen{
+      .host = endpoint.host, .port = *endpoint.port, .profile = profile, .serial = identity.serial};
+  if (endpoint.unit) seen.unit = endpoint.unit->value;
+  const auto kept = ToolMemory(environment.disk, environment.cache_folder).remember(seen);
+  if (!kept) {
+    tell_memory(tool.target, fmt::format("nothing: {}", describe(kept.error())), environment);
+  }
+}
+
+Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
+                           const Environment& environment) {
+  if (const auto seen = recall_place(target, need, environment)) {
+    TRY_LET(auto tool, open_where_seen(target, *seen, need, environment));
+    if (tool) return std::move(*tool);
+  }
+  auto tool = open_as_named(target, std::move(profile), need, environment);
+  if (tool && need == Need::named_registers && tool->device.identity()) {
+    remember_tool(*tool, *tool->device.identity(), tool->profile->id, environment);
+  }
+  return tool;
+}
+
+Result<void> ask_more(OpenTool& tool, Identification& found) {
+  const auto& matched = found.matched;
+  const bool has_more = found.candidates.size() == 1 && matched->identity->has_more();
+  if (!has_more) return {};
+  tool.profile = std::make_unique<const catalogue::Profile>(*matched);
+  tool.device.use(*tool.profile, found.identity);
+  TRY(tool.device.ask_more());
+  found.identity = *tool.device.identity();
+  return {};
+}
+
+Result<void> read_torque_unit(OpenTool& tool) {
+  const auto& name = tool.profile->torque_unit_from;
+  if (name.empty()) return {};
+  TRY_LET(const auto parameter, tool.profile->find(name));
+  TRY_LET(const auto readings, tool.device.read_each({parameter}, device::Limits::skip));
+  const auto& value = readings.front().value;
+  if (!value) return tl::unexpected(value.error());
+  tool.target.torque_unit = value->label;
+  return {};
 }
 
 }  // namespace spindle::work

@@ -16,7 +16,10 @@ Environment with(const Environment& environment, Clock& clock, const Interrupt& 
           .tools = tools,
           .show_frames = environment.show_frames,
           .common = environment.common,
-          .make_doors = environment.make_doors};
+          .make_doors = environment.make_doors,
+          .cache_folder = environment.cache_folder,
+          .network = environment.network,
+          .target_variable = environment.target_variable};
 }
 
 }  // namespace

@@ -17,11 +17,23 @@ constexpr auto origin_words =
 /// No product has more presets that anyone asked for.
 constexpr std::int64_t last_preset = 255;
 
-/// A number in steps of the column; empty where it lies between two of them.
-std::optional<std::int64_t> in_steps(const catalogue::Value& value, std::int64_t steps) {
+/// A number in steps of the column; empty where it lies between two of them. That of a
+/// floating-point number is the nearest step: it has more digits than were measured, and the block
+/// keeps them.
+std::optional<std::int64_t> in_steps(const catalogue::Value& value, std::int64_t steps,
+                                     const catalogue::Encoding& encoding) {
   if (!value.is_number()) return std::nullopt;
   const auto scaled = value.number.times(Decimal(steps));
-  return scaled ? scaled->divided_by(Decimal(1)) : std::nullopt;
+  if (!scaled) return std::nullopt;
+  return (encoding.is_float() ? scaled->with_decimals(0) : *scaled).divided_by(Decimal(1));
+}
+
+/// "seating_torque" of an event is "seating" of a store.
+std::optional<store::Column> column_of(std::string_view key) {
+  constexpr std::string_view torque = "_torque";
+  if (const auto column = store::column_words.find(key)) return column;
+  if (!key.ends_with(torque)) return std::nullopt;
+  return store::column_words.find(key.substr(0, key.size() - torque.size()));
 }
 
 /// "target-torque" of the catalogue is "target_torque" of a store.
@@ -63,12 +75,15 @@ store::Event EventRows::row(const device::ToolEvent& news) const {
                        catalogue::to_text(layout_.kind_of(news.block).value_or(EventKind::other))),
                    .remembered = news.standing != device::Standing::result,
                    .raw = news.block};
-  for (const auto& [parameter, at, key] : layout_.fields()) {
+  for (const auto& field : layout_.fields()) {
+    if (!catalogue::EventLayout::has(field, news.block)) continue;
+    const auto& [parameter, at, key, form] = field;
     const auto words = catalogue::register_count(parameter->encoding);
     const auto value = catalogue::decode(*parameter, RegisterView(news.block).subspan(at, words));
     if (!value) continue;
-    if (const auto column = store::column_words.find(key)) {
-      row.columns[*column] = in_steps(*value, is_torque(*column) ? store::torque_scale : 1);
+    if (const auto column = column_of(key)) {
+      row.columns[*column] =
+          in_steps(*value, is_torque(*column) ? store::torque_scale : 1, parameter->encoding);
     }
     if (key == "barcode" && value->content == catalogue::Content::text) row.barcode = value->text;
   }
@@ -104,7 +119,8 @@ std::optional<store::PresetSettings> EventRows::settings_row(
       if (!column || reading.parameter.name != name || !reading.value) continue;
       const bool is_fine = *column == store::Setting::target_torque ||
                            setting.is == catalogue::SettingKind::torque_limit;
-      row[*column] = in_steps(*reading.value, is_fine ? store::torque_scale : 1);
+      row[*column] =
+          in_steps(*reading.value, is_fine ? store::torque_scale : 1, reading.parameter.encoding);
       any = true;
     }
   }

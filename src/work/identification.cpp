@@ -38,7 +38,9 @@ Result<std::vector<Match>> matches_of(ByteView answer, const std::string& only,
     if (!profile.identity) continue;
     auto identity = catalogue::decode_identity(*profile.identity, answer);
     const auto generation = catalogue::generation_of(*profile.identity, identity);
-    if (generation == catalogue::Generation::unknown) continue;
+    const bool is_earlier = generation == catalogue::Generation::earlier;
+    // A firmware that another profile begins with is no fault where nothing was named.
+    if (generation == catalogue::Generation::unknown || (is_earlier && only.empty())) continue;
     matches.push_back({std::move(profile), std::move(identity), generation, !only.empty()});
   }
   return matches;

@@ -10,6 +10,9 @@ namespace {
 /// What need not be stored at once is stored after so long.
 constexpr Duration lazy_every = std::chrono::seconds(10);
 
+/// A curve is as large as a hundred events, so that curves find no room when much less waits.
+constexpr std::size_t curve_share = 50;
+
 constexpr std::string_view no_room =
     "the store could not be written, and the memory for events that wait was full";
 
@@ -69,7 +72,10 @@ void Journal::take(Item item) {
   auto* event = std::get_if<store::NewEvent>(&item.entry);
   // What is told of links and values leaves room for events, and a gap is told whatever there is.
   const bool is_gap = std::holds_alternative<store::NewGap>(item.entry);
-  const std::size_t room = event != nullptr ? options_.capacity : options_.capacity / 2;
+  const bool is_curve = std::holds_alternative<store::NewCurve>(item.entry);
+  const std::size_t room = event != nullptr ? options_.capacity
+                           : is_curve       ? options_.capacity / curve_share
+                                            : options_.capacity / 2;
   const bool has_room = is_gap || waiting_.size() < room;
   if (event != nullptr && !has_room) return lose(*event);
   if (!has_room) return;

@@ -67,7 +67,8 @@ std::optional<catalogue::SnapshotIdentity> identity_of(const device::Device& dev
                                      .model_code = identity->tool_model_code,
                                      .serial = identity->serial,
                                      .firmware = identity->firmware,
-                                     .raw = identity->raw};
+                                     .raw = identity->raw,
+                                     .version = identity->version};
 }
 
 std::string unit_of(const catalogue::Parameter& parameter, const Target& target) {

@@ -107,8 +107,10 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
   if (!answer) return {};
   const auto& facts = *profile_->identity;
   const auto identity = catalogue::decode_identity(facts, *answer);
-  if (catalogue::generation_of(facts, identity) != catalogue::Generation::later) return {};
-  return device.require_known_registers();
+  const auto generation = catalogue::generation_of(facts, identity);
+  const bool has_others =
+      generation == catalogue::Generation::later || generation == catalogue::Generation::earlier;
+  return has_others ? device.require_known_registers() : Result<void>();
 }
 
 Result<device::Device> StopPursuit::connect_unknown() {
@@ -116,7 +118,7 @@ Result<device::Device> StopPursuit::connect_unknown() {
   const Duration patience = usual.timeout.value_or(catalogue::LinkSpec().answer);
   environment_.common.retries = 0;  // a question that got lost is asked on a new connection
   if (++questions_ <= soon_repeated) environment_.common.timeout = std::min(patience, soon);
-  auto tool = open_tool(target_, Profile(), Need::named_registers, environment_);
+  auto tool = open_tool(target_, Profile(), Need::stop, environment_);
   environment_.common = usual;
   if (!tool) return tl::unexpected(std::move(tool.error()));
   generation_is_checked_ = true;

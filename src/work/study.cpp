@@ -193,6 +193,10 @@ ProductFacts facts_of(const catalogue::Profile& profile, catalogue::CodeTexts er
     const catalogue::Encoding& encoding = field.parameter->encoding;
     for (const Quantity quantity : quantities) {
       const bool is_meant = field.key == store::column_words.text(column_of(quantity));
+      // A floating-point number has the steps that the store keeps.
+      if (is_meant && encoding.is_float() && quantity == Quantity::torque) {
+        facts.steps[quantity] = Decimal(1, -torque_decimals);
+      }
       if (!is_meant || !encoding.is_integer() || encoding.divisor != 1) continue;
       facts.steps[quantity] = encoding.scale;
     }
@@ -284,7 +288,7 @@ class Study::ToolCourse {
     const auto& preset = event.columns[Column::preset];
     if (study_->options_.preset && preset != study_->options_.preset) return;
     Stratum& stratum = stratum_of(event, place, product);
-    StudiedResult result{.at = event.at, .stretch = stretch_};
+    StudiedResult result{.id = event.id, .at = event.at, .stretch = stretch_};
     for (const Quantity quantity : quantities) {
       result.values[quantity] = event.columns[column_of(quantity)];
     }

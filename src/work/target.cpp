@@ -31,7 +31,8 @@ Error unknown_target(const std::string& text, const files::Tools& tools) {
   }
   return {.code = Errc::unknown_name,
           .message = fmt::format("unknown target '{}'", text),
-          .hint = std::move(hint)};
+          .hint = std::move(hint),
+          .remedy = remedy_for(text, known, tools.path.empty() ? "" : "spindle tools")};
 }
 
 Result<Target> target_of_url(const std::string& url, const Environment& environment) {
@@ -42,28 +43,46 @@ Result<Target> target_of_url(const std::string& url, const Environment& environm
   return target;
 }
 
-Result<Target> target_of_tool(const files::Tool& tool, const Environment& environment) {
+/// A tool of which a part means nothing.
+Target faulty_target(const files::Tool& tool, const files::SourceLocation& at, const Error& error,
+                     const Environment& environment) {
+  return {.shown = tool.name,
+          .fault = fmt::format("{}:{}:{}: {}", environment.tools.path, at.line, at.column,
+                               describe(error))};
+}
+
+Target target_of_tool(const files::Tool& tool, const Environment& environment) {
   auto target = target_of_url(tool.url, environment);
-  if (!target) {
-    target.error().target = tool.name;
-    target.error().endpoint = tool.url;
-    target.error().code = Errc::bad_file;
-    return target;
-  }
+  if (!target) return faulty_target(tool, tool.url_at, target.error(), environment);
   target->shown = tool.name;
   if (tool.timeout) target->endpoint.timeout = tool.timeout;
   if (tool.gap) target->endpoint.gap = tool.gap;
   if (tool.retries) target->endpoint.retries = tool.retries;
   if (tool.transactions) target->endpoint.transactions = tool.transactions;
-  if (environment.common.profile.empty() && !tool.profile.empty()) target->profile = tool.profile;
+  if (environment.common.profile.empty() && !tool.profile.empty()) {
+    const auto profile = environment.profiles.load(tool.profile);
+    if (!profile) return faulty_target(tool, tool.profile_at, profile.error(), environment);
+    target->profile = tool.profile;
+  }
   target->torque_unit = tool.torque_unit;
   target->verified = tool.verified;
-  return target;
+  return std::move(*target);
 }
 
-/// The tools of this name, or that of this URL. Only a file with faults can have a name twice.
+/// The tools of this name, or that of this URL; a target with a fault where the entry has one. Only
+/// a file with faults can have a name twice.
 std::vector<Result<Target>> named_targets(const std::string& name, const Environment& environment) {
   std::vector<Result<Target>> found;
+  if (const auto fault = environment.tools.faults.find(name);
+      fault != environment.tools.faults.end()) {
+    const std::string& file = environment.common.tools_file;
+    found.emplace_back(
+        Target{.shown = name,
+               .fault = fault->second.message,
+               .check = "spindle tools --check" +
+                        (file.empty() ? std::string() : " --tools " + shell_word(file))});
+    return found;
+  }
   for (const files::Tool& tool : environment.tools.tools) {
     if (tool.name == name) found.push_back(target_of_tool(tool, environment));
   }
@@ -129,6 +148,23 @@ void share_gateways(std::vector<Target>& targets, const Environment& environment
 
 }  // namespace
 
+Error fault_of(const Target& target) {
+  return {.code = Errc::bad_file,
+          .message = target.fault,
+          .hint = "until it is mended, this entry is not used",
+          .target = target.shown,
+          .remedy = {.right = target.check}};
+}
+
+std::vector<Error> take_out_faulty(std::vector<Target>& targets) {
+  std::vector<Error> faults;
+  for (const Target& target : targets) {
+    if (!target.fault.empty()) faults.push_back(fault_of(target));
+  }
+  std::erase_if(targets, [](const Target& target) { return !target.fault.empty(); });
+  return faults;
+}
+
 Error with_target(Error error, const Target& target) {
   if (!error.target.empty()) return error;
   error.target = target.shown;
@@ -170,7 +206,8 @@ Error unproven(const Target& target) {
       Error{.code = Errc::usage,
             .message = "a tool on a serial line cannot prove what it is",
             .hint = "name the profile with --profile or in the tools file; 'spindle profile list' "
-                    "shows all"},
+                    "shows all",
+            .remedy = {.right = "spindle profile list"}},
       target);
 }
 
@@ -181,14 +218,21 @@ bool is_target(std::string_view text, const Environment& environment) {
   return names_group(text) && environment.tools.groups.contains(std::string(text.substr(1)));
 }
 
-Resolution resolve_each_target(const std::vector<std::string>& texts,
-                               const Environment& environment) {
+namespace {
+
+/// With the faulty ones among the targets.
+Resolution resolve_all(const std::vector<std::string>& texts, const Environment& environment) {
   Resolution resolution;
   for (const std::string& text : texts) {
     const auto group = names_group(text) ? environment.tools.groups.find(text.substr(1))
                                          : environment.tools.groups.end();
     if (group == environment.tools.groups.end()) {
       add_named(text, environment, resolution);
+      continue;
+    }
+    if (const auto fault = environment.tools.faults.find(text);
+        fault != environment.tools.faults.end()) {
+      resolution.faults.push_back(fault->second);
       continue;
     }
     for (const std::string& name : group->second) add_named(name, environment, resolution);
@@ -201,10 +245,26 @@ Resolution resolve_each_target(const std::vector<std::string>& texts,
   return resolution;
 }
 
+}  // namespace
+
+Resolution resolve_each_target(const std::vector<std::string>& texts,
+                               const Environment& environment) {
+  Resolution resolution = resolve_all(texts, environment);
+  for (Error& fault : take_out_faulty(resolution.targets)) {
+    resolution.faults.push_back(std::move(fault));
+  }
+  return resolution;
+}
+
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Environment& environment) {
-  Resolution resolution = resolve_each_target(texts, environment);
+  Resolution resolution = resolve_all(texts, environment);
   if (!resolution.faults.empty()) return tl::unexpected(std::move(resolution.faults.front()));
+  const auto& targets = resolution.targets;
+  const auto usable = [](const Target& target) { return target.fault.empty(); };
+  if (!targets.empty() && std::none_of(targets.begin(), targets.end(), usable)) {
+    return tl::unexpected(fault_of(targets.front()));
+  }
   return std::move(resolution.targets);
 }
 
@@ -216,7 +276,8 @@ Result<Target> resolve_target(const std::string& text, const Environment& enviro
       .code = Errc::usage,
       .message = fmt::format("'{}' is {} tools, and {}", text, targets.size(), words.why),
       .hint = words.remedy.empty() ? fmt::format("{} {}", words.instead, targets.front().shown)
-                                   : std::string(words.remedy)});
+                                   : std::string(words.remedy),
+      .remedy = words.remedy.empty() ? Remedy{text, targets.front().shown} : Remedy()});
 }
 
 }  // namespace spindle::work

@@ -305,6 +305,16 @@ class Finished:
     seconds: float  # of real time: for lower limits
     paced: float  # seconds of the paced clock: for upper limits
 
+    def sentences(self):
+        """What stands on standard error, each sentence in one piece, without what there is to try."""
+        told = []
+        for line in self.stderr.splitlines():
+            if not line.startswith("  ") or not told:
+                told.append(line)
+            elif not line.startswith("  try: "):
+                told[-1] += " " + line.strip()
+        return told
+
     def records(self, kind=None):
         """All of standard output as JSON lines, or those of one type."""
         if self.stdout and not self.stdout.endswith("\n"):

@@ -28,7 +28,7 @@ class UnreachableTest(unittest.TestCase):
                 errors = finished.records("error")
                 self.assertEqual([(e["code"], e["exit_status"]) for e in errors], [("unreachable", 4)])
                 self.assertIn(words, errors[0]["message"])
-                self.assertEqual(len(finished.stderr.splitlines()), 1, finished)
+                self.assertEqual(len(finished.sentences()), 1, finished)
 
     def test_refused(self):
         with support.refusing_port() as url:

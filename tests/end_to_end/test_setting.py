@@ -28,9 +28,11 @@ class SettingTest(unittest.TestCase):
         self.assertEqual(finished.status, 2, finished)
         self.assertEqual(finished.stdout, "")
         self.assertEqual(
-            finished.stderr,
-            "spindle: preset.1.target-torque: 9.99 is above 6.00, the maximum that the tool itself "
-            "reports (register 2002)\n",
+            finished.sentences(),
+            [
+                "spindle: preset.1.target-torque: 9.99 is above 6.00, the maximum that the tool itself "
+                "reports (register 2002)"
+            ],
         )
         self.assertEqual(self.writes(), [])
 

@@ -134,7 +134,7 @@ class ValuesTest(unittest.TestCase):
         server = self.serve(GOOD)
         finished = self.spindle("set", server, "power=500", "exponent=2")
         self.assertEqual(finished.status, 2, finished)
-        self.assertIn("between the two writes it would be another quantity", finished.stderr)
+        self.assertIn("between the two writes it would be another quantity", finished.sentences()[0])
         self.assertEqual(server.writes, [])
         self.good(self.spindle("set", server, "power=500", "exponent=0"))
         self.assertEqual(server.writes, [(6, 20, [500])])

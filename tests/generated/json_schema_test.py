@@ -1,4 +1,4 @@
-"""The JSON that the transcripts and the README show, against the published schema.
+"""The JSON that the transcripts, the README and docs/promises.md show, against the published schema.
 
 Also the other way round: a schema that lets everything pass would be worth nothing, so every line is
 spoilt in all the ways that matter, and must be refused then.
@@ -35,7 +35,8 @@ def load(line):
 
 def shown_lines():
     """Place and text of every line of JSON that is shown, on standard output or from a file."""
-    for path in sorted((ROOT / "tests" / "transcripts").glob("*.transcript")) + [ROOT / "README.md"]:
+    pages = [ROOT / "README.md", ROOT / "docs" / "promises.md"]
+    for path in sorted((ROOT / "tests" / "transcripts").glob("*.transcript")) + pages:
         for number, line in enumerate(path.read_text().splitlines(), 1):
             if line.startswith('{"'):
                 yield f"{path.name}:{number}", line

@@ -15,7 +15,7 @@ test_packages=(
   python3-pymodbus python3-serial-asyncio mbpoll tshark socat
   python3-jsonschema mandoc dpkg-dev lintian sqlite3 systemd
   python3-scipy python3-statsmodels chromium
-  mosquitto mosquitto-clients python3-paho-mqtt postgresql python3-psycopg2 curl
+  mosquitto mosquitto-clients python3-paho-mqtt postgresql python3-psycopg2 curl tmux openssh-client
 )
 
 # Prints those of the named packages that are not installed, one a line.

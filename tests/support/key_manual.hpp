@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "files/known_keys.hpp"
+#include "support/key_examples.hpp"
 #include "support/manual.hpp"
 
 /// The keys of a kind of file as mdoc(7) text.
@@ -31,16 +33,42 @@ inline std::string_view need_of(const files::Key& key) {
   return {};
 }
 
-/// A row for each key; below one that has a map the keys of that map.
-inline std::string key_rows(const std::vector<files::Key>& keys, std::string_view indent = {}) {
+/// Words of a literal text, none of which is a macro.
+inline std::string literal(const std::string& text) {
+  std::string words;
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    words += (words.empty() ? "" : " ") + mdoc_argument(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return words;
+}
+
+/// A row for each key with an example; below one that has a map the keys of that map.
+inline std::string key_rows(const std::vector<files::Key>& keys, const Nodes& maps,
+                            std::vector<std::string>& without, const std::string& path,
+                            std::string_view indent = {}) {
   constexpr std::string_view step = "\\ \\ ";
   std::string rows;
   for (const files::Key& key : keys) {
     const std::string_view space = indent.empty() ? "" : " Ns ";
     rows += fmt::format(".It {}{}Ic {} Ta {}{}Ta\n", indent, space, mdoc_argument(key.name),
                         need_of(key), need_of(key).empty() ? "" : " ");
-    rows += mdoc_prose(value_of(key));
-    if (key.inner != nullptr) rows += key_rows(key.inner(), fmt::format("{}{}", indent, step));
+    const std::string example = KeyExamples::example(maps, key.name);
+    if (example.empty()) without.push_back(fmt::format("{}.{}", path, key.name));
+    rows +=
+        mdoc_prose(value_of(key) + (example.empty() || key.inner != nullptr ? "" : ", such as"));
+    if (key.inner == nullptr && !example.empty()) rows += fmt::format(".Li {}\n", literal(example));
+    if (key.inner != nullptr) {
+      const std::vector<files::Key> keys_inside = key.inner();
+      Nodes inside;
+      for (const files::YamlNode* map : maps)
+        if (const files::YamlNode* value = map->find(key.name))
+          add_maps_with(keys_inside, *value, inside);
+      rows += key_rows(keys_inside, inside, without, fmt::format("{}.{}", path, key.name),
+                       fmt::format("{}{}", indent, step));
+    }
   }
   return rows;
 }
@@ -54,12 +82,13 @@ inline std::string name_of_keys(std::string_view map) {
   return name;
 }
 
-inline std::string key_list(const files::KeyList& list) {
+inline std::string key_list(const files::KeyList& list, const KeyExamples& examples,
+                            std::vector<std::string>& without) {
   return fmt::format(
       ".Pp\nKeys of\n.Ic {} :\n"
       ".Bl -column \"controller\\-model\" \"here or in a base\" \"decimal number\"\n"
-      ".It Sy Key Ta Sy Needed Ta Sy Value\n{}.El\n",
-      mdoc_argument(list.map), key_rows(list.keys));
+      ".It Sy Key Ta Sy Needed Ta Sy Value, with an example\n{}.El\n",
+      mdoc_argument(list.map), key_rows(list.keys, examples.maps(list.map), without, list.map));
 }
 
 /// What a group of parameters may say for all of them.
@@ -71,11 +100,13 @@ inline std::string group_keys(const std::vector<files::Key>& keys) {
   return fmt::format("{} .\n", fmt::join(names, " ,\n"));
 }
 
-/// The placeholders for each list of the profile's keys, and GROUP_KEYS.
-inline std::vector<Placeholder> key_placeholders() {
+/// The placeholders for each list of the profile's keys, and GROUP_KEYS. Keys that no file has an
+/// example of are told in `without`.
+inline std::vector<Placeholder> key_placeholders(const KeyExamples& examples,
+                                                 std::vector<std::string>& without) {
   std::vector<Placeholder> placeholders;
   for (const files::KeyList& list : files::profile_keys()) {
-    placeholders.push_back({name_of_keys(list.map), key_list(list)});
+    placeholders.push_back({name_of_keys(list.map), key_list(list, examples, without)});
     if (list.map == "parameters") placeholders.push_back({"GROUP_KEYS", group_keys(list.keys)});
   }
   return placeholders;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "spindle/base/disk.hpp"
 #include "spindle/posix/disk.hpp"
@@ -17,7 +19,7 @@ class MemoryDisk {
     return {.exists = [this](const std::string& path) { return files_.contains(plain(path)); },
             .absent = [this](const std::string& path) { return is_absent(path); },
             .same_file = real_.same_file,
-            .list = real_.list,
+            .list = [this](const std::string& folder) { return list(folder); },
             .read = [this](const std::string& path) { return read(path); },
             .write = [this](const std::string& path, std::string_view text, Overwrite overwrite,
                             Privacy) { return write(path, text, overwrite); },
@@ -40,7 +42,14 @@ class MemoryDisk {
             .user = [] { return std::string("anna"); },
             .process = [] { return std::uint64_t{4242}; },
             // Profiles and tools files lie on the real disk, too.
-            .read_trusted = real_.read_trusted};
+            .read_trusted = [this](const std::string& path) -> Result<std::string> {
+              return files_.contains(plain(path)) ? read(path) : real_.read_trusted(path);
+            },
+            .replace = [this](const std::string& path, std::string_view expected,
+                              std::string_view text) -> Result<bool> {
+              if (this->text(path) != expected) return false;
+              return write(path, text, Overwrite::allow).map([] { return true; });
+            }};
   }
 
   void put(const std::string& path, std::string text) { files_[plain(path)] = std::move(text); }
@@ -55,6 +64,17 @@ class MemoryDisk {
  private:
   static std::string plain(const std::string& path) {
     return path.starts_with("./") ? path.substr(2) : path;
+  }
+  /// What is in a folder on either disk.
+  std::vector<std::string> list(const std::string& folder) {
+    std::vector<std::string> names = real_.list(folder);
+    const std::string head = plain(folder) + "/";
+    for (const auto& [path, text] : files_) {
+      const std::string name = path.starts_with(head) ? path.substr(head.size()) : std::string();
+      const bool is_there = std::find(names.begin(), names.end(), name) != names.end();
+      if (!name.empty() && name.find('/') == std::string::npos && !is_there) names.push_back(name);
+    }
+    return names;
   }
   static Error no_room(const std::string& path) {
     return {.code = Errc::storage,

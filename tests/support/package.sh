@@ -74,9 +74,10 @@ share=$root/usr/share
 for file in spindle/spindle-1.schema.json spindle/profiles/doga-bm.yaml \
   bash-completion/completions/spindle zsh/vendor-completions/_spindle \
   fish/vendor_completions.d/spindle.fish doc/spindle/copyright doc/spindle/changelog.gz \
-  doc/spindle/changelog.Debian.gz doc/spindle/examples/tools.yaml man/man1/spindle.1.gz \
+  doc/spindle/changelog.Debian.gz doc/spindle/examples/tools.yaml doc/spindle/examples/line1.yaml \
+  doc/spindle/promises.md man/man1/spindle.1.gz \
   man/man5/spindle-profile.5.gz man/man5/spindle-tools.5.gz man/man5/spindle-backup.5.gz \
-  man/man7/spindle-json.7.gz; do
+  man/man7/spindle-json.7.gz man/man7/spindle-tutorial.7.gz; do
   [[ -s $share/$file ]] || fail "$file is missing"
 done
 [[ -s $root/usr/lib/systemd/system/spindle-record.service ]] || fail "its unit is missing"

@@ -13,6 +13,9 @@
 //                         motor drivers on one serial line, alive as long as the transcript
 //   %alarm URL UNIT CODE  an alarm occurs on one of them; %warning the same; %power URL UNIT
 //                         switches one off and on; %setter URL UNIT DURATION keeps it busy
+//   %interface NAME ADDRESS   this computer has such a network interface, which can send to groups
+//   %datagram HEX         what comes back for each question to a group, with the question's number
+//                         in its first two bytes
 //   %wait DURATION        time passes
 //   %later DURATION URL UNIT REGISTER VALUE
 //                         so long from now another master writes a register
@@ -24,9 +27,11 @@
 //   %report-store FILE    the store of tests/support/report_store.hpp: a shift of three tools
 //   %profile NAME         a file of tests/profiles/good, in the transcript's own folder
 //   %edit FILE OLD NEW    replaces a text in a file on that disk
+//   %set NAME VALUE       a variable of the program's environment from here on
 //   %disk full|empty      whether it takes any more
 //   %hide progress        from here on the line that a terminal shows for a moment is left out
 //   %answer TEXT          what the user types at the next question
+//   %env NAME [VALUE]     a variable of the environment; without a value it is not set
 //   $ spindle ARGUMENTS   followed by what it prints
 //   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
@@ -118,6 +123,15 @@ std::string without_source_folder(std::string text) {
   return text;
 }
 
+/// Nor has the folder of a transcript a name that stays.
+std::string without_own_folder(std::string text) {
+  const std::string folder = fs::current_path().string();
+  for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
+    text.replace(at, folder.size(), "$FOLDER");
+  }
+  return text;
+}
+
 enum class Marking { mark_stderr, plain };
 
 /// A simulated tool behind an address, alive from one command to the next.
@@ -129,6 +143,49 @@ struct Tool {
   sim::AnswerCounter answers;
   std::uint32_t connections = 0;
 };
+
+/// A group in which every question has the same answers, at once.
+class FakeGroup final : public link::Datagrams {
+ public:
+  FakeGroup(std::vector<Bytes> answers, std::string interface, Clock& clock)
+      : answers_(std::move(answers)), interface_(std::move(interface)), clock_(&clock) {}
+
+  std::vector<Error> send(ByteView question) override {
+    for (Bytes answer : answers_) {
+      std::copy_n(question.begin(), std::min<std::size_t>(2, answer.size()), answer.begin());
+      waiting_.push_back({std::move(answer), "192.168.10.100", interface_});
+    }
+    return {};
+  }
+  Result<std::optional<link::Datagram>> receive(TimePoint deadline) override {
+    if (waiting_.empty()) {
+      return clock_->sleep_until(deadline).map([] { return std::optional<link::Datagram>(); });
+    }
+    link::Datagram next = std::move(waiting_.front());
+    waiting_.erase(waiting_.begin());
+    return next;
+  }
+
+ private:
+  std::vector<Bytes> answers_;
+  std::string interface_;
+  Clock* clock_;
+  std::vector<link::Datagram> waiting_ = {};
+};
+/// Whether a sentence on stderr goes on behind column 100. A word that alone is too wide, frames,
+/// and what can be pasted are not broken.
+bool is_too_wide(const std::string& line) {
+  constexpr std::string_view mark = "! ";
+  constexpr std::size_t widest = 100;
+  if (!line.starts_with(mark) || line.size() <= mark.size() + widest) return false;
+  const std::string_view text = std::string_view(line).substr(mark.size());
+  // A frame of --verbose begins with its time, and progress is no line that stays.
+  const bool is_frame = glob_match("[0-9]*T*Z *", text.substr(0, 30));
+  const bool is_whole =
+      is_frame || text.starts_with("  try: ") || text.find('\x1b') != std::string_view::npos;
+  const std::size_t begin = text.find_first_not_of(' ');
+  return !is_whole && text.substr(0, widest).find(' ', begin) != std::string_view::npos;
+}
 
 class Stage {
  public:
@@ -188,7 +245,20 @@ class Stage {
     words.size() > 2 ? test::make_damaged_store(words.at(1), profiles_)
                      : test::make_sample_store(words.at(1), profiles_);
   }
+  void set_variable(const std::string& name, const std::string& value) { variables_[name] = value; }
   void hide_progress() { hides_progress_ = true; }
+
+  void add_interface(const std::vector<std::string>& words) {
+    interfaces_.push_back(
+        {.name = words.at(1), .address = words.at(2), .is_up = true, .is_multicast = true});
+  }
+  void add_datagram(const std::string& hex) {
+    Bytes bytes;
+    for (std::size_t at = 0; at + 1 < hex.size(); at += 2) {
+      bytes.push_back(static_cast<std::uint8_t>(std::stoul(hex.substr(at, 2), nullptr, 16)));
+    }
+    datagrams_.push_back(std::move(bytes));
+  }
 
   /// Motor drivers on one line; what happens to them is told by happen().
   void add_bus(const std::vector<std::string>& words) {
@@ -245,6 +315,10 @@ class Stage {
               [=, this] { bus->answer({99}, unit, write, clock_.now()); });
   }
 
+  void set_variable(const std::vector<std::string>& words) {
+    variables_[words.at(1)] = words.size() > 2 ? words.at(2) : std::string();
+  }
+
   void answer(std::string text) { answers_.push_back(std::move(text)); }
 
   /// Runs one command line (without "spindle") and returns what a terminal would show.
@@ -288,26 +362,42 @@ class Stage {
         .environment = [this](std::string_view name) -> std::optional<std::string> {
           if (name == "XDG_STATE_HOME") return "/state";
           if (name == "SPINDLE_PROFILE_PATH" && !own_profiles_.empty()) return own_profiles_;
-          return std::nullopt;
+          const auto found = variables_.find(name);
+          return found == variables_.end() ? std::nullopt : std::optional(found->second);
         },
         .disk = disk_.functions(),
         .installation = {SPINDLE_SOURCE_DIR, "3.1.6"},
-        .shipped = shipped::profiles()};
+        .shipped = shipped::profiles(),
+        .network = network()};
     status_ = cli::run(arguments, world);
     Lines lines;
-    std::istringstream stream(without_source_folder(std::move(shown)));
+    std::istringstream stream(without_own_folder(without_source_folder(std::move(shown))));
     for (std::string line; std::getline(stream, line);) lines.push_back(line);
+    for (const std::string& line : lines) {
+      if (marking == Marking::mark_stderr && is_too_wide(line)) too_wide_.push_back(line);
+    }
     if (status_ != 0 && marking == Marking::mark_stderr)
       lines.push_back(fmt::format("[{}]", status_));
     return lines;
   }
 
   [[nodiscard]] int status() const { return status_; }
+  [[nodiscard]] const Lines& too_wide() const { return too_wide_; }
   [[nodiscard]] test::MemoryDisk& disk() { return disk_; }
 
  private:
   static std::string address(const std::string& host, std::uint16_t port) {
     return fmt::format("{}:{}", host, port);
+  }
+
+  link::Network network() {
+    return {.interfaces = [this]() -> Result<std::vector<link::NetworkInterface>> {
+              return interfaces_;
+            },
+            .open = [this](const auto& interfaces, const auto&, auto,
+                           auto&) -> Result<std::unique_ptr<link::Datagrams>> {
+              return std::make_unique<FakeGroup>(datagrams_, interfaces.front().name, clock_);
+            }};
   }
 
   template <typename Show>
@@ -343,8 +433,12 @@ class Stage {
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
   std::vector<std::string> answers_;
+  Lines too_wide_;
   test::MemoryDisk disk_;
+  std::vector<link::NetworkInterface> interfaces_;
+  std::vector<Bytes> datagrams_;
   bool hides_progress_ = false;
+  std::map<std::string, std::string, std::less<>> variables_ = {};
   int status_ = 0;
 };
 
@@ -375,6 +469,7 @@ class Player {
     return played_;
   }
   [[nodiscard]] int commands() const { return commands_; }
+  [[nodiscard]] const Lines& too_wide() const { return stage_.too_wide(); }
 
  private:
   std::size_t play_line(const Lines& lines, std::size_t index) {
@@ -409,10 +504,14 @@ class Player {
     if (words.at(0) == "tool") stage_.add_tool({words.begin() + 1, words.end()});
     if (words.at(0) == "bank") stage_.add_bank({words.begin() + 1, words.end()});
     if (words.at(0) == "answer") stage_.answer(words.at(1));
+    if (words.at(0) == "env") stage_.set_variable(words);
     if (words.at(0) == "disk" && words.at(1) == "full") stage_.disk().fill();
     if (words.at(0) == "disk" && words.at(1) == "empty") stage_.disk().make_room();
     if (words.at(0) == "profile") copy_profile(words.at(1));
+    if (words.at(0) == "set") stage_.set_variable(words.at(1), words.at(2));
     if (words.at(0) == "hide") stage_.hide_progress();
+    if (words.at(0) == "interface") stage_.add_interface(words);
+    if (words.at(0) == "datagram") stage_.add_datagram(words.at(1));
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
   }
 
@@ -516,6 +615,8 @@ int main(int count, char** arguments) {
     std::cerr << path << ": no command in it\n";
     return 1;
   }
+  for (const std::string& line : player.too_wide()) std::cerr << "too wide: " << line << '\n';
+  if (!player.too_wide().empty() && std::getenv("SPINDLE_UPDATE") == nullptr) return 1;
   if (std::getenv("SPINDLE_UPDATE") != nullptr) {
     std::ofstream file(path);
     for (const std::string& line : played) file << line << '\n';

@@ -336,7 +336,11 @@ TEST_CASE("an MBAP header that cannot be is junk as soon as it shows") {
            Case{"8001 FF", true},
            Case{"8001 0000 0000", true},  // length 0, 1, 255, 65535
            Case{"8001 0000 0001 00", true},
-           Case{"8001 0000 00FF", true},
+           Case{"8001 0000 00FF",
+                false},  // a function whose data begin with their length may follow
+           Case{"8001 0000 00FF 00 03", true},
+           Case{"8001 0000 00FF 00 64 00", false},
+           Case{"8001 0000 00FF 00 64 00FA", true},
            Case{"8001 0000 FFFF", true},
            Case{"8001 0000 0002", false},
            Case{"8001 0000 00FE", false},

@@ -8,6 +8,7 @@
 
 #include "cli/grammar.hpp"
 #include "spindle/posix/disk.hpp"
+#include "support/memory_disk.hpp"
 
 using namespace spindle;
 using cli::Completion;
@@ -82,7 +83,7 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
       {{"set", "station3", "event.num"}, {}},
       {{"do", "station3", "select-preset=1", "dir"}, {"direction="}},
       {{"get", "--", "--"}, {}},
-      {{"ping", "station3", "sta"}, {}},
+      {{"ping", "station3", "sta"}, {"station3"}},
       {{"profile", "show", "doga-bmt"}, {"doga-bmt"}},
       {{"get", "nowhere", "p"}, {}},
       {{"get", "@line1", "event.num"}, {"event.number"}},
@@ -90,6 +91,9 @@ TEST_CASE("complete: what a word stands for depends on those before it") {
       {{"do", "@line1", "dir"}, {"direction="}},
       {{"get", "@single", "event.num"}, {}},
       {{"get", "@elsewhere", "event.num"}, {}},
+      {{"learn", "sim:doga-gen2", "sel"}, {"select-preset"}},
+      {{"learn", "sim:doga-bm", ""}, {}},
+      {{"do", "sim:doga-gen2", "find"}, {"find-event-block"}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.words.back());
@@ -118,7 +122,7 @@ TEST_CASE("complete: a group is offered where several tools make sense") {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@line1", "@single"});
   }
-  for (const char* command : {"list", "remote-start", "scan", "dump"}) {
+  for (const char* command : {"list", "remote-start", "scan", "dump", "learn"}) {
     CAPTURE(command);
     CHECK(texts({command, "@"}) == Words{"@single"});
   }
@@ -147,4 +151,44 @@ TEST_CASE("complete: files where files are meant") {
   CHECK(offered({"get", ""}).paths == Paths::none);
   CHECK(cli::to_text(offered({"get", "--tools", ""})) == "files\n");
   CHECK(cli::to_text(offered({"get", "sta"})) == "none\nstation3\ttcp://10.0.0.3\n");
+}
+
+TEST_CASE("complete: an entry with a fault is not offered") {
+  const files::Tools tools{.path = "spindle.yaml",
+                           .tools = {{.name = "station3", .url = "tcp://10.0.0.3"},
+                                     {.name = "station4", .url = "tcp://10.0.0.4"}},
+                           .groups = {{"line1", {"station3"}}, {"line2", {"station3"}}},
+                           .faults = {{"station4", Error{}}, {"@line2", Error{}}}};
+  const auto offered_of = [&](const Words& words) {
+    Words all;
+    for (const auto& one :
+         cli::complete(words, cli::describe_grammar(), {tools, shipped()}).candidates) {
+      all.push_back(one.text);
+    }
+    return all;
+  };
+  CHECK(offered_of({"get", "sta"}) == Words{"station3"});
+  CHECK(offered_of({"get", "@"}) == Words{"@line1"});
+  CHECK(offered_of({"tools", "test", "sta"}) == Words{"station3"});
+  CHECK(offered_of({"tools", "add", "--profile", "doga-bm", "pre"}).empty());
+}
+
+TEST_CASE("complete: names of a tool that was seen") {
+  test::MemoryDisk files;
+  const Disk disk = files.functions();
+  const work::ToolMemory memory(disk, "/cache");
+  REQUIRE(memory.remember(
+      {.host = "10.0.0.4", .port = 5000, .profile = "doga-bm", .serial = "1021100042"}));
+  const files::Tools tools{.path = "spindle.yaml",
+                           .tools = {{.name = "bare", .url = "tcp://10.0.0.4"}}};
+  for (const char* target : {"bare", "tcp://10.0.0.4:5000", "10.0.0.4"}) {
+    CAPTURE(target);
+    const auto found = cli::complete({"get", target, "event.num"}, cli::describe_grammar(),
+                                     {tools, shipped(), &memory});
+    REQUIRE(found.candidates.size() == 1);
+    CHECK(found.candidates.front().text == "event.number");
+  }
+  CHECK(cli::complete({"get", "tcp://10.0.0.5", "event.num"}, cli::describe_grammar(),
+                      {tools, shipped(), &memory})
+            .candidates.empty());
 }

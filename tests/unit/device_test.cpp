@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "support/rig.hpp"
@@ -448,7 +449,37 @@ TEST_CASE("without a profile nothing is asked whose answer could be a frame that
     return counts;
   };
   CHECK(requests_for({}) == std::vector<std::uint16_t>{14});
-  CHECK(requests_for({.unasked = {shape_of(*bm().events)}}) == std::vector<std::uint16_t>{13, 1});
+  CHECK(requests_for({.unasked = shapes_of(*bm().events)}) == std::vector<std::uint16_t>{13, 1});
+}
+
+TEST_CASE("the event block is read in the longest form that a tool with this firmware has") {
+  const auto counts_of = [](Bench& bench) {
+    std::vector<std::uint16_t> counts;
+    for (const auto& request : bench.wire.requests) {
+      const auto parsed = modbus::parse_request(request.pdu);
+      const auto* read = parsed ? std::get_if<modbus::ReadRequest>(&*parsed) : nullptr;
+      if (read != nullptr) counts.push_back(read->count);
+    }
+    return counts;
+  };
+  Bench later({.tool = {.firmware = 3000}});
+  REQUIRE(later.device().require_known_registers());
+  const auto block = later.device().event_block();
+  REQUIRE(block);
+  CHECK(block->size() == 50);
+  Bench older({.tool = {.firmware = 2999}});
+  REQUIRE(older.device().require_known_registers());
+  CHECK(older.device().event_block().value().size() == 14);
+  CHECK(counts_of(older) == std::vector<std::uint16_t>{13, 1});
+  // 50 at once would look like an event.
+  CHECK(counts_of(later) == std::vector<std::uint16_t>{49, 1});
+}
+
+TEST_CASE("where more is refused, the usual event block is read from then on") {
+  Bench bench({.faults = {"exception=2@2"}, .tool = {.firmware = 3100}});
+  REQUIRE(bench.device().require_known_registers());
+  CHECK(bench.device().event_block().value().size() == 14);
+  CHECK(bench.device().event_block().value().size() == 14);
 }
 
 TEST_CASE("the first id of a connection is not known before, and never small") {

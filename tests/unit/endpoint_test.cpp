@@ -262,14 +262,48 @@ TEST_CASE("every beginning of a URL is taken or refused, and text follows it unc
   }
 }
 
+TEST_CASE("an address or a serial port alone is a target") {
+  struct Row {
+    std::string_view typed;
+    std::string_view meant;
+  };
+  for (const auto& [typed, meant] : std::vector<Row>{
+           {"192.168.10.23", "tcp://192.168.10.23"},
+           {"192.168.10.23:5000", "tcp://192.168.10.23:5000"},
+           {"192.168.10.23:5000?unit=3", "tcp://192.168.10.23:5000?unit=3"},
+           {"[::1]", "tcp://[::1]"},
+           {"[fe80::1%eth0]:502", "tcp://[fe80::1%eth0]:502"},
+           {"gateway-2.plant:4001", "tcp://gateway-2.plant:4001"},
+           {"/dev/ttyUSB0", "rtu:///dev/ttyUSB0"},
+           {"/dev/serial/by-id/usb-FTDI?unit=2", "rtu:///dev/serial/by-id/usb-FTDI?unit=2"},
+           {"ttyACM1?unit=2&baud=19200", "rtu:///dev/ttyACM1?unit=2&baud=19200"},
+           {"COM1", "rtu:///dev/ttyS0"},
+           {"COM12?unit=3", "rtu:///dev/ttyS11?unit=3"}}) {
+    CAPTURE(typed);
+    const auto endpoint = parse_endpoint(typed);
+    REQUIRE(endpoint);
+    CHECK(endpoint->text == typed);
+    auto same = parse_endpoint(meant).value();
+    same.text = typed;
+    CHECK(*endpoint == same);
+  }
+  for (const std::string_view typed : {"192.168.10.23:0", "192.168.10.23:70000", "[::1]5000"}) {
+    CAPTURE(typed);
+    CHECK_FALSE(parse_endpoint(typed));
+  }
+}
+
 TEST_CASE("a URL is told from a name") {
-  for (const std::string_view url : {"tcp://h", "rtu:///d", "rtu+tcp://h:1", "sim:doga-bm",
-                                     "tpc://h", "http:", "station:5000"}) {
+  for (const std::string_view url :
+       {"tcp://h", "rtu:///d", "rtu+tcp://h:1", "sim:doga-bm", "tpc://h", "http:", "station:5000",
+        "10.0.0.7:5000", "st3:1", "10.0.0.7", "[::1]", "[::1]:5000", "/dev/ttyUSB0",
+        "/dev/ttyUSB0?unit=3", "ttyUSB0", "COM3"}) {
     CAPTURE(url);
     CHECK(looks_like_url(url));
   }
   for (const std::string_view name :
-       {"", "station3", "@line1", ":5000", "10.0.0.7:5000", "st3:1"}) {
+       {"", "station3", "@line1", ":5000", "10.0.0", "10.0.0.7.8", "a.b.c.d", "[ab]*", "[ab]:1",
+        "preset.1.speed", "p242", "@holding:2", "/home/x", "COM", "COM0", "ttyUSB", "st3:x"}) {
     CAPTURE(name);
     CHECK_FALSE(looks_like_url(name));
   }

@@ -6,6 +6,8 @@
 #include <cctype>
 #include <fstream>
 #include <set>
+#include <string>
+#include <vector>
 
 using namespace spindle;
 using namespace std::chrono_literals;
@@ -50,10 +52,10 @@ TEST_CASE("exit statuses and their names are those of the contract") {
   }
 }
 
-TEST_CASE("the README's table of exit statuses is the table of the code") {
-  std::ifstream readme(SPINDLE_SOURCE_DIR "/README.md");
+TEST_CASE("the promised table of exit statuses is the table of the code") {
+  std::ifstream promises(SPINDLE_SOURCE_DIR "/docs/promises.md");
   std::vector<std::string> rows;
-  for (std::string line; std::getline(readme, line);) {
+  for (std::string line; std::getline(promises, line);) {
     const bool begins = line == "| status | name | meaning |";
     if (begins || (!rows.empty() && line.starts_with('|'))) rows.push_back(line);
     if (!rows.empty() && !line.starts_with('|')) break;
@@ -180,4 +182,53 @@ TEST_CASE("a refused value brings no hint beside its own words") {
 TEST_CASE("foreign text can break neither the line nor the terminal") {
   CHECK(describe({.code = Errc::bad_file, .message = "a\nb\x1b[31mc\x7f\xC3\xA9"}) ==
         "a b [31mc \xC3\xA9");
+}
+
+TEST_CASE("a remedy is what was typed with the right word, as a shell takes it") {
+  struct Case {
+    std::string name;
+    Remedy remedy;
+    std::vector<std::string> typed;
+    std::string command;
+  };
+  const Case cases[] = {
+      {"none", {}, {"get"}, ""},
+      {"a word", {"gte", "get"}, {"gte", "station 3"}, "spindle get 'station 3'"},
+      {"the first one only", {"a", "b"}, {"a", "a"}, "spindle b a"},
+      {"in front of a value", {"sped", "speed"}, {"set", "sped=900"}, "spindle set speed=900"},
+      {"a value", {"TC/AN", "TC/AM"}, {"set", "mode=TC/AN"}, "spindle set mode=TC/AM"},
+      {"of a simulated tool",
+       {"doga-mb", "doga-bm"},
+       {"get", "sim:doga-mb"},
+       "spindle get sim:doga-bm"},
+      {"a word that was not typed", {"x", "y"}, {"get", "xx"}, ""},
+      {"a pattern", {"'", "*"}, {"get", "'"}, "spindle get '*'"},
+      {"another command", {.right = "spindle log"}, {"undo"}, "spindle log"},
+  };
+  for (const Case& row : cases) {
+    CAPTURE(row.name);
+    CHECK(command_to_try({.code = Errc::usage, .hint = "h", .remedy = row.remedy}, row.typed) ==
+          row.command);
+  }
+}
+
+TEST_CASE("a remedy about a tool needs to know which one") {
+  Error error{.code = Errc::unknown_name, .remedy = {.right = "spindle list TARGET"}};
+  CHECK(command_to_try(error, {}).empty());
+  error.asked_of = "station 3";
+  CHECK(command_to_try(error, {}) == "spindle list 'station 3'");
+  error.target = "station4";
+  CHECK(command_to_try(error, {}) == "spindle list station4");
+}
+
+TEST_CASE("the table's command goes with the table's hint") {
+  CHECK(command_to_try({.code = Errc::port_missing}, {}) == "ls /dev/serial/by-id");
+  CHECK(command_to_try({.code = Errc::port_missing, .hint = "another"}, {}).empty());
+}
+
+TEST_CASE("the nearest word is the remedy, or else a command") {
+  CHECK(remedy_for("sped", {"mode", "speed"}).right == "speed");
+  CHECK(remedy_for("sped", {"mode", "speed"}).wrong == "sped");
+  CHECK(remedy_for("zzz", {"mode"}, "spindle list").right == "spindle list");
+  CHECK(remedy_for("zzz", {"mode"}, "spindle list").wrong.empty());
 }

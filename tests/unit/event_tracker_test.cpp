@@ -161,3 +161,13 @@ TEST_CASE(
   CHECK(tracker.track(0, zeros).novelty == Sequence::repeat);
   CHECK(track(tracker, 1).novelty == Sequence::next);
 }
+
+TEST_CASE("an event that was pushed in its longer form is a repeat when the usual one is read") {
+  EventTracker tracker;
+  tracker.set_baseline(7);
+  const Registers whole = {8, 1, 2, 3};
+  const Registers usual = {8, 1};
+  CHECK(tracker.track(8, whole).novelty == Sequence::next);
+  CHECK(tracker.track(8, usual).novelty == Sequence::repeat);
+  CHECK(tracker.track(8, Registers{8, 2}).novelty == Sequence::restart);
+}

@@ -140,3 +140,51 @@ TEST_CASE("every prefix of an answer is read without harm") {
     CHECK((generation(answer) == Generation::known) == (size >= 12));
   }
 }
+
+namespace {
+
+/// Of firmware 4000 and later there is no table of models.
+IdentitySpec later_doga() {
+  IdentitySpec facts = doga();
+  facts.minimum_bytes = 13;
+  facts.products = {{10, "doga-gen2"}, {19, "doga-gen2"}};
+  facts.models = {};
+  facts.firmware_below = 0;
+  facts.firmware_from = 4000;
+  facts.cautions = {{.from = 4000, .to = 4001, .text = "look twice"}};
+  return facts;
+}
+
+Identity later_identity(std::uint16_t firmware, std::uint8_t product = 19) {
+  Bytes answer = long_answer;
+  answer[6] = static_cast<std::uint8_t>(firmware >> 8U);
+  answer[7] = static_cast<std::uint8_t>(firmware);
+  answer[10] = product;
+  return decode_identity(later_doga(), answer);
+}
+
+}  // namespace
+
+TEST_CASE("without a table of models a tool is known by its product, and by its firmware") {
+  const auto generation = [](std::uint16_t firmware, std::uint8_t product = 19) {
+    return generation_of(later_doga(), later_identity(firmware, product));
+  };
+  CHECK(generation(4000) == Generation::known);
+  CHECK(generation(65535) == Generation::known);
+  CHECK(generation(3999) == Generation::earlier);
+  CHECK(generation(0) == Generation::unknown);
+  CHECK(generation(4002, 15) == Generation::unknown);
+  CHECK(generation(3999, 15) == Generation::unknown);
+  CHECK(later_identity(4002).notes.empty());
+  CHECK(later_identity(4002, 15).notes == std::vector<std::string>{"product code 15 is not known"});
+  const Identity twelve = decode_identity(later_doga(), short_answer);
+  CHECK(generation_of(later_doga(), twelve) == Generation::unknown);
+}
+
+TEST_CASE("a caution is of the firmware of its range") {
+  CHECK(caution_of(later_doga(), later_identity(3999)).empty());
+  CHECK(caution_of(later_doga(), later_identity(4000)) == "look twice");
+  CHECK(caution_of(later_doga(), later_identity(4001)) == "look twice");
+  CHECK(caution_of(later_doga(), later_identity(4002)).empty());
+  CHECK(caution_of(later_doga(), Identity()).empty());
+}

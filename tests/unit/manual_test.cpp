@@ -19,6 +19,7 @@
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
 #include "spindle/posix/disk.hpp"
+#include "support/key_examples.hpp"
 #include "support/key_manual.hpp"
 #include "support/schema_manual.hpp"
 
@@ -29,8 +30,9 @@ namespace {
 
 const fs::path root = SPINDLE_SOURCE_DIR;
 const fs::path manual = root / "man";
-const std::vector<std::string> pages = {"spindle.1",        "spindle-profile.5", "spindle-tools.5",
-                                        "spindle-backup.5", "spindle-json.7",    "spindle-plant.7"};
+const std::vector<std::string> pages = {"spindle.1",         "spindle-profile.5", "spindle-tools.5",
+                                        "spindle-backup.5",  "spindle-json.7",    "spindle-plant.7",
+                                        "spindle-tutorial.7"};
 
 std::string read(const fs::path& path) {
   std::ifstream file(path);
@@ -47,15 +49,29 @@ test::Placeholder example(std::string name, const std::string& file) {
   return {std::move(name), test::mdoc_literal(lines)};
 }
 
+/// What examples of keys come from: files that tests or the build hold to be right.
+test::KeyExamples key_examples() {
+  test::KeyExamples examples;
+  for (const char* folder : {"profiles", "man/examples", "tests/profiles/good"}) {
+    std::set<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(root / folder))
+      if (entry.path().extension() == ".yaml") files.insert(entry.path());
+    for (const fs::path& file : files) examples.add(read(file));
+  }
+  return examples;
+}
+
 std::vector<test::Placeholder> all_placeholders() {
   std::vector<test::Placeholder> placeholders = test::manual_placeholders(cli::describe_grammar());
   const auto schema = nlohmann::ordered_json::parse(read(root / "share" / "spindle-1.schema.json"));
   for (test::Placeholder& placeholder : test::schema_placeholders(schema))
     placeholders.push_back(std::move(placeholder));
-  for (test::Placeholder& placeholder : test::key_placeholders())
+  std::vector<std::string> without;
+  for (test::Placeholder& placeholder : test::key_placeholders(key_examples(), without))
     placeholders.push_back(std::move(placeholder));
   placeholders.push_back(example("EXAMPLE_TOOLS", "tools.yaml"));
   placeholders.push_back(example("EXAMPLE_PLANT", "plant.yaml"));
+  placeholders.push_back(example("EXAMPLE_LINE1", "line1.yaml"));
   placeholders.push_back(example("EXAMPLE_EXTENSION", "bm-line1.yaml"));
   placeholders.push_back(example("EXAMPLE_PROFILE", "my-driver.yaml"));
   placeholders.push_back(example("EXAMPLE_ENCODINGS", "any-device.yaml"));
@@ -232,6 +248,38 @@ TEST_CASE("manual: every key of every kind of file is explained") {
       CHECK(explains(page, key));
     }
   }
+}
+
+TEST_CASE("manual: every key of a profile has an example in a file that is right") {
+  std::vector<std::string> without;
+  test::key_placeholders(key_examples(), without);
+  // The keys of a status are those of all models, and a command word has bits, not values.
+  CHECK(fmt::format("{}", fmt::join(without, " ")) == "command-word.status.stopped");
+  const fs::path good = root / "tests" / "profiles" / "good";
+  const files::ProfileStore store({good.string(), (root / "profiles").string()},
+                                  posix::source_disk());
+  const auto findings = store.check((good / "every-key.yaml").string());
+  REQUIRE(findings.has_value());
+  CHECK(findings->empty());
+}
+
+TEST_CASE("manual: an example is the shortest, on one line, and YAML") {
+  test::KeyExamples examples;
+  examples.add(
+      "link: {framing: tcp, port: 5000}\nparameters:\n"
+      "  - {name: a, title: \"100 % of: it\", labels: {0: off, 1: on}}\n"
+      "  - {name: b, title: \"A title that is longer than any line of a table can be, \" }\n"
+      "---\npart: texts\nerror-codes: {1: one}\n");
+  examples.add("link: {port: 502}\nrun: {model: start-action, start: {action: go}}\n");
+  using test::KeyExamples;
+  CHECK(KeyExamples::example(examples.maps("link"), "port") == "port: 502");
+  CHECK(KeyExamples::example(examples.maps("link"), "unit").empty());
+  CHECK(KeyExamples::example(examples.maps("parameters"), "title") == "title: \"100 % of: it\"");
+  CHECK(KeyExamples::example(examples.maps("parameters"), "labels") == "labels: {0: off, 1: on}");
+  CHECK(KeyExamples::example(examples.maps("texts"), "error-codes") == "error-codes: {1: one}");
+  CHECK(KeyExamples::example(examples.maps("start-action"), "start") == "start: {action: go}");
+  CHECK(KeyExamples::example(examples.maps("profile"), "parameters") ==
+        "parameters: [{name: a, ...}, ...]");
 }
 
 TEST_CASE("manual: the words of a profile are explained") {

@@ -269,3 +269,42 @@ TEST_CASE("folders are made with those above them, for whom it may concern") {
 TEST_CASE("the user who runs the program has a name") {
   CHECK_FALSE(posix::local_disk().user().empty());
 }
+
+TEST_CASE("a text is replaced only where the file still holds what was read") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  const std::string path = folder / "a.yaml";
+  CHECK_FALSE(disk.replace(path, "", "one\n"));
+  REQUIRE(disk.write(path, "one\n", Overwrite::refuse, Privacy::usual));
+  fs::permissions(path, fs::perms(0640));
+  fs::create_symlink("a.yaml", folder / "link.yaml");
+  CHECK(disk.replace(folder / "link.yaml", "one\n", "two\n").value());
+  CHECK(text_of(path) == "two\n");
+  CHECK(rights_of(path) == 0640);
+  CHECK(fs::is_symlink(folder / "link.yaml"));
+  CHECK_FALSE(disk.replace(path, "one\n", "three\n").value());
+  CHECK(text_of(path) == "two\n");
+  CHECK(folder.count() == 2);
+}
+
+TEST_CASE("of several that replace a file at once none loses what another wrote") {
+  const Folder folder;
+  const Disk disk = posix::local_disk();
+  const std::string path = folder / "a.yaml";
+  REQUIRE(disk.write(path, "", Overwrite::refuse, Privacy::usual));
+  constexpr int writers = 4;
+  constexpr int lines_each = 25;
+  std::vector<std::thread> threads;
+  for (int writer = 0; writer < writers; ++writer) {
+    threads.emplace_back([&] {
+      for (int line = 0; line < lines_each;) {
+        const std::string before = text_of(path);
+        const auto replaced = disk.replace(path, before, before + "x\n");
+        if (replaced && *replaced) ++line;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  CHECK(text_of(path).size() == 2U * writers * lines_each);
+  CHECK(folder.count() == 1);
+}

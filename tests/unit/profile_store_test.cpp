@@ -242,7 +242,8 @@ TEST_CASE("rules are checked too where other entries could not be read, and find
             "9:5: key 'register' is missing",
             "12:56: go: it moves, and no 'run' of this profile guards it",
             "13:92: 'x' is no parameter of this profile; did you mean 'b'?",
-            "14:64: unknown evidence 'hearsay'; known: manual, transcribed, sibling, inferred",
+            "14:64: unknown evidence 'hearsay'; known: verified, manual, transcribed, sibling, "
+            "inferred",
             "20:7: unknown part 'nonsense'; known: texts, simulation",
         });
 }
@@ -462,7 +463,7 @@ TEST_CASE("doga-bm: counts") {
   CHECK(count("event.*") == 14);
   CHECK(count("status.*") == 14);
   CHECK(count("alarm.*") == 2);
-  CHECK(profile.parameters.size() == 255);
+  CHECK(profile.parameters.size() == 261);
   CHECK(profile.actions.size() == 6);
   CHECK(profile.exceptions.size() == 6);
 }

@@ -351,3 +351,58 @@ TEST_CASE("which bit a name means may depend on another parameter") {
   });
   CHECK(unread.error().code == Errc::no_answer);
 }
+
+TEST_CASE("what is guarded is so by whatever name or number its registers are asked for") {
+  Profile profile = example();
+  Parameter unit = named("unit", RegisterTable::holding, 300, Kind::u32, Access::read_write);
+  unit.guarding = catalogue::Guarding::alone;
+  CHECK_FALSE(profile.has_guarded());
+  test::append(profile.parameters, unit);
+  CHECK(profile.has_guarded());
+  for (const std::string name : {"unit", "p300", "p301", "@holding:301", "@holding:299/u32"}) {
+    CAPTURE(name);
+    CHECK(profile.find(name).value().guarding == catalogue::Guarding::alone);
+    CHECK(profile.find(name).value().secrecy == Secrecy::open);
+  }
+  for (const std::string name : {"p299", "p302", "@input:300"}) {
+    CAPTURE(name);
+    CHECK(profile.find(name).value().guarding == catalogue::Guarding::none);
+  }
+}
+
+TEST_CASE("where writes are listed nothing else may be written") {
+  Profile profile;
+  profile.id = "listed";
+  profile.writes = catalogue::Writes::listed;
+  Parameter elsewhere =
+      named("elsewhere", RegisterTable::holding, 30, Kind::u16, Access::read_write);
+  elsewhere.write_address = modbus::RegisterAddress{40};
+  profile.parameters = {named("torque", RegisterTable::holding, 10, Kind::f32, Access::read_write),
+                        named("shown", RegisterTable::holding, 20, Kind::u16, Access::read_only),
+                        elsewhere,
+                        named("lamp", RegisterTable::coil, 10, Kind::bit, Access::read_write)};
+  catalogue::Action start;
+  start.name = "start";
+  start.address = {5000};
+  profile.actions = {start};
+  const auto allows = [&](RegisterTable table, unsigned first, std::size_t count = 1) {
+    return profile.may_write(table, {static_cast<std::uint16_t>(first)}, count).has_value();
+  };
+  CHECK(allows(RegisterTable::holding, 10, 2));
+  CHECK(allows(RegisterTable::holding, 11));
+  CHECK(allows(RegisterTable::holding, 40));
+  CHECK(allows(RegisterTable::coil, 10));
+  CHECK(allows(RegisterTable::holding, 5000));
+  for (const unsigned first : {0U, 9U, 12U, 20U, 30U, 4999U, 5001U, 65535U}) {
+    CAPTURE(first);
+    CHECK_FALSE(allows(RegisterTable::holding, first));
+  }
+  CHECK_FALSE(allows(RegisterTable::holding, 9, 2));
+  CHECK_FALSE(allows(RegisterTable::holding, 11, 2));
+  CHECK_FALSE(allows(RegisterTable::coil, 11));
+  const auto refused = profile.may_write(RegisterTable::holding, {11}, 2);
+  CHECK(refused.error().code == Errc::read_only);
+  CHECK(refused.error().register_address == 12);
+  profile.writes = catalogue::Writes::any;
+  CHECK(allows(RegisterTable::holding, 9, 20));
+}

@@ -187,6 +187,7 @@ TEST_CASE("it is never wider than the terminal, and the counts stay") {
   test::FakeClock clock;
   Progress progress(terminal.streams, clock, Showing::wanted);
   const auto shown = [&](std::size_t columns, const std::string& what) {
+    progress.clear();
     terminal.columns = columns;
     progress.advance({.what = what, .done = 0, .total = 725});
     return terminal.line();
@@ -199,9 +200,51 @@ TEST_CASE("it is never wider than the terminal, and the counts stay") {
   CHECK(shown(0, std::string(100, 'w')).size() == 79);
   CHECK(shown(26, "トルクトルクトルク") == "...トルクトルク 0 of 725");
   CHECK(shown(80, "two\nlines \x1b[2J") == "two lines \\x1b[2J 0 of 725");
+  progress.clear();
   terminal.columns = 10;
   progress.show("トルクトルク");
   CHECK(terminal.line() == "トルク...");
+}
+
+TEST_CASE("several lines: all of them go before something else is written") {
+  Terminal terminal;
+  test::FakeClock clock;
+  Progress progress(terminal.streams, clock, Showing::wanted);
+  const std::vector<ScreenLine> lines = {{"station3  connected", 19}, {"station4  lost", 14}};
+  progress.show(lines);
+  CHECK(terminal.writes.back() == wipe + "station3  connected\nstation4  lost");
+  progress.show(lines);
+  CHECK(terminal.writes.back() == "\r\x1b[1A\x1b[Jstation3  connected\nstation4  lost");
+  REQUIRE(terminal.streams.out("an event\n"));
+  REQUIRE(terminal.writes.size() == 4);
+  CHECK(terminal.writes[2] == "\r\x1b[1A\x1b[J");
+  CHECK(terminal.writes[3] == "out:an event\n");
+  terminal.streams.err("a note\n");
+  CHECK(terminal.writes.size() == 5);  // nothing is left that would have to go
+}
+
+TEST_CASE("a terminal that became narrower has put lines into further rows") {
+  Terminal terminal;
+  test::FakeClock clock;
+  Progress progress(terminal.streams, clock, Showing::wanted);
+  const std::vector<ScreenLine> lines = {{std::string(70, 'a'), 70}, {std::string(20, 'b'), 20}};
+  progress.show(lines);
+  terminal.columns = 30;
+  progress.clear();
+  CHECK(terminal.writes.back() == "\r\x1b[3A\x1b[J");
+}
+
+TEST_CASE("how much of a terminal there is, also where it does not say") {
+  Terminal terminal;
+  test::FakeClock clock;
+  std::size_t rows = 50;
+  terminal.streams.err_rows = [&rows] { return rows; };
+  const Progress progress(terminal.streams, clock, Showing::wanted);
+  CHECK(progress.screen() == Screen{77, 50});
+  terminal.columns = 3;
+  rows = 0;
+  CHECK(progress.screen() == Screen{2, 24});
+  CHECK(progress.is_shown());
 }
 
 TEST_CASE("several threads may tell how far they are while others write") {

@@ -106,7 +106,7 @@ TEST_CASE("lines for programs begin on a line of their own behind one that was c
     Format format;
     std::string_view first;
   };
-  for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\nf\r\n"}}) {
+  for (const Case& row : {Case{Format::json, "\n{"}, Case{Format::csv, "\r\ntarget,f\r\n"}}) {
     Caught caught;
     caught.streams.out_ends_within_line = [] { return true; };
     const auto renderer = make_renderer(row.format, caught.streams, Verbosity::normal);
@@ -361,8 +361,8 @@ TEST_CASE("CSV: RFC 4180 with the columns' keys as header") {
   CHECK(rendered(Format::csv, value_columns,
                  {value_record("a", Decimal(271, -2)),
                   value_record("b", Decimal(100), std::string("%"))}) ==
-        "name,value,unit\r\na,2.71,\r\nb,100,%\r\n");
-  CHECK(rendered(Format::csv, value_columns, {}) == "name,value,unit\r\n");
+        "target,name,value,unit\r\nsim:doga-bm,a,2.71,\r\nsim:doga-bm,b,100,%\r\n");
+  CHECK(rendered(Format::csv, value_columns, {}) == "target,name,value,unit\r\n");
 }
 
 TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is shown") {
@@ -381,7 +381,7 @@ TEST_CASE("CSV: what must be quoted is quoted, what could steer a terminal is sh
       {"21.5 °C \xff", "21.5 °C \uFFFD"},
       {"", ""},
   };
-  for (const Row& row : rows) CHECK(csv_cell(row.text) == "f\r\n" + row.field + "\r\n");
+  for (const Row& row : rows) CHECK(csv_cell(row.text) == "target,f\r\n," + row.field + "\r\n");
 }
 
 TEST_CASE("CSV: cells as they are, the target, and a header only when the columns change") {
@@ -396,8 +396,8 @@ TEST_CASE("CSV: cells as they are, the target, and a header only when the column
     REQUIRE(renderer->record(record));
     REQUIRE(renderer->end());
   }
-  REQUIRE(renderer->begin(std::vector<Column>{{"F", "f"}}));
-  CHECK(caught.out() == "target,f\r\nstation3,0.1\r\nstation3,0.1\r\nf\r\n");
+  REQUIRE(renderer->begin(std::vector<Column>{{"G", "g"}}));
+  CHECK(caught.out() == "target,f\r\nstation3,0.1\r\nstation3,0.1\r\ntarget,g\r\n");
 }
 
 TEST_CASE("a line stands for itself at once, a note is for people only") {
@@ -519,4 +519,69 @@ TEST_CASE("a closed pipe is handed on by every function that writes") {
     REQUIRE_FALSE(wrote);
     CHECK(wrote.error().code == Errc::closed_pipe);
   }
+}
+
+namespace {
+
+std::size_t widest_line(const std::string& text) {
+  std::size_t widest = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    widest = std::max(widest, end - begin);
+    begin = end + 1;
+  }
+  return widest;
+}
+
+}  // namespace
+
+TEST_CASE("an error is the cause, what can be pasted, and the rest, on lines of 100 columns") {
+  Caught caught;
+  caught.streams.typed = {"get", "staton3"};
+  const auto renderer = make_renderer(Format::table, caught.streams, Verbosity::normal);
+  Error error{.code = Errc::unknown_name,
+              .message = "unknown target 'staton3'",
+              .hint = "did you mean 'station3'?",
+              .remedy = {"staton3", "station3"}};
+  REQUIRE(renderer->error(error, moment));
+  CHECK(caught.err ==
+        "spindle: unknown target 'staton3'; did you mean 'station3'?\n"
+        "  try: spindle get station3\n");
+  caught.err.clear();
+  error.hint.clear();
+  for (int word = 0; word < 40; ++word) error.hint += "hint ";
+  error.hint += "end";
+  error.details = {"one", "two"};
+  REQUIRE(renderer->error(error, moment));
+  CHECK(caught.err.starts_with(
+      "spindle: unknown target 'staton3'\n  try: spindle get station3\n  hint hint"));
+  CHECK(caught.err.ends_with("end\n  one\n  two\n"));
+  CHECK(widest_line(caught.err) <= 100);
+}
+
+TEST_CASE("the journal gets an error as one line, and JSON what can be pasted as a key") {
+  Caught caught;
+  caught.streams.typed = {"get", "staton3"};
+  caught.streams.err_is_journal = true;
+  const Error error{.code = Errc::unknown_name,
+                    .message = "unknown target 'staton3'",
+                    .hint = "did you mean 'station3'?",
+                    .remedy = {"staton3", "station3"},
+                    .details = {"one"}};
+  REQUIRE(make_renderer(Format::json, caught.streams, Verbosity::normal)->error(error, moment));
+  CHECK(caught.err == "<3>spindle: unknown target 'staton3'; did you mean 'station3'?\n");
+  const json told = json::parse(caught.out());
+  CHECK(told["try"] == "spindle get station3");
+  CHECK(told["details"] == json::array({"one"}));
+  CHECK(told["hint"] == "did you mean 'station3'?");
+}
+
+TEST_CASE("a sentence is broken at blanks, and a word that is too wide stays whole") {
+  std::string words;
+  for (int word = 0; word < 60; ++word) words += "word ";
+  CHECK(widest_line(wrapped(words)) <= 100);
+  CHECK(wrapped("short") == "short");
+  const std::string path(150, 'x');
+  CHECK(wrapped("in " + path + " it is") == "in\n  " + path + "\n  it is");
+  CHECK(wrapped("  begins") == "  begins");
 }

@@ -10,6 +10,7 @@
 
 #include "commands/exact_numbers.hpp"
 #include "commands/report_assessment.hpp"
+#include "commands/report_curves.hpp"
 #include "commands/report_page.hpp"
 #include "commands/report_selection.hpp"
 #include "commands/report_text.hpp"
@@ -29,6 +30,7 @@ bool contains(std::string_view text, std::string_view part) {
 struct Printed {
   Bench bench = {};
   ReportOptions options = {};
+  StoredCurves curves = {};
 
   /// Values that go around a mean, two hundredths up and down.
   void add(std::size_t count, std::int64_t mean = 271, std::int64_t begin = 1) {
@@ -56,9 +58,11 @@ struct Printed {
   }
   [[nodiscard]] std::string page() const {
     return with_report([&](const Assessed& assessed) {
-      return report_page(
-          assessed,
-          {.zone = zone, .made = bench_second(9000), .version = "9.9", .options = options});
+      return report_page(assessed, {.zone = zone,
+                                    .made = bench_second(9000),
+                                    .version = "9.9",
+                                    .options = options,
+                                    .curves = curves});
     });
   }
   /// Of the torque of the first stratum.

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "spindle/catalogue/event_layout.hpp"
 #include "spindle/catalogue/fields.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/posix/disk.hpp"
@@ -187,14 +189,31 @@ TEST_CASE("without any file the program knows its profiles, and their bases are 
     CHECK(entry.path == files::built_in);
     ids.push_back(entry.id);
   }
-  CHECK(ids == std::vector<std::string>{"doga-bm", "doga-bmt", "eastron-sdm72d-m", "huanyang-fc01",
-                                        "kolver-kducer", "orientalmotor-blh", "orientalmotor-blv",
-                                        "orientalmotor-blvr"});
+  CHECK(ids == std::vector<std::string>{"doga-bm", "doga-bmt", "doga-gen2", "eastron-sdm72d-m",
+                                        "huanyang-fc01", "kolver-kducer", "orientalmotor-blh",
+                                        "orientalmotor-blv", "orientalmotor-blvr"});
   CHECK(store.load("doga-bm").value().id == "doga-bm");
   CHECK(store.load_code_tables(store.load("doga-bm").value().path).value().error.size() > 10);
   CHECK(store.load("doga-common").error().code == Errc::bad_file);
   CHECK(store.load("doga-b").error().hint.find("doga-bm") != std::string::npos);
   CHECK(store.check("doga-bm").value().empty());
+}
+
+TEST_CASE("no register of an event has a key that its record has beside the registers") {
+  const std::set<std::string> taken = {"schema", "type",        "time",      "target", "serial",
+                                       "epoch",  "id",          "kind",      "source", "raw",
+                                       "text",   "torque_unit", "error_text"};
+  const ProfileStore store({}, posix::source_disk(), shipped::profiles());
+  for (const auto& entry : store.list()) {
+    CAPTURE(entry.id);
+    const auto profile = store.load(entry.id).value();
+    if (!profile.events) continue;
+    const catalogue::EventLayout layout(profile);
+    for (const auto& field : layout.fields()) {
+      CAPTURE(field.key);
+      CHECK(!taken.contains(field.key));
+    }
+  }
 }
 
 TEST_CASE("a user's profile extends one of the program as it extends its file") {

@@ -482,3 +482,15 @@ TEST_CASE("values that are one number in 64 bits are told apart by their registe
   REQUIRE(plan.writes.size() == 1);
   CHECK(*encode(charge, plan.writes[0].after) == backup.entries[0].raw);
 }
+
+TEST_CASE("what is guarded is restored before all others") {
+  Profile profile;
+  profile.id = "guarded";
+  Parameter unit = parameter("unit", 3);
+  unit.guarding = Guarding::alone;
+  profile.parameters = {parameter("first", 1), parameter("second", 2), unit};
+  const auto backup = snapshot(profile, {{"first", 1}, {"second", 2}, {"unit", 3}});
+  const auto present = snapshot(profile, {{"first", 0}, {"second", 0}, {"unit", 0}});
+  const auto plan = plan_restore(backup, present, profile, {}, Destination::same_tool);
+  CHECK(shown(plan) == Lines{"unit: 0 -> 3", "first: 0 -> 1", "second: 0 -> 2"});
+}

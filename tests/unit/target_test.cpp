@@ -323,3 +323,31 @@ TEST_CASE("where ids are ignored a tool must be told by its unit, and send nothi
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::usage);
 }
+
+TEST_CASE("a tool whose entry has a fault keeps no other from being used") {
+  Bench bench;
+  bench.tools.faults.emplace("station4",
+                             Error{.code = Errc::bad_file, .message = "spindle.yaml:3:1: no"});
+  const auto group = resolve_targets({"@line1"}, bench.context());
+  REQUIRE(group.has_value());
+  REQUIRE(group->size() == 2);
+  CHECK(group->front().fault.empty());
+  CHECK(group->back().shown == "station4");
+  CHECK(group->back().fault == "spindle.yaml:3:1: no");
+  const auto opened = load_profile(group->back(), bench.context());
+  REQUIRE_FALSE(opened);
+  CHECK(opened.error().code == Errc::bad_file);
+  CHECK(opened.error().target == "station4");
+  CHECK_FALSE(connect_device(group->back(), catalogue::Profile(), bench.context()));
+  CHECK(bench.opened.empty());
+
+  for (const char* alone : {"station4", "@single"}) {
+    const auto refused = resolve_targets({alone}, bench.context());
+    REQUIRE_FALSE(refused);
+    CHECK(refused.error().message == "spindle.yaml:3:1: no");
+  }
+  const Resolution each = resolve_each_target({"@line1"}, bench.context());
+  CHECK(each.targets.size() == 1);
+  REQUIRE(each.faults.size() == 1);
+  CHECK(each.faults.front().target == "station4");
+}

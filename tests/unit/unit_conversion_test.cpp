@@ -102,3 +102,15 @@ TEST_CASE("another quantity is refused, and no unit is taken for another one tha
   CHECK(in("", "5V") == "'5V' has a unit, and the parameter has none that is known");
   CHECK(in("W", "18446744073709551615GW") == "18446744073709551615 GW has too many digits in W");
 }
+
+TEST_CASE("units of torque are told from others") {
+  for (const std::string unit :
+       {"N.m", "cN.m", "Nm", "kgf.cm", "kgf.m", "lbf.in", "ozf.in", "in-lb"}) {
+    CAPTURE(unit);
+    CHECK(is_torque(unit));
+  }
+  for (const std::string unit : {"", "N", "m", "rpm", "W", "torque", "nothing"}) {
+    CAPTURE(unit);
+    CHECK_FALSE(is_torque(unit));
+  }
+}

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 namespace spindle {
 
@@ -82,12 +83,28 @@ struct ErrcInfo {
   /// replaced by the error's members.
   std::string_view text;
   std::string_view hint;  ///< the next step used when an error brings none; may be empty
+  /// What can be pasted beside this hint, as Remedy::right; may be empty.
+  std::string_view command = {};
 };
 
 std::span<const StatusInfo> status_table();
 std::span<const ErrcInfo> errc_table();
 const StatusInfo& info(ExitStatus status);
 const ErrcInfo& info(Errc code);
+
+/// A command line that may help, as it can be pasted: what was typed with one change, or another.
+struct Remedy {
+  /// The word that is replaced, alone, on one side of a '=' or behind a ':'; empty: none is.
+  std::string wrong = {};
+  /// In its place. Without `wrong` a whole command line; TARGET in it stands for the tool that the
+  /// error is about. Empty: there is no remedy.
+  std::string right = {};
+};
+
+/// The nearest of these words in place of a misspelt one (see closest()); where none is near, this
+/// command line, which may be empty.
+Remedy remedy_for(std::string_view word, const std::vector<std::string>& known,
+                  std::string command = {});
 
 /// The one error type. Carries what was tried; `describe()` is the only place that makes it text.
 struct Error {
@@ -103,6 +120,8 @@ struct Error {
   std::optional<std::uint16_t> register_address = std::nullopt;
   std::optional<std::uint8_t> exception = std::nullopt;     ///< exception code as received
   std::optional<std::uint32_t> device_code = std::nullopt;  ///< why, in the device's own code
+  Remedy remedy = {};
+  std::vector<std::string> details = {};  ///< more of the same kind, a sentence each
 
   [[nodiscard]] ExitStatus status() const { return info(code).status; }
 };
@@ -115,6 +134,13 @@ std::string message_of(const Error& error);
 
 /// The next step: the error's own or its table row's; may be empty.
 std::string hint_of(const Error& error);
+
+/// "target (endpoint): name: message", one line.
+std::string cause_of(const Error& error);
+
+/// The remedy as a command line for a shell, where `typed` are the words behind the program's name.
+/// Empty where there is none, or where the word that is wrong does not stand in it.
+std::string command_to_try(const Error& error, const std::vector<std::string>& typed);
 
 /// "target (endpoint): name: message; hint", one line, as printed on stderr behind "spindle: ". A
 /// target that is a URL itself is not told beside its endpoint.

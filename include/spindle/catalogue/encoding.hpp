@@ -70,15 +70,18 @@ inline constexpr auto packing_words =
 
 /// How the parts of a date stand in registers.
 enum class DateLayout : std::uint8_t {
-  registers,  ///< six registers: year (of this century), month, day, hour, minute, second
-  long_year,  ///< the same with all four digits of the year
-  bytes,      ///< the same six as bytes of three registers
-  unix_time,  ///< seconds since 1970-01-01 00:00 UTC, in two registers
+  registers,       ///< six registers: year (of this century), month, day, hour, minute, second
+  long_year,       ///< the same with all four digits of the year
+  bytes,           ///< the same six as bytes of three registers
+  year_and_bytes,  ///< all four digits of the year, then bytes: the other five, and one that is not
+                   ///< ours
+  unix_time,       ///< seconds since 1970-01-01 00:00 UTC, in two registers
 };
 inline constexpr auto date_layout_words =
     enum_table<DateLayout>({{"registers", DateLayout::registers},
                             {"long-year", DateLayout::long_year},
                             {"bytes", DateLayout::bytes},
+                            {"year-and-bytes", DateLayout::year_and_bytes},
                             {"unix", DateLayout::unix_time}});
 
 /// Bits of an integer, counted from the lowest. Width 0: all of it.

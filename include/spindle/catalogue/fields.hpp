@@ -45,13 +45,13 @@ inline auto fields(const BitName& v) {
 
 inline auto fields(const Parameter& v) {
   const auto& [name, title, table, address, encoding, unit, range, except, default_value, labels,
-               bits, bits_by, part, notation, access, cloning, secrecy, reading, evidence, source,
-               note, effect, risk, settle, hazard, nulls, scale_by, write_address, before, after] =
-      v;
+               bits, bits_by, part, notation, access, cloning, secrecy, guarding, reading, evidence,
+               source, note, effect, risk, settle, hazard, nulls, scale_by, write_address, before,
+               after] = v;
   return std::tie(name, title, table, address, encoding, unit, range, except, default_value, labels,
-                  bits, bits_by, part, notation, access, cloning, secrecy, reading, evidence,
-                  source, note, effect, risk, settle, hazard, nulls, scale_by, write_address,
-                  before, after);
+                  bits, bits_by, part, notation, access, cloning, secrecy, guarding, reading,
+                  evidence, source, note, effect, risk, settle, hazard, nulls, scale_by,
+                  write_address, before, after);
 }
 
 inline auto fields(const Slice& v) {
@@ -59,17 +59,29 @@ inline auto fields(const Slice& v) {
   return std::tie(offset, size);
 }
 
+inline auto fields(const FirmwareCaution& v) {
+  const auto& [from, to, text] = v;
+  return std::tie(from, to, text);
+}
+
 inline auto fields(const IdentitySpec& v) {
   const auto& [minimum_bytes, id, controller_model, tool_model, firmware, serial, long_serial_bytes,
-               long_serial, product_byte, products, total_bytes, total, models, firmware_below] = v;
+               long_serial, product_byte, products, total_bytes, total, models, firmware_from,
+               firmware_below, cautions, model_from, serial_from, version_from] = v;
   return std::tie(minimum_bytes, id, controller_model, tool_model, firmware, serial,
                   long_serial_bytes, long_serial, product_byte, products, total_bytes, total,
-                  models, firmware_below);
+                  models, firmware_from, firmware_below, cautions, model_from, serial_from,
+                  version_from);
 }
 
 inline auto fields(const Area& v) {
   const auto& [table, from, to, note] = v;
   return std::tie(table, from, to, note);
+}
+
+inline auto fields(const UnaskedFrame& v) {
+  const auto& [function, count] = v;
+  return std::tie(function, count);
 }
 
 inline auto fields(const GapRule& v) {
@@ -96,11 +108,11 @@ inline auto fields(const LinkSpec& v) {
   const auto& [framing, port, unit, transactions, units, max_read, max_write, max_read_bits,
                write_function, max_gap, busy, busy_every, busy_limit, keep_alive, answer, connect,
                retries, settle, loopback, any_unit, word_order, byte_order, even_pairs, serial,
-               contiguous, absent] = v;
+               contiguous, absent, unasked] = v;
   return std::tie(framing, port, unit, transactions, units, max_read, max_write, max_read_bits,
                   write_function, max_gap, busy, busy_every, busy_limit, keep_alive, answer,
                   connect, retries, settle, loopback, any_unit, word_order, byte_order, even_pairs,
-                  serial, contiguous, absent);
+                  serial, contiguous, absent, unasked);
 }
 
 inline auto fields(const Arming& v) {
@@ -118,11 +130,60 @@ inline auto fields(const EventSetting& v) {
   return std::tie(is, parameter);
 }
 
+inline auto fields(const EventForm& v) {
+  const auto& [count, parameters, firmware_from] = v;
+  return std::tie(count, parameters, firmware_from);
+}
+
+inline auto fields(const EventFrame& v) {
+  const auto& [function, holds] = v;
+  return std::tie(function, holds);
+}
+
+inline auto fields(const CurveChannel& v) {
+  const auto& [type, count] = v;
+  return std::tie(type, count);
+}
+
+inline auto fields(const CurveType& v) {
+  const auto& [number, is, unit] = v;
+  return std::tie(number, is, unit);
+}
+
+inline auto fields(const CurveSpec& v) {
+  const auto& [channels, types, sampling, most, steps, first_step, step_types] = v;
+  return std::tie(channels, types, sampling, most, steps, first_step, step_types);
+}
+
+inline auto fields(const BlockSearch& v) {
+  const auto& [name, title, count, from, to, step] = v;
+  return std::tie(name, title, count, from, to, step);
+}
+
+inline auto fields(const LearnedAction& v) {
+  const auto& [name, title, follows, by, deed, minimum, maximum, labels, hazard, check] = v;
+  return std::tie(name, title, follows, by, deed, minimum, maximum, labels, hazard, check);
+}
+
+inline auto fields(const LearnSpec& v) {
+  const auto& [table, from, to, actions] = v;
+  return std::tie(table, from, to, actions);
+}
+
+inline auto fields(const DiscoverySpec& v) {
+  const auto& [group, port, ask, answer, bytes, every, serial, model, address, tool_port, mac,
+               firmware, in_use, kind, kinds] = v;
+  return std::tie(group, port, ask, answer, bytes, every, serial, model, address, tool_port, mac,
+                  firmware, in_use, kind, kinds);
+}
+
 inline auto fields(const EventSpec& v) {
   const auto& [model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-               interval, preset, settings] = v;
+               interval, preset, settings, longer, frames, identity, unit, curves, members,
+               search] = v;
   return std::tie(model, arm, function, first, count, number, flag, kind, kinds, error, columns,
-                  interval, preset, settings);
+                  interval, preset, settings, longer, frames, identity, unit, curves, members,
+                  search);
 }
 
 inline auto fields(const LimitSpec& v) {
@@ -257,10 +318,10 @@ inline auto fields(const UnlockSpec& v) {
 inline auto fields(const Profile& v) {
   const auto& [id, title, maker, series, path, bases, link, identity, events, limits, numbered,
                parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
-               unlock] = v;
+               unlock, writes, torque_unit_from, discovery, learn] = v;
   return std::tie(id, title, maker, series, path, bases, link, identity, events, limits, numbered,
                   parameters, actions, exceptions, run, refusals, alarm_lists, alarm_reset, watched,
-                  unlock);
+                  unlock, writes, torque_unit_from, discovery, learn);
 }
 
 template <typename T>

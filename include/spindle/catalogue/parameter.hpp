@@ -16,9 +16,11 @@
 
 namespace spindle::catalogue {
 
-/// Where a fact comes from, strongest first (contract, section 5, Evidence).
-enum class Evidence : std::uint8_t { manual, transcribed, sibling, inferred };
-inline constexpr auto evidence_words = enum_table<Evidence>({{"manual", Evidence::manual},
+/// Where a fact comes from, strongest first (contract, section 5, Evidence). `verified` is what was
+/// seen on a user's own tool: only profiles of users have it.
+enum class Evidence : std::uint8_t { verified, manual, transcribed, sibling, inferred };
+inline constexpr auto evidence_words = enum_table<Evidence>({{"verified", Evidence::verified},
+                                                             {"manual", Evidence::manual},
                                                              {"transcribed", Evidence::transcribed},
                                                              {"sibling", Evidence::sibling},
                                                              {"inferred", Evidence::inferred}});
@@ -34,8 +36,13 @@ enum class Reading : std::uint8_t {
   harmless,
   consumes,  ///< it clears it: only who waits for what it says may read it
 };
-/// Whether backups hold a value without being told to.
+/// Whether a value is shown, and held by backups, without being told to.
 enum class Secrecy : std::uint8_t { open, secret };
+/// Whether a write may change what other values mean, or the tool may change them along.
+enum class Guarding : std::uint8_t {
+  none,
+  alone,  ///< it is asked about, and written alone, between two readings of everything
+};
 /// What a write may do beyond storing a value.
 enum class Hazard : std::uint8_t {
   none,
@@ -118,6 +125,7 @@ struct Parameter {
   Access access = Access::read_only;
   Cloning cloning = Cloning::allowed;
   Secrecy secrecy = Secrecy::open;
+  Guarding guarding = Guarding::none;
   Reading reading = Reading::harmless;
   Evidence evidence = Evidence::inferred;
   Text source;  ///< document and section

@@ -9,7 +9,9 @@
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
+#include "spindle/catalogue/discovery.hpp"
 #include "spindle/catalogue/identity.hpp"
+#include "spindle/catalogue/learning.hpp"
 #include "spindle/catalogue/parameter.hpp"
 #include "spindle/catalogue/run_facts.hpp"
 #include "spindle/modbus/adu.hpp"
@@ -50,6 +52,13 @@ struct UnitRange {
   }
 };
 
+/// Frames that may come although nothing asked for them: they look like the answer to a read of so
+/// many registers by this function.
+struct UnaskedFrame {
+  std::uint8_t function = 0;  ///< 3 or 4
+  std::uint16_t count = 0;
+};
+
 /// How to talk to this product. Values come from the profile, each with its evidence there.
 struct LinkSpec {
   modbus::Framing framing = modbus::Framing::tcp;
@@ -84,6 +93,8 @@ struct LinkSpec {
   SerialSpec serial = {};
   List<Area> contiguous = {};  ///< registers may be read along here
   List<Area> absent = {};      ///< registers said not to exist
+  /// Beside those of `events`. Such a read is never sent.
+  List<UnaskedFrame> unasked = {};
 };
 
 /// Whether a value of this encoding can be written. Error `usage`: values of several registers are
@@ -139,6 +150,57 @@ struct EventColumn {
   std::uint16_t width = 0;  ///< cells that a table keeps free for it
 };
 
+/// What a frame holds that a tool sends unasked.
+enum class FrameContent : std::uint8_t {
+  event,              ///< the event block
+  event_with_curves,  ///< the event block, and behind it the samples of every channel that it
+                      ///< counts
+  curve,              ///< the number of a channel, how many samples, and these
+};
+inline constexpr auto frame_content_words =
+    enum_table<FrameContent>({{"event", FrameContent::event},
+                              {"event-with-curves", FrameContent::event_with_curves},
+                              {"curve", FrameContent::curve}});
+
+/// A function of frames that are sent unasked, whose data begin with their own length in two bytes.
+struct EventFrame {
+  std::uint8_t function = 0;
+  FrameContent holds = FrameContent::event;
+};
+
+/// One channel of a result's curves, by parameters of the event block.
+struct CurveChannel {
+  Text type;   ///< what is measured; its labels name it
+  Text count;  ///< how many samples there are
+};
+
+/// What a channel measures.
+enum class CurveQuantity : std::uint8_t { none, torque, angle, torque_over_angle, other };
+inline constexpr auto curve_quantity_words =
+    enum_table<CurveQuantity>({{"none", CurveQuantity::none},
+                               {"torque", CurveQuantity::torque},
+                               {"angle", CurveQuantity::angle},
+                               {"torque-over-angle", CurveQuantity::torque_over_angle},
+                               {"other", CurveQuantity::other}});
+
+/// One type of channel by its number.
+struct CurveType {
+  std::uint16_t number = 0;
+  CurveQuantity is = CurveQuantity::other;
+  Text unit = {};  ///< "torque": that of the event; may be empty
+};
+
+/// The course of a result: binary32 numbers, the high word first, of up to so many channels.
+struct CurveSpec {
+  List<CurveChannel> channels = {};  ///< the first one is channel 1
+  List<CurveType> types = {};
+  Text sampling = {};            ///< parameter of the event block: milliseconds between two samples
+  std::uint16_t most = 0;        ///< samples of a channel
+  std::uint16_t steps = 0;       ///< pairs of a step's type and the sample where it begins
+  std::uint16_t first_step = 0;  ///< register of the event block, from 0
+  List<Label> step_types = {};   ///< 0: no step
+};
+
 /// What of a preset decides whether a result is good.
 enum class SettingKind : std::uint8_t {
   target_torque,
@@ -163,12 +225,22 @@ struct EventSetting {
   Text parameter;  ///< with {n} in place of the preset's number
 };
 
+/// A longer form of the event block, which some tools of a product have. What stands behind the
+/// usual registers is known by the length alone.
+struct EventForm {
+  std::uint16_t count = 0;     ///< registers in all
+  Text parameters;             ///< pattern of the names of what stands there; read by no other way
+  unsigned firmware_from = 0;  ///< such a tool is asked for all of them; 0: it is only understood
+};
+
 /// Results and what else happens: how it is learned of, and the registers that tell of it.
 struct EventSpec {
   EventModel model = EventModel::push;
   std::optional<Arming> arm = std::nullopt;  ///< of `push`; empty: frames come without
   std::uint8_t function = 0;                 ///< 3 or 4
-  std::uint16_t first = 0;                   ///< first register of the block
+  /// First register of the block; empty: it is not known, so that the block is only ever pushed,
+  /// and `fields` say what is in it.
+  std::optional<std::uint16_t> first = std::nullopt;
   std::uint16_t count = 0;  ///< registers in the block; a frame has 2 × count data bytes
   /// Parameter that counts events up. Stands in the block; may be empty for a `flag`.
   Text number;
@@ -180,6 +252,23 @@ struct EventSpec {
   std::optional<Duration> interval = std::nullopt;  ///< between two polls; empty: as usual
   Text preset = {};  ///< parameter of the block: which preset a result was made with; may be empty
   List<EventSetting> settings = {};  ///< of a preset, to be kept with its results
+  List<EventForm> longer = {};
+  List<EventFrame> frames = {};  ///< beside the answer to a read of the block
+  /// Parameters of the block that tell one event from another, beside its number; none: all of it.
+  List<Text> identity = {};
+  Text torque_unit = {};  ///< parameter of the block whose label is the unit of its torques
+  std::optional<CurveSpec> curves = std::nullopt;
+  /// Where the block has no known place: its parameters, whose registers count from its first one.
+  List<Parameter> fields = {};
+  /// How the place of the block can be found on a tool; empty: it is not known how.
+  std::optional<BlockSearch> search = std::nullopt;
+
+  /// Whether a block of so many registers is one of its forms.
+  [[nodiscard]] bool has_form(std::size_t registers) const;
+  /// Of the form that a tool with this firmware is asked for.
+  [[nodiscard]] std::uint16_t count_for(unsigned firmware) const;
+  /// The form whose own part this is; null: none's.
+  [[nodiscard]] const EventForm* form_of(const Parameter& parameter) const;
 };
 
 /// The name of a setting's parameter for one preset.
@@ -330,6 +419,14 @@ struct SimulationSpec {
   List<Area> absent = {};  ///< registers that answer exception 02
 };
 
+/// Which registers may be written.
+enum class Writes : std::uint8_t {
+  any,     ///< also those that the profile does not know, where the user insists
+  listed,  ///< only those of its writable parameters and of its actions
+};
+inline constexpr auto writes_words =
+    enum_table<Writes>({{"any", Writes::any}, {"listed", Writes::listed}});
+
 /// A register that has to hold a value before others can be written. It is put back afterwards.
 struct UnlockSpec {
   Text parameter = {};
@@ -360,6 +457,10 @@ class Profile {
   Text alarm_reset = {};    ///< action that resets an alarm; empty: none does
   List<Text> watched = {};  ///< values that `watch` polls unless others are named
   std::optional<UnlockSpec> unlock = std::nullopt;
+  Writes writes = Writes::any;
+  Text torque_unit_from = {};  ///< parameter whose labels are units of torque; may be empty
+  std::optional<DiscoverySpec> discovery = std::nullopt;  ///< how such tools are found
+  std::optional<LearnSpec> learn = std::nullopt;          ///< what a tool can show itself
 
   /// The parameter meant by a name, a number behind the numbered prefix ("p242") or a raw register
   /// ("@holding:2", "@input:3204/i16"). Errors: `unknown_name` with a suggestion; those
@@ -394,6 +495,14 @@ class Profile {
   /// named or numbered.
   [[nodiscard]] bool writable(modbus::RegisterTable table, modbus::RegisterAddress address) const;
 
+  /// Whether the profile allows a write to these registers at all, whatever the user says. Error
+  /// `read_only` where only listed registers may be written (`writes`), and one of these is none.
+  [[nodiscard]] Result<void> may_write(modbus::RegisterTable table, modbus::RegisterAddress first,
+                                       std::size_t count) const;
+
+  /// Whether it has parameters that are written alone.
+  [[nodiscard]] bool has_guarded() const;
+
   /// Whether a write to this parameter is a command to the motor of `run`.
   [[nodiscard]] bool commands_motion(const Parameter& parameter) const {
     return run && run->is_command(parameter.name);
@@ -408,9 +517,9 @@ class Profile {
   };
   [[nodiscard]] std::optional<LimitRegisters> limit_registers(const Parameter& parameter) const;
 
-  /// This parameter, marked as a secret where one of its registers is part of one: a secret is one
-  /// by whatever name or number it is asked for.
-  [[nodiscard]] Parameter with_secrecy(Parameter parameter) const;
+  /// This parameter, marked as a secret, and as guarded, where one of its registers is part of one
+  /// that is: by whatever name or number it is asked for.
+  [[nodiscard]] Parameter marked(Parameter parameter) const;
 };
 
 /// Whether the product sends frames that nothing asked for.
@@ -420,6 +529,7 @@ bool sends_unasked(const Profile& profile);
 enum class Judgement : std::uint8_t {
   fits,           ///< nothing contradicts the profile
   other_product,  ///< the tool is another product of the same maker and generation
+  earlier,        ///< its firmware has other registers
   later,          ///< its firmware has other registers
   unknown,        ///< it is no product that the profile knows
 };

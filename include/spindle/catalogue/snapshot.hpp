@@ -44,6 +44,7 @@ struct SnapshotIdentity {
   std::string serial = {};
   std::optional<unsigned> firmware = std::nullopt;
   Bytes raw = {};
+  std::string version = {};  ///< of the firmware, "4.0.2"; empty: the product does not say it
 };
 
 /// The stored parameters of one tool at one moment: a backup in memory.
@@ -160,7 +161,8 @@ struct SkippedEntry {
 
 /// What a restore will do. With findings nothing must be written.
 struct RestorePlan {
-  std::vector<PlannedWrite> writes = {};  ///< in the order of the catalogue
+  /// In the order of the catalogue, what is guarded before all others.
+  std::vector<PlannedWrite> writes = {};
   std::vector<SkippedEntry> skipped = {};
   /// Values outside limits, limits that are not known, and units that do not go together.
   std::vector<Error> findings = {};

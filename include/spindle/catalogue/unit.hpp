@@ -20,4 +20,7 @@ struct Converted {
 /// `unit` has no others.
 Result<Converted> convert_typed(std::string_view text, std::string_view unit);
 
+/// Whether this is a unit of torque that is known.
+bool is_torque(std::string_view unit);
+
 }  // namespace spindle::catalogue

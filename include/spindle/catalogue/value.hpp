@@ -69,6 +69,9 @@ std::optional<std::int64_t> power_of(const Value& value);
 /// is none, `out_of_range` when it does not fit the encoding.
 Result<Registers> encode(const Parameter& parameter, const Value& value, RegisterView present = {});
 
+/// The value as people read it; of a secret only that it is one.
+std::string shown_of(const Parameter& parameter, const Value& value);
+
 /// What a user typed: a number ("2.71", "0x1F" where the scale is 1), a label of the enumeration,
 /// names of bits joined by '+' or ',' (ASCII case ignored), a text, or elements joined by ','. A
 /// number between two steps becomes the nearest one, which Value::typed tells. Checked against

@@ -28,6 +28,7 @@ struct World {
   files::ShippedProfiles shipped = {};  ///< the profiles of the program
   commands::Companions companions = {};
   commands::Supervision supervision = {};
+  link::Network network = {};  ///< where tools are looked for; may be empty
 };
 
 /// The whole program: parses the arguments (without the program's name), runs one command, and

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,9 +34,10 @@ struct ListOptions {
 Result<Outcome> list(const ListOptions& options, Context& context);
 
 struct GetOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   std::vector<std::string> names;
   device::Limits limits = device::Limits::skip;
+  Secrets secrets = Secrets::leave_out;
   std::size_t jobs = usual_jobs;
 };
 Result<Outcome> get(const GetOptions& options, Context& context);
@@ -48,19 +50,27 @@ enum class Storing : std::uint8_t { no, yes };
 /// Whether registers may be written that the profile does not say can be.
 enum class RawWrites : std::uint8_t { refuse, ask };
 
+/// What is taken back: which tool it was, and what it has to hold still.
+struct Undoing {
+  std::string serial = {};                       ///< empty: not known
+  std::map<std::string, std::string> left = {};  ///< by name: what the change left, as recorded
+};
+
 struct SetOptions {
-  std::string target;                    ///< or a group
-  std::vector<std::string> assignments;  ///< NAME=VALUE
+  std::vector<std::string> targets;  ///< or groups
+  std::vector<std::string> assignments;  ///< NAME=VALUE, NAME+=STEP; NAME may be a pattern
+  std::string file = {};                 ///< with more of them, a line each; "-": standard input
   Execution execution = Execution::real;
   Storing storing = Storing::no;
   Addressing addressing = Addressing::unicast;
   RawWrites raw = RawWrites::refuse;
   std::size_t jobs = usual_jobs;
+  std::optional<Undoing> undoing = std::nullopt;  ///< of `undo`, which always asks
 };
 Result<Outcome> set(const SetOptions& options, Context& context);
 
 struct DoOptions {
-  std::string target;                ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   std::vector<std::string> actions;  ///< ACTION[=VALUE]; none: list them
   Acceptance acceptance = Acceptance::verified_only;
   Addressing addressing = Addressing::unicast;
@@ -69,7 +79,7 @@ struct DoOptions {
 Result<Outcome> perform(const DoOptions& options, Context& context);
 
 struct PingOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   unsigned count = 4;
   Duration interval = std::chrono::seconds(1);
   std::size_t jobs = usual_jobs;
@@ -86,6 +96,31 @@ struct ScanOptions {
 Result<Outcome> scan(const ScanOptions& options, Context& context);
 /// Which registers of a tool can be read. Requires `registers`.
 Result<Outcome> scan_registers(const ScanOptions& options, Context& context);
+
+/// Whether what is found is added to the tools file.
+enum class WriteTools : std::uint8_t { no, yes };
+
+struct DiscoverOptions {
+  std::string subnet = {};                         ///< empty: tools are asked as a group
+  std::vector<std::string> interfaces = {};        ///< names or addresses; none: all that can
+  Duration duration = std::chrono::seconds(3);     ///< of listening
+  std::vector<std::uint16_t> ports = {5000, 502};  ///< of a subnet's addresses
+  std::vector<modbus::UnitId> units = {};          ///< behind each port; none: as a tool is asked
+  unsigned rate = 50;                              ///< connections begun in a second
+  WriteTools write = WriteTools::no;
+};
+/// Which tools are in the network: those that answer to a group, or at the addresses of a subnet.
+Result<Outcome> discover(const DiscoverOptions& options, Context& context);
+
+struct LearnOptions {
+  std::string target;
+  std::string what;       ///< an action of the profile's section `learn`
+  std::string file = {};  ///< of the profile that is written; empty: none
+  unsigned changes = 3;   ///< on the tool, that have to be followed
+  Duration idle_timeout = std::chrono::minutes(2);
+};
+/// Which register an action has, by what the user does on the tool. Reads only.
+Result<Outcome> learn(const LearnOptions& options, Context& context);
 
 /// Whether other programs than spindle can ask, too.
 struct GatewayOptions {
@@ -199,7 +234,7 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context);
 enum class AlarmReset : std::uint8_t { no, yes };
 
 struct AlarmsOptions {
-  std::string target;  ///< or a group
+  std::vector<std::string> targets;  ///< or groups
   AlarmReset reset = AlarmReset::no;
   Acceptance acceptance = Acceptance::verified_only;
   std::size_t jobs = usual_jobs;
@@ -239,11 +274,37 @@ struct ResultsOptions {
   Told told = Told::results;
   Following following = Following::no;
   std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
-  std::string qdas = {};  ///< folder for files in the format of Q-DAS; empty: none
+  std::string qdas = {};   ///< folder for files in the format of Q-DAS; empty: none
+  std::string curve = {};  ///< SERIAL/EPOCH/NUMBER of the result whose curve is wanted; empty: none
   Overwrite overwrite = Overwrite::refuse;
 };
 /// What was stored.
 Result<Outcome> results(const ResultsOptions& options, Context& context);
+
+struct LogOptions {
+  std::vector<std::string> arguments = {};          ///< [TARGET...] [NAME|PATTERN...]
+  std::string since = {};                           ///< as typed; see parse_time()
+  std::optional<std::size_t> count = std::nullopt;  ///< the newest so many
+};
+/// What was changed, by whom, and how it ended: the record of changes.
+Result<Outcome> log(const LogOptions& options, Context& context);
+
+struct UndoOptions {
+  std::string id = {};  ///< of a change, or of all changes of one command; empty: the last one
+  Execution execution = Execution::real;
+};
+/// Writes back what a command found, if the tool still holds what it left. Plans, asks, verifies.
+Result<Outcome> undo(const UndoOptions& options, Context& context);
+
+/// Whether the default target is given up.
+enum class Forgetting : std::uint8_t { no, yes };
+
+struct UseOptions {
+  std::string target = {};  ///< that is meant from now on where none is named; empty: show it
+  Forgetting forget = Forgetting::no;
+};
+/// The default target.
+Result<Outcome> use(const UseOptions& options, Context& context);
 
 struct StoreOptions {
   std::string store = {};  ///< empty: the user's own
@@ -304,7 +365,7 @@ enum class ModelCheck : std::uint8_t { strict, off };
 enum class OnFailure : std::uint8_t { roll_back, leave };
 
 struct RestoreOptions {
-  std::string target;  ///< with a folder also a group
+  std::vector<std::string> targets;  ///< with a folder several, and groups
   std::string file;    ///< not with a folder
   std::string folder;  ///< each tool is restored from its backup in it; empty: from `file`
   std::vector<std::string> patterns;
@@ -335,6 +396,33 @@ std::vector<std::string> simulate_options(const catalogue::Profile& profile);
 Result<Outcome> tools(Context& context);
 /// Every fault of the tools file; context.tools needs no more than its path.
 Result<Outcome> check_tools(Context& context);
+
+/// Whether a tool that is added is asked who it is.
+enum class Asking : std::uint8_t { ask, offline };
+
+struct ToolAddOptions {
+  std::string name;
+  std::string url;
+  std::string torque_unit = {};  ///< empty: unknown
+  Asking asking = Asking::ask;
+  Execution execution = Execution::real;
+};
+/// Adds a tool to the tools file, which is made where there is none; context.tools needs no more
+/// than its path.
+Result<Outcome> add_tool(const ToolAddOptions& options, Context& context);
+
+struct ToolsInitOptions {
+  Execution execution = Execution::real;
+};
+/// Writes a tools file to begin with, and never over one.
+Result<Outcome> init_tools(const ToolsInitOptions& options, Context& context);
+
+struct ToolsTestOptions {
+  std::vector<std::string> targets;  ///< empty: all of the tools file
+  std::size_t jobs = usual_jobs;
+};
+/// Asks every tool who it is, and compares that with the tools file.
+Result<Outcome> test_tools(const ToolsTestOptions& options, Context& context);
 
 struct ProfileNameOptions {
   std::string profile;  ///< id or file

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "spindle/commands/companions.hpp"
 #include "spindle/commands/supervision.hpp"
@@ -28,6 +30,9 @@ enum class Consent : std::uint8_t {
 /// Whether every frame stands on stderr (--verbose), which leaves no room for progress.
 enum class Frames : std::uint8_t { hidden, shown };
 
+/// Whether the user named a tool, or the default one is meant: what changes it is asked about then.
+enum class TargetChoice : std::uint8_t { typed, by_default };
+
 /// The options that every command takes about what is said and asked.
 struct UserOptions {
   Consent consent = Consent::ask;
@@ -36,6 +41,9 @@ struct UserOptions {
   report::Format format = report::Format::table;  ///< what the renderer draws
   /// Not on a terminal that cannot draw over a line, and not where there is one for all tools.
   report::Showing progress = report::Showing::wanted;
+  TargetChoice choice = TargetChoice::typed;
+  /// Tools by their names that may be those of parameters or actions, too.
+  std::vector<std::string> doubtful = {};
 };
 
 /// The part of a context that is the same for all tools, beside what work on them needs.
@@ -46,6 +54,7 @@ struct Surroundings {
   const Companions& companions;
   UserOptions user = {};
   Supervision supervision = {};
+  std::string new_tools_file = {};  ///< where one is made if there is none; empty: nowhere is known
 };
 
 /// The part of a context that differs from one tool of a group to the next.

@@ -23,8 +23,10 @@ using OpenTransport = std::function<Result<std::unique_ptr<link::Transport>>(
 /// How frames are bounded there: by the medium, and by the product where it is simulated.
 modbus::Framing framing_of(const link::Endpoint& endpoint, const catalogue::LinkSpec& facts);
 
-/// The frames that an armed tool sends.
-link::SpontaneousShape shape_of(const catalogue::EventSpec& events);
+/// All that a product sends unasked: the answer to a read of the block, in each of its forms, and
+/// longer frames.
+std::vector<link::SpontaneousShape> shapes_of(const catalogue::EventSpec& events);
+link::SpontaneousShape shape_of(const catalogue::UnaskedFrame& frame);
 
 /// What the user may override of a profile's link facts.
 struct LinkOptions {
@@ -171,10 +173,14 @@ class Device {
   void set_retries(unsigned retries);
 
   /// Whether the registers are those of the profile. Asks FC 11h where the profile has an identity,
-  /// and refuses with `wrong_generation` a tool whose firmware is later, or unknown (also when FC
-  /// 11h is refused), and with `mismatch` another product: on such a tool only raw registers may be
-  /// read.
+  /// and refuses with `wrong_generation` a tool whose firmware is earlier, later, or unknown (also
+  /// when FC 11h is refused), and with `mismatch` another product: on such a tool only raw
+  /// registers may be read.
   Result<void> require_known_registers();
+
+  /// Reads what else the tool says of itself, where the profile says in which registers, into
+  /// identity(). What it refuses stays empty. Requires registers that are known.
+  Result<void> ask_more();
 
   /// What the tool said of itself when its registers were last checked: "serial 1021100042,
   /// firmware 2103"; empty before.
@@ -244,7 +250,8 @@ class Device {
   /// like an event frame. Requires a profile whose events are counted.
   Result<std::optional<Registers>> last_event();
 
-  /// The registers of the event block as they are now. Requires a profile with events.
+  /// The registers of the event block as they are now, in the longest form that a tool with this
+  /// firmware has, or in the usual one where that is refused. Requires a profile with events.
   Result<Registers> event_block();
 
   /// Whether the flag of events is set. Reading clears it, so it is asked once and never again:
@@ -280,6 +287,9 @@ class Device {
   std::vector<link::RegisterRange> limit_ranges(const std::vector<catalogue::Parameter>& parameters,
                                                 const link::RegisterImage* values);
   Result<void> send_write(const catalogue::Parameter& parameter, const Registers& registers);
+  [[nodiscard]] Error misfit(catalogue::Judgement judgement,
+                             const catalogue::Identity& identity) const;
+  Result<Registers> event_registers(std::uint16_t count);
   Result<void> write_registers(modbus::RegisterTable table, modbus::RegisterAddress first,
                                const Registers& registers);
   Result<Registers> registers_for(const catalogue::Parameter& parameter,
@@ -332,6 +342,7 @@ class Device {
   link::Client client_;
   Clock* calm_ = nullptr;  ///< empty: the session's
   bool registers_known_ = false;
+  bool has_usual_events_ = false;  ///< it refused the longer form of its event block
   std::string identity_text_ = {};
   std::optional<catalogue::Identity> identity_ = std::nullopt;
 };

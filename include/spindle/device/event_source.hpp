@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "spindle/base/clock.hpp"
 #include "spindle/device/device.hpp"
@@ -39,6 +40,16 @@ struct ToolEvent {
   Sequence sequence = Sequence::next;                  ///< what its number says
 };
 
+/// The curves of one event, told behind it, or of none that was seen.
+struct ToolCurve {
+  std::optional<Registers> block = std::nullopt;  ///< of its event; empty: it fits none
+  std::optional<std::uint16_t> number = std::nullopt;
+  std::vector<Bytes> channels = {};  ///< by channel, as they came; empty: none, or it did not come
+  WallTime time = {};                ///< when the last part of it came
+  bool is_whole = true;              ///< every channel is there that the event counts
+  std::string trouble = {};          ///< why a frame of samples could not be understood
+};
+
 /// Events that happened, or may have, and were not seen.
 struct EventGap {
   std::optional<std::uint32_t> missed;  ///< empty: unknown
@@ -68,7 +79,8 @@ enum class EventMode : std::uint8_t {
 /// nothing is told twice, as far as the tool lets it be known. One thread.
 class EventSource {
  public:
-  using Tell = std::function<void(const std::variant<ToolEvent, EventGap>&)>;
+  using News = std::variant<ToolEvent, EventGap, ToolCurve>;
+  using Tell = std::function<void(const News&)>;
 
   /// Null where there is nothing to learn: the profile has no events, or they are not wanted.
   /// `profile` and `clock` must outlive it.

@@ -38,6 +38,7 @@ struct Tool {
   std::optional<Duration> gap = std::nullopt;           ///< silence before a request; likewise
   std::optional<std::uint32_t> retries = std::nullopt;  ///< of reads; likewise
   std::optional<modbus::TransactionIds> transactions = std::nullopt;  ///< tcp; likewise
+  std::string serial = {};                          ///< whose it is; empty: not given
   std::vector<std::string> verified = {};           ///< actions that were checked on this tool
   std::map<std::int64_t, JointLimits> limits = {};  ///< of the joints, by preset
   SourceLocation url_at = {};
@@ -52,6 +53,9 @@ struct Tools {
   /// Why not all of the file is here; only of salvage_tools().
   std::optional<Error> left_out = std::nullopt;
   std::vector<Sink> sinks = {};
+  /// What is wrong with single entries, by how they are named on a command line: a tool, "@group";
+  /// a sink behind "sink ". Only of usable_tools().
+  std::map<std::string, Error> faults = {};
 };
 
 /// Whether a word may stand for tools of a tools file: it is a tool's name, or a group's.
@@ -60,6 +64,19 @@ bool may_name_tools(std::string_view word);
 /// The file has to be trusted. Strict: unknown and duplicate keys, unknown members of groups and
 /// torque units are `bad_file` with file:line:col.
 Result<Tools> load_tools(const std::string& path, const Disk& disk);
+
+/// The same, but a fault inside of the entry of a tool, group or sink is one of that entry only: it
+/// stands in `faults`, and the entry must not be used.
+Result<Tools> usable_tools(const std::string& path, const Disk& disk);
+
+/// The same of a text; `path` is for messages.
+Result<Tools> parse_tools(std::string_view text, const std::string& path);
+
+/// The tools, or the first fault of one of their entries.
+Result<Tools> without_faults(Tools tools);
+
+/// A sink of these tools, or the fault of its entry.
+Result<Sink> usable_sink(const Sink& sink, const Tools& tools);
 
 /// The same for who must not be sent away to mend the file first: what can be read of it, with
 /// names that are given twice as often as they are there.

@@ -8,17 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "spindle/link/register_range.hpp"
 #include "spindle/link/session.hpp"
 
 namespace spindle::link {
-
-/// A run of registers of one table. `count` >= 1.
-struct RegisterRange {
-  modbus::RegisterTable table = modbus::RegisterTable::holding;
-  std::uint16_t first = 0;
-  std::uint16_t count = 1;
-  friend auto operator<=>(const RegisterRange&, const RegisterRange&) = default;
-};
 
 /// Which registers may be read along for no other reason than to prove an answer.
 enum class Neighbours : std::uint8_t {

@@ -8,11 +8,17 @@
 
 namespace spindle::link {
 
-/// A frame that a server may send unasked: function code and byte count of a read response.
+/// A frame that a server may send unasked: function code and byte count of a read response. Byte
+/// count 0: a function that no request has, whose data begin with their own length in two bytes.
+/// Where that is not their length, it is still not to be passed over.
 struct SpontaneousShape {
   std::uint8_t function = 0;
   std::uint8_t byte_count = 0;
+  [[nodiscard]] bool is_long() const { return byte_count == 0; }
 };
+
+/// Whether the PDU has the shape.
+bool has_shape(const modbus::Pdu& pdu, const SpontaneousShape& shape);
 
 /// TCP: whose answers are taken.
 enum class Units : std::uint8_t {

@@ -50,7 +50,8 @@ struct Endpoint {
   friend bool operator==(const Endpoint&, const Endpoint&) = default;
 };
 
-/// Whether the text can only be meant as a URL: it begins with "WORD:".
+/// Whether the text can only be meant as a URL, or as an address or serial port without a scheme
+/// (see parse_endpoint()).
 bool looks_like_url(std::string_view text);
 
 /// Longest time for one answer, most repetitions of a read, and longest silence, which a URL, a
@@ -62,7 +63,9 @@ inline constexpr Duration longest_gap = std::chrono::seconds(1);
 /// Parses tcp://HOST[:PORT][?unit=N&transaction=],
 /// rtu:///PATH[?unit=&reserved=&baud=&parity=&stop=&gap=&rs485=&echo=],
 /// rtu+tcp://HOST:PORT[?unit=&reserved=&baud=&gap=&echo=] and sim:PROFILE[?unit=&baud=], each also
-/// with timeout= and retries=. IPv6 addresses stand in brackets. Error `bad_target` names the part
+/// with timeout= and retries=. IPv6 addresses stand in brackets. Without a scheme, an IPv4 address,
+/// an IPv6 address in brackets and HOST:PORT are tcp, and /dev/PATH, ttyUSB0, ttyACM0, ttyS0,
+/// ttyAMA0 and COM1 (the first port of the board: ttyS0) are rtu. Error `bad_target` names the part
 /// that is wrong: unknown scheme (with a suggestion), empty host, port outside 1…65535, unit
 /// outside 0…255 (0…247 on rtu and rtu+tcp, where the others are reserved: Modbus over Serial
 /// Line 1.02, section 2.2), unknown or repeated option. The `baud` of rtu+tcp is that of the line

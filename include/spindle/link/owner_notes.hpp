@@ -45,7 +45,7 @@ struct Unanswered {
 using OwnerNote = std::variant<Hello, Welcome, Manner, Haste, Unanswered>;
 
 /// The largest packet of either kind.
-inline constexpr std::size_t max_owner_packet = 4096;
+inline constexpr std::size_t max_owner_packet = modbus::max_long_adu_size;
 
 Bytes encode(const OwnerNote& note);
 

@@ -13,6 +13,7 @@
 #include "spindle/link/local_echo.hpp"
 #include "spindle/link/trace.hpp"
 #include "spindle/link/transport.hpp"
+#include "spindle/link/veil.hpp"
 
 namespace spindle::link {
 
@@ -159,6 +160,8 @@ class Session {
   [[nodiscard]] std::uint16_t fresh_word() const;
   /// For a profile that is only known after the first answer.
   void set_rules(DemuxRules rules);
+  /// These registers are secret: no trace and no message says what they hold.
+  void hide(std::vector<RegisterRange> secrets) { veil_.hide(std::move(secrets)); }
   [[nodiscard]] const SessionOptions& options() const { return options_; }
   [[nodiscard]] const SessionCounters& counters() const { return counters_; }
   [[nodiscard]] Clock& clock() const { return *clock_; }
@@ -244,6 +247,8 @@ class Session {
   void decide(Decision decision, std::string_view text) const;
   [[nodiscard]] std::string describe_address(const modbus::Adu& adu) const;
   [[nodiscard]] std::string describe_frame(const modbus::Adu& adu) const;
+  [[nodiscard]] std::string describe_buffer() const;
+  void show_received(ByteView bytes);
 
   std::unique_ptr<Transport> transport_;
   Clock* clock_;
@@ -251,10 +256,12 @@ class Session {
   std::optional<SessionOptions> asked_as_ = std::nullopt;
   SessionOptions options_;
   Trace trace_;
+  Veil veil_ = {};
   SessionCounters counters_ = {};
   Bytes buffer_ = {};
   Bytes came_ = {};  ///< since the last request, the beginning of it as it came
   std::deque<Spontaneous> queue_ = {};
+  std::size_t queued_bytes_ = 0;
   std::function<void(const Spontaneous&)> handle_spontaneous_ = {};
   std::uint16_t first_transaction_;  ///< of this connection
   std::uint16_t next_transaction_;

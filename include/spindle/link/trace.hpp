@@ -25,7 +25,8 @@ enum class Decision : std::uint8_t {
   retry,
   resync,
   doubt,
-  proof
+  proof,
+  memory
 };
 
 /// Hears all bytes and every decision of one connection, for --verbose and --trace. Bytes come as

@@ -40,17 +40,22 @@ using Deframing = std::variant<Deframed, NeedMore, Junk>;
 Bytes frame(Framing framing, const Adu& adu);
 
 /// Looks for one frame at the front of `buffered`; pure, so it may be called again with more bytes.
-/// TCP: an MBAP length outside 2…254, or a protocol identifier with a high byte, is Junk.
-/// RTU: scans for the first frame whose length (by function) is complete and whose CRC fits; bytes
-/// before it are `skipped`. Waiting for silence is never needed. With nothing found in more than
-/// 256 bytes of buffer, Junk.
+/// TCP: an MBAP length outside 2…254, or a protocol identifier with a high byte, is Junk. What a
+/// server sends may be longer, up to max_long_adu_size, where is_counted_by_words() and the length
+/// in front of its data is that of the data. RTU: scans for the first frame whose length (by
+/// function) is complete and whose CRC fits; bytes before it are `skipped`. Waiting for silence is
+/// never needed. With nothing found in more than 256 bytes of buffer, Junk.
 Deframing deframe(Framing framing, Role role, ByteView buffered);
 
 /// The RTU frame that these bytes are, whatever its function, for a receiver whose silence told it
 /// where frames begin and end. Empty when the CRC does not fit.
 std::optional<Adu> whole_rtu_frame(ByteView bytes);
 
-/// The largest frame: 260 bytes on TCP, 256 on RTU.
+/// The largest frame of the standard: 260 bytes on TCP, 256 on RTU.
 inline constexpr std::size_t max_adu_size = 260;
+
+/// The largest frame on TCP whose data begin with their own length: a little more than an event
+/// with two curves of 2000 samples each.
+inline constexpr std::size_t max_long_adu_size = 16'384;
 
 }  // namespace spindle::modbus

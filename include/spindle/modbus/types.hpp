@@ -52,6 +52,13 @@ constexpr bool is_read(std::uint8_t function) {
   }
 }
 
+/// Whether data of this function may begin with their own length in two bytes, big-endian, and be
+/// longer than a PDU of the standard: one of the user-defined functions 100 to 110 (1.1b3, section
+/// 5), as screwdrivers send curves.
+constexpr bool is_counted_by_words(std::uint8_t function) {
+  return function >= 100 && function <= 110;
+}
+
 /// Set in the function code of an exception response (1.1b3, section 7).
 inline constexpr std::uint8_t exception_bit = 0x80;
 

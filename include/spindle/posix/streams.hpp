@@ -52,6 +52,10 @@ bool err_is_journal();
 
 /// Cells of a row of the terminal behind standard error; 0 when it is none, or does not say.
 std::size_t err_columns();
+/// Rows of the same terminal; 0 likewise.
+std::size_t err_rows();
+/// Cells of a row of the terminal behind standard output; 0 likewise.
+std::size_t out_columns();
 
 /// The standard streams.
 enum class Std : std::uint8_t { in, out, err };
@@ -69,6 +73,8 @@ Streams standard_streams(const Clock& clock, const Interrupt& interrupt) {
           .out_is_open = out_is_open,
           .err_is_ready = err_is_ready,
           .err_columns = err_columns,
+          .err_rows = err_rows,
+          .out_columns = out_columns,
           .out_ends_within_line = out_ends_within_line,
           .out_for = write_out_for,
           .err_is_journal = err_is_journal()};

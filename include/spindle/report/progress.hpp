@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spindle/base/clock.hpp"
+#include "spindle/report/screen_lines.hpp"
 #include "spindle/report/streams.hpp"
 
 namespace spindle::report {
@@ -24,11 +27,19 @@ struct Step {
   std::size_t at_once = 1;  ///< how many are under way side by side: they also end together
 };
 
-/// The one line on a terminal that says how far long work has come. Says nothing elsewhere and
-/// where it is not wanted, is never wider than the terminal, and never waits for a terminal that
-/// does not take it. Several threads may call it.
+/// How much of a terminal there is.
+struct Screen {
+  std::size_t columns = 0;
+  std::size_t rows = 0;
+
+  friend bool operator==(const Screen&, const Screen&) = default;
+};
+
+/// The last line of a terminal, or the last ones, that say how far long work has come. Says nothing
+/// elsewhere and where it is not wanted, is never wider than the terminal, and never waits for a
+/// terminal that does not take it. Several threads may call it.
 ///
-/// As long as it lives, whatever is written to the streams takes the line away first. It must be
+/// As long as it lives, whatever is written to the streams takes the lines away first. It must be
 /// made before threads write to them, and end after they did.
 class Progress {
  public:
@@ -45,10 +56,18 @@ class Progress {
 
   /// A state, in words: at once.
   void show(std::string_view text);
+  /// Several lines, at once, each at most screen().columns wide.
+  void show(std::span<const ScreenLine> lines);
   /// The same state a little later, at most ten times a second.
   void refresh(std::string_view text);
 
   void clear();
+
+  /// Whether there is a terminal that shows it.
+  [[nodiscard]] bool is_shown() const { return is_shown_; }
+  /// Cells that may be drawn on, so that a key's echo still fits, and rows; usual ones where the
+  /// terminal does not say.
+  [[nodiscard]] Screen screen() const;
 
  private:
   /// One piece of counted work.
@@ -64,7 +83,8 @@ class Progress {
   [[nodiscard]] bool is_due() const;
   void draw(std::string_view text);
   void wipe();
-  void put(std::string_view text);
+  void put(std::string_view text, std::span<const ScreenLine> lines);
+  [[nodiscard]] std::string wiping() const;
 
   Streams* streams_;
   const Clock* clock_;
@@ -75,7 +95,7 @@ class Progress {
   std::mutex mutex_ = {};
   Work work_ = {};
   TimePoint drawn_at_ = {};
-  bool is_drawn_ = false;
+  std::vector<std::size_t> drawn_ = {};  ///< widths of the lines that stand there
 };
 
 }  // namespace spindle::report

@@ -62,6 +62,8 @@ std::string to_json(const Record& record);
 /// The record that to_json() made this of; its time is told by who kept it. Empty for what it makes
 /// of no record.
 std::optional<Record> record_of(std::string_view json, WallTime time);
+/// The same of a line that tells its time itself: it is the field `time`, a text.
+std::optional<Record> record_of(std::string_view json);
 
 /// Plain text of a cell, as in CSV: null is empty, words are separated by single spaces.
 std::string to_text(const Cell& cell);

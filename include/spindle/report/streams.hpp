@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spindle/base/clock.hpp"
 #include "spindle/base/error.hpp"
@@ -31,6 +32,10 @@ struct Streams {
   std::function<bool()> err_is_ready = {};
   /// Cells of a row of the terminal behind err(); 0, or an empty function: not known.
   std::function<std::size_t()> err_columns = {};
+  /// Rows of the same terminal; 0, or an empty function: not known.
+  std::function<std::size_t()> err_rows = {};
+  /// Cells of a row of the terminal behind out(); 0, or an empty function: not known.
+  std::function<std::size_t()> out_columns = {};
   /// Whether out() writes to a file that ends within a line; may be empty, which means no.
   std::function<bool()> out_ends_within_line = {};
   /// Writes what is taken of the text within this time, and returns how many bytes; fails as out()
@@ -39,6 +44,8 @@ struct Streams {
   /// Whether the system's journal reads err(), which wants to know how important a line is.
   bool err_is_journal = false;
   Color color = Color::off;
+  /// What the user typed behind the program's name: an error may say how to mend it.
+  std::vector<std::string> typed = {};
 };
 
 }  // namespace spindle::report

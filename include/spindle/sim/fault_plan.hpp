@@ -44,6 +44,8 @@ enum class FaultKind : std::uint8_t {
   ignore_write,     ///< a write is echoed, but nothing is stored
   store_other,      ///< a write is echoed, but value + N (default 1) is stored
   reset_neighbour,  ///< a write is stored, and the register N (default 1) behind it becomes 0
+  zero_date,        ///< an event has no date
+  not_a_number,     ///< the torque of an event, and the present one behind it, is no number
 };
 
 /// One fault: kind, argument, and when. Counts answers of the whole server from 1; with neither
@@ -71,6 +73,7 @@ enum class FaultNeed : std::uint8_t {
   serial_line,  ///< RTU
   events,       ///< frames that the tool sends unasked
   screwdriver,  ///< a tool that an operator works with, see Abilities
+  dated,        ///< events that have a date, and torques that are floating-point
 };
 FaultNeed need_of(FaultKind kind);
 

@@ -65,6 +65,7 @@ class Peer {
     Ending ending = Ending::stay;
     Holding holding = Holding::none;
     bool begun = false;
+    Duration distance = std::chrono::milliseconds(1);  ///< from one piece to the next
   };
 
   void echo(ByteView bytes, TimePoint now);
@@ -91,6 +92,7 @@ class Peer {
   Bytes inbox_ = {};
   TimePoint last_byte_ = {};  ///< in the inbox
   std::deque<Message> outbox_ = {};
+  TimePoint pushes_in_order_from_ = {};
   TimePoint in_order_from_ = TimePoint::min();
   std::uint16_t push_transaction_ = 1;
   modbus::UnitId unit_ = {};

@@ -42,6 +42,9 @@ class Server {
     return true;
   }
 
+  /// The unit identifier of answers to this one; on a network a tool may have its own.
+  [[nodiscard]] virtual modbus::UnitId answering_unit(modbus::UnitId asked) const { return asked; }
+
   /// Silence that a server on a serial line wants before a query; it does not hear one that comes
   /// earlier. Zero on a network.
   [[nodiscard]] virtual Duration required_gap() const { return {}; }

@@ -27,9 +27,11 @@ struct DeviceOptions {
   std::optional<std::uint32_t> serial =
       std::nullopt;  ///< as printed, in every form of the identity
   std::optional<std::uint16_t> tool_model = std::nullopt;
+  std::optional<std::uint16_t> event_number =
+      std::nullopt;  ///< of the last event; empty: profile's
 
   /// Only those that concern the device: ignore_write, store_other, reset_neighbour. They count
-  /// accepted writes from 1.
+  /// accepted writes from 1; zero_date and not_a_number count events.
   FaultPlan faults = {};
   /// An operator who runs down a screw at this interval, beginning one interval after the first
   /// advance(); empty: no operator.
@@ -77,6 +79,7 @@ struct Abilities {
   bool identity = false;       ///< it answers what it is
   bool operated = false;       ///< an operator drives screws, and it may spoil what is written
   bool pushes = false;         ///< it sends frames unasked
+  bool dated = false;          ///< its events have a date, and torques that are floating-point
   bool configuration = false;  ///< it configures itself, and is busy with that
   bool alarms = false;
   bool warnings = false;

@@ -81,6 +81,10 @@ class Reader {
   /// In the order of the store, until `take` returns false.
   virtual Result<void> events(const Filter& filter,
                               const std::function<bool(const EventView&)>& take) = 0;
+  /// The curves of an event; empty: none are stored.
+  virtual Result<std::optional<Curve>> curve(RowId event) = 0;
+  /// All curves of events behind this one, until `take` returns false.
+  virtual Result<void> curves(RowId after, const std::function<bool(const Curve&)>& take) = 0;
   virtual Result<std::vector<Gap>> gaps(const Filter& filter) = 0;
   virtual Result<void> happenings(const Filter& filter,
                                   const std::function<bool(const Happening&)>& take) = 0;

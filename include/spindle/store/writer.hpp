@@ -28,13 +28,21 @@ struct NewGap {
   Gap gap = {};  ///< `epoch` is the writer's
 };
 
+/// The curves of an event that was handed over before: that of this number in the newest epoch of
+/// its tool. Where it is not stored, or has curves already, nothing is added (`known`).
+struct NewCurve {
+  RowId tool = 0;
+  std::uint16_t number = 0;
+  Curve curve = {};  ///< `event` is the writer's
+};
+
 /// The tool was listened to until then.
 struct Seen {
   RowId tool = 0;
   WallTime at = {};
 };
 
-using Entry = std::variant<NewEvent, NewGap, PresetSettings, Happening, Seen>;
+using Entry = std::variant<NewEvent, NewGap, PresetSettings, Happening, Seen, NewCurve>;
 
 /// What became of one entry.
 struct Stored {

@@ -53,6 +53,9 @@ class ChangeLog {
   [[nodiscard]] std::string begin(LoggedChange change);
   void end(const std::string& id, const LoggedChange& change);
 
+  /// What the ids of all its changes begin with, in front of a '-'; empty before the first one.
+  [[nodiscard]] const std::string& run() const { return run_; }
+
  private:
   void add(const LoggedChange& change, const std::string& id);
   Result<void> append(const std::string& line);
@@ -61,6 +64,7 @@ class ChangeLog {
   const Disk* disk_;
   const Clock* clock_;
   Warn warn_;
+  std::string run_ = {};
   unsigned begun_ = 0;
   bool folder_made_ = false;
   bool warned_ = false;

@@ -10,6 +10,8 @@
 
 namespace spindle::work {
 
+struct Identification;
+
 /// A target that was connected.
 struct OpenTool {
   Target target;
@@ -21,9 +23,13 @@ struct OpenTool {
 enum class Need : std::uint8_t {
   named_registers,  ///< that they are those of the profile
   raw_registers,    ///< nothing
+  raw_writes,       ///< nothing, unless the tool says that it is of a profile
+  raw_secrets,      ///< nothing, but a tool that says what it is keeps its secrets
+  stop,             ///< the same as of named registers, and nothing else is asked before it is sent
 };
 
-/// The target's profile, or an empty one where none is known before connecting.
+/// The target's profile, or an empty one where none is known before connecting. Error `bad_file`
+/// where the target has a fault.
 Result<catalogue::Profile> load_profile(const Target& target, const Environment& environment);
 
 /// Whether an operator works with a tool of sim:, so that there is something to watch.
@@ -42,9 +48,28 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 
 /// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
 /// other registers than the profile's (`wrong_generation`), or one that is another product
-/// (`mismatch`), is refused.
+/// (`mismatch`), is refused. For raw writes it is the same of a tool whose profile was named, or
+/// that can say over TCP what it is; another one is left as it is. For raw secrets a tool that says
+/// over TCP what it is goes on with the profile that fits, where that has secrets. A torque unit
+/// that the profile says where to read is read; error `mismatch` where the tools file says another
+/// one. A tool whose port and profile are not named is asked where it was last seen, and goes on
+/// there if it says the serial number that it had.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Environment& environment);
+
+/// Keeps in the user's cache where a tool over TCP was that said this of itself, unless its profile
+/// is from the tools file. What cannot be kept is told to those who ask for every decision only.
+void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
+                   const std::string& profile, const Environment& environment);
+
+/// What was found, with what the tool says of itself in registers where the profile that fits says
+/// in which; the tool goes on with that profile then.
+Result<void> ask_more(OpenTool& tool, Identification& found);
+
+/// Reads into the target in which unit the torques of this tool are, where its profile says which
+/// parameter tells; empty where that has a number which is no unit. Where it cannot be read the
+/// target stays as it is.
+Result<void> read_torque_unit(OpenTool& tool);
 
 /// Unit 0 on a serial line is every unit, and none answers: refuses it where one tool is meant,
 /// and one tool where everybody is.
@@ -69,7 +94,8 @@ auto open_prepared(const Target& target, Need need, const Environment& environme
   using Attempt = std::invoke_result_t<Prepare, const catalogue::Profile&>;
   auto profile = load_profile(target, environment);
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  const bool known = !target.profile.empty() || need == Need::raw_registers;
+  const bool known =
+      need != Need::raw_secrets && (!target.profile.empty() || need == Need::raw_registers);
   std::optional<Attempt> prepared;
   if (known) prepared = prepare(*profile);
   if (prepared && !*prepared) return tl::unexpected(std::move(prepared->error()));

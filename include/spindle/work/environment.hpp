@@ -10,6 +10,7 @@
 #include "spindle/device/device.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
+#include "spindle/link/datagrams.hpp"
 #include "spindle/link/doors.hpp"
 
 namespace spindle::work {
@@ -58,6 +59,9 @@ struct Environment {
   const ShowFrames& show_frames;  ///< may be empty
   CommonOptions common = {};
   link::MakeDoors make_doors = {};  ///< lets other programs ask; empty: none can
+  std::string cache_folder = {};    ///< spindle's own; empty: nothing is remembered there
+  link::Network network = {};       ///< where tools are looked for; may be empty
+  std::string target_variable = {};  ///< $SPINDLE_TARGET; empty: it is not set
 };
 
 /// The same environment with a clock and lines that signals do not end.

@@ -59,6 +59,7 @@ enum class Completeness : std::uint8_t {
 
 /// One fastening. Torque in ten-thousandths of the tool's unit, angle in degrees.
 struct StudiedResult {
+  store::RowId id = 0;
   WallTime at = {};
   PerQuantity<std::optional<std::int64_t>> values = {};
   /// Between results of two stretches something is missing, or the tool began to count anew.

@@ -21,6 +21,10 @@ struct Target {
   std::vector<std::string> verified = {};
   Addressing addressing = Addressing::unicast;
   link::Reopening reopening = link::Reopening::never;
+  /// What is wrong with its entry of the tools file: it must not be used, see fault_of(). Empty:
+  /// nothing.
+  std::string fault = {};
+  std::string check = {};  ///< the command that shows all faults of that file
 
   friend bool operator==(const Target&, const Target&) = default;
 };
@@ -28,6 +32,9 @@ struct Target {
 /// The error as one of this tool, with its address beside its name, unless it is one of a tool
 /// already.
 Error with_target(Error error, const Target& target);
+
+/// Why a target cannot be used that has a fault.
+Error fault_of(const Target& target);
 
 /// The same target, whose connection is opened once more where the tool closes it: for commands
 /// that ask for one thing and end, while the context lives.
@@ -39,7 +46,8 @@ Target reopening(Target target);
 std::vector<Target> naming_gateways(std::vector<Target> targets, const Environment& environment);
 
 /// Name, @group or URL to targets, each once. Errors `bad_target` and `unknown_name` with a
-/// suggestion.
+/// suggestion. A tool whose entry has a fault is one that cannot be opened, so that the others can
+/// go on; where there are no others, the fault is the error.
 Result<std::vector<Target>> resolve_targets(const std::vector<std::string>& texts,
                                             const Environment& environment);
 
@@ -49,7 +57,8 @@ struct Resolution {
   std::vector<Error> faults = {};
 };
 
-/// For a command that must not leave out a tool because the name of another is wrong.
+/// For a command that must not leave out a tool because the name of another is wrong. No target has
+/// a fault.
 Resolution resolve_each_target(const std::vector<std::string>& texts,
                                const Environment& environment);
 
@@ -64,6 +73,10 @@ struct OneTool {
 /// The same for a command that takes one tool; a group of several is an error.
 Result<Target> resolve_target(const std::string& text, const Environment& environment,
                               const OneTool& words = {});
+
+/// Takes those out that have a fault, and returns their errors: for a command that watches them all
+/// at once.
+std::vector<Error> take_out_faulty(std::vector<Target>& targets);
 
 /// Names the line on which the target's unit is one of several, as only one connection at a time
 /// can have it: the port behind its links, or the device server. Empty for a tool with a line of

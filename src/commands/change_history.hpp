@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "spindle/commands/context.hpp"
+
+namespace spindle::commands {
+
+/// One change that a command made, or tried to make: what was recorded of it when it was begun,
+/// and how it ended.
+struct PastChange {
+  std::string id;
+  std::string time;
+  std::string user;
+  std::string command;
+  std::string target;
+  std::string serial;  ///< empty: not known
+  std::string name;
+  report::Cell register_address;
+  report::Cell before;
+  report::Cell after;
+  std::string result;  ///< `begun`: the program ended before it was known
+};
+
+struct ChangeHistory {
+  std::vector<PastChange> changes = {};  ///< in the order in which they were begun
+  std::size_t unreadable = 0;            ///< lines that are no record of a change
+};
+
+/// The record of changes of this user. Where there is none, nothing was changed.
+Result<ChangeHistory> read_changes(const Context& context);
+
+}  // namespace spindle::commands
