@@ -433,11 +433,28 @@ class Completer {
     return seen && *seen ? (*seen)->profile : std::string();
   }
 
+  [[nodiscard]] bool is_target(const std::string& argument) const {
+    const auto& tools = nameable_->tools.tools;
+    return argument.starts_with('@') || link::looks_like_url(argument) ||
+           std::any_of(tools.begin(), tools.end(),
+                       [&](const files::Tool& tool) { return tool.name == argument; });
+  }
+
+  /// What was typed, or what is meant where no tool was.
+  [[nodiscard]] std::vector<std::string> targets() const {
+    std::vector<std::string> named;
+    for (const std::string& argument : typed_.arguments) {
+      if (is_target(argument)) named.push_back(argument);
+    }
+    if (named.empty() && !nameable_->usual_target.empty()) return {nameable_->usual_target};
+    return named;
+  }
+
   /// By --profile, else that of the first tool which has one.
   [[nodiscard]] std::optional<Profile> profile_of_target() const {
     std::string name = typed_.profile;
-    for (const std::string& argument : typed_.arguments) {
-      for (const std::string& member : members_of(argument)) {
+    for (const std::string& target : targets()) {
+      for (const std::string& member : members_of(target)) {
         if (name.empty()) name = profile_of(member);
       }
     }

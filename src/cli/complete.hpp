@@ -30,6 +30,7 @@ struct CompletionSources {
   const files::Tools& tools;
   const files::ProfileStore& profiles;
   const work::ToolMemory* memory = nullptr;  ///< may be null
+  std::string usual_target = {};             ///< where none is typed; empty: there is none
 };
 
 /// What the last of the words, which is still being typed, can become. The program's name is left

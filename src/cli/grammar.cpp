@@ -1227,8 +1227,7 @@ void bind_simulated_line(Binder& bind, commands::SimulateOptions& options) {
               "serial tools: rate of the line");
   bind.flag("--no-gap", options.gaps, sim::LineModel::Gaps::ignored,
             "serial tools: also hear clients that keep too short a silence");
-  bind.repeatable("--fault", "FAULT", options.faults,
-                  "make the tool misbehave, repeatable");
+  bind.repeatable("--fault", "FAULT", options.faults, "make the tool misbehave, repeatable");
   bind.option("--busy", "DURATION", options.tool.busy, to_busy,
               "how long Configuration takes (default 200ms, at most 1s)")
       ->group(of_command_word);
@@ -1836,13 +1835,13 @@ bool names_tools(const CLI::App& command, Invocation::ToolsFile use) {
   bool takes_targets = false;
   bool has_words = false;
   for (const CLI::Option* known : command.get_options()) {
-    if (!known->get_positional()) continue;
-    takes_words = true;
-    has_words = has_words || !known->results().empty();
-    const std::string name = known->get_name(true);
-    if (std::find(targets.begin(), targets.end(), name) == targets.end()) continue;
-    takes_targets = true;
+    const bool is_argument = known->get_positional();
     const auto& words = known->results();
+    takes_words = takes_words || is_argument;
+    has_words = has_words || (is_argument && !words.empty());
+    const std::string kind = is_argument ? known->get_name(true) : known->get_type_name();
+    if (std::find(targets.begin(), targets.end(), kind) == targets.end()) continue;
+    takes_targets = takes_targets || is_argument;
     if (std::any_of(words.begin(), words.end(), files::may_name_tools)) return true;
   }
   const bool is_about_all = !has_words || !takes_targets;

@@ -11,6 +11,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/show_frames.hpp"
 #include "spindle/files/capture.hpp"
+#include "spindle/work/default_target.hpp"
 #include "spindle/work/tool_memory.hpp"
 #include "version.hpp"
 
@@ -127,27 +128,34 @@ Result<void> begin_capture(const std::string& path, const Disk& disk) {
   return begun;
 }
 
+/// What work on tools needs of the world. What it is given must outlive it.
+work::Environment environment_of(World& world, const Invocation& invocation,
+                                 const files::Tools& tools, const files::ProfileStore& profiles,
+                                 const std::string& state, const work::ShowFrames& show_frames) {
+  return {.clock = world.clock,
+          .interrupt = world.interrupt,
+          .open = world.open,
+          .uninterruptible = world.uninterruptible,
+          .disk = world.disk,
+          .state_folder = state,
+          .version = version,
+          .profiles = profiles,
+          .tools = tools,
+          .show_frames = show_frames,
+          .common = invocation.common,
+          .make_doors = world.make_doors,
+          .cache_folder = cache_folder(world),
+          .network = world.network,
+          .target_variable = variable(world, "SPINDLE_TARGET")};
+}
+
 Result<commands::Outcome> run_command(const Invocation& invocation, World& world,
                                       report::Renderer& renderer) {
   TRY_LET(const auto tools, find_tools(world, invocation));
   const files::ProfileStore profiles = profile_store(world);
   const std::string state = state_folder(world);
   const auto show_frames = commands::show_frames(world.io, world.clock, invocation.user.frames);
-  commands::Context context{{.clock = world.clock,
-                             .interrupt = world.interrupt,
-                             .open = world.open,
-                             .uninterruptible = world.uninterruptible,
-                             .disk = world.disk,
-                             .state_folder = state,
-                             .version = version,
-                             .profiles = profiles,
-                             .tools = tools,
-                             .show_frames = show_frames,
-                             .common = invocation.common,
-                             .make_doors = world.make_doors,
-                             .cache_folder = cache_folder(world),
-                             .network = world.network,
-                             .target_variable = variable(world, "SPINDLE_TARGET")},
+  commands::Context context{environment_of(world, invocation, tools, profiles, state, show_frames),
                             {.io = world.io,
                              .serve = world.serve,
                              .end_waits = world.end_waits,
@@ -176,12 +184,16 @@ int tell(const Error& error, World& world, report::Renderer& renderer) {
 int run_completion(const std::vector<std::string>& words, World& world) {
   auto typed = parse(words).value_or(Invocation());
   typed.tools_use = Invocation::ToolsFile::loaded;  // also where no word is typed yet
-  const auto tools = find_tools(world, typed);
-  const files::Tools none;
+  const auto tools = find_tools(world, typed).value_or(files::Tools());
   const files::ProfileStore profiles = profile_store(world);
   const work::ToolMemory memory(world.disk, cache_folder(world));
+  const std::string state = state_folder(world);
+  const work::ShowFrames show_nothing;
+  const auto usual =
+      work::default_target(environment_of(world, typed, tools, profiles, state, show_nothing));
   const Completion completion =
-      complete(words, describe_grammar(), {tools ? *tools : none, profiles, &memory});
+      complete(words, describe_grammar(),
+               {tools, profiles, &memory, usual && *usual ? (*usual)->text : std::string()});
   const auto written = world.io.out(to_text(completion));
   return exit_status(written ? ExitStatus::ok : written.error().status());
 }

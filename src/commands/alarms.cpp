@@ -110,14 +110,16 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
     AlarmReport report;
+    work::ChangeLog log = change_log("alarms", tool, context);
     auto done = show_alarms(plan.sources, tool, report, context);
-    if (done && plan.reset) done = reset(*plan.reset, tool, report, context);
+    if (done && plan.reset) done = reset(*plan.reset, tool, report, log, context);
     if (!done) return tl::unexpected(std::move(done.error()));
     const report::Cell present =
         report.is_known() ? count(report.was_present() ? 1 : 0) : report::Cell();
-    return tell(summary_of(present, report.outcome, sentence_of(report), tool.target.shown),
-                report.outcome, context)
-        .map([&] { return report; });
+    Summary summary = summary_of(present, report.outcome, sentence_of(report), tool.target.shown);
+    return tell(with_change(std::move(summary), log), report.outcome, context).map([&] {
+      return report;
+    });
   }
 
   [[nodiscard]] std::optional<Summary> summary(const AllDone& all) const override {
@@ -129,12 +131,11 @@ class Alarms final : public Verb<AlarmPlan, AlarmReport> {
  private:
   /// The notes about a group were told when it was asked about.
   Result<void> reset(const ActionRequest& request, OpenTool& tool, AlarmReport& report,
-                     Context& context) const {
+                     work::ChangeLog& log, Context& context) const {
     if (report.is_present() && report.resettable == catalogue::Resettable::no) {
       return tl::unexpected(not_resettable(report));
     }
     if (!is_group_) tell_notes(request, tool.target, context);
-    work::ChangeLog log = change_log("alarms", tool, context);
     const auto result = perform_recorded(request, tool, log, context);
     if (!result) return tl::unexpected(result.error());
     Listing listing(context, performed_columns());

@@ -57,7 +57,10 @@ Ended scan_network(const std::vector<link::NetworkInterface>& interfaces,
   std::size_t strange = 0;
   for (const auto& spec : work::discovery_specs(context.profiles)) {
     const auto scanned = work::scan_group(spec, interfaces, options.duration, context,
-                                          [&](const work::Heard& heard) { finds.add(heard); });
+                                          [&](const work::Heard& heard) {
+                                            ++ended.found;
+                                            finds.add(heard);
+                                          });
     if (!scanned) {
       ended.error = scanned.error();
       break;
@@ -69,7 +72,6 @@ Ended scan_network(const std::vector<link::NetworkInterface>& interfaces,
       context.renderer.note(fmt::format("{} of more tools left out: this may be a flood",
                                         counted(scanned->left_out, "answer")));
     }
-    ended.found += scanned->found;
     strange += scanned->strange;
   }
   std::vector<std::string> names;

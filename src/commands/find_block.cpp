@@ -129,13 +129,24 @@ class FindBlock final : public Verb<BlockSearch, Outcome> {
                    {"count", number(events.count)},
                    {"event_number", number(*result.number)},
                    {"profile", text}}};
-    std::string plain = text;
-    plain.pop_back();  // the line's end
-    TRY(context.renderer.line(record, plain));
+    TRY(tell_profile(record, text, context));
     context.renderer.note(
         fmt::format("save these lines as {}.yaml, and use it with --profile or "
                     "in the tools file",
                     seen_->id));
+    return {};
+  }
+
+  /// Lines that can be saved, for people; else the record.
+  Result<void> tell_profile(const report::Record& record, std::string_view text,
+                            Context& context) const {
+    if (!report::is_table(context.user.format)) {
+      return context.renderer.line(record, fmt::to_string(*seen_->event_block));
+    }
+    text.remove_suffix(1);  // the last line's end
+    for (const std::string_view line : split(text, '\n')) {
+      TRY(context.renderer.line({}, line));
+    }
     return {};
   }
 

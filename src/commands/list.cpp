@@ -81,16 +81,19 @@ Result<Subject> subject_of(const ListOptions& options, const Context& context) {
 }
 
 /// People who ask for nothing particular see once what is there several times.
-std::vector<report::Record> without_repeats(std::vector<report::Record> records,
-                                            const Subject& subject, const Context& context) {
-  if (!report::is_table(context.user.format) || !subject.patterns.empty()) return records;
-  FoldedList list = fold(std::move(records));
-  if (!list.folded.empty()) {
-    const std::string& one = list.folded.front();
-    context.renderer.note(fmt::format("told once: {}; '{}.*' lists one of them",
-                                      fmt::join(list.folded, ", "), one.substr(0, one.find('-'))));
+FoldedList without_repeats(std::vector<report::Record> records, const Subject& subject,
+                           const Context& context) {
+  if (!report::is_table(context.user.format) || !subject.patterns.empty()) {
+    return {.records = std::move(records)};
   }
-  return std::move(list.records);
+  return fold(std::move(records));
+}
+
+void tell_folded(const std::vector<std::string>& folded, const Context& context) {
+  if (folded.empty()) return;
+  const std::string& one = folded.front();
+  context.renderer.note(fmt::format("told once: {}; '{}.*' lists one of them",
+                                    fmt::join(folded, ", "), one.substr(0, one.find('-'))));
 }
 
 }  // namespace
@@ -113,10 +116,12 @@ Result<Outcome> list(const ListOptions& options, Context& context) {
     records.push_back(parameter_record(parameter, subject.target, context.clock));
     outcome.succeed();
   }
-  records = without_repeats(std::move(records), subject, context);
+  const FoldedList told = without_repeats(std::move(records), subject, context);
   Listing listing(context, columns);
-  for (const report::Record& record : records) listing.add(record);
-  return finish(listing, outcome);
+  for (const report::Record& record : told.records) listing.add(record);
+  TRY(listing.end());
+  tell_folded(told.folded, context);
+  return outcome;
 }
 
 }  // namespace spindle::commands

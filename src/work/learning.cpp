@@ -113,7 +113,7 @@ Result<LearnPlan> plan_learning(const std::string& name, const catalogue::Profil
     return tl::unexpected(std::move(error));
   }
   if (!profile.learn) {
-    error.message = fmt::format("profile {} says of nothing that a tool could show", profile.id);
+    error.message = fmt::format("profile {} names nothing that a tool can show", profile.id);
     return tl::unexpected(std::move(error));
   }
   std::vector<std::string> names;

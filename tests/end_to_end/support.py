@@ -315,6 +315,11 @@ class Finished:
                 told[-1] += " " + line.strip()
         return told
 
+    @property
+    def said(self):
+        """Standard error with each sentence on one line: where a line is broken depends on what stands in it."""
+        return re.sub(r"\n  +", " ", self.stderr)
+
     def records(self, kind=None):
         """All of standard output as JSON lines, or those of one type."""
         if self.stdout and not self.stdout.endswith("\n"):

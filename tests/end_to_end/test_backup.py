@@ -295,7 +295,7 @@ class HostileFileTest(BackupTest):
                 finished = support.run("restore", self.server.url, path, *PROFILE, "--yes")
                 self.assertEqual(finished.status, 3, (name, finished))
                 self.assertEqual(finished.stdout, "", name)
-                self.assertRegex(finished.stderr, r"\Aspindle: [^\n]*hostile\.yaml:\d+:\d+: [^\n]+\n\Z", name)
+                self.assertRegex(finished.said, r"\Aspindle: [^\n]*hostile\.yaml:\d+:\d+: [^\n]+\n\Z", name)
                 self.assertLess(finished.paced, 5, name)
                 if "asan" in support.binary():
                     continue  # the sanitizer maps terabytes

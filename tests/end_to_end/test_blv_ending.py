@@ -45,7 +45,7 @@ class EndingTest(MotorTest):
                 os.kill(started.pid, signal.SIGCONT)
                 finished = started.finish()
             self.assertEqual(finished.status, 1, finished)
-            self.assertIn("85h", finished.stderr)
+            self.assertIn("85h", finished.said)
             self.assertEqual(finished.records()[-1]["result"], "alarm", finished)
             self.assertIn("alarm", [event["kind"] for event in finished.records("event")])
             self.assert_stopped(bus, finished)
@@ -90,7 +90,7 @@ class EndingTest(MotorTest):
                     os.close(reading)
                     finished = started.finish()
                 self.assertEqual(finished.status, 1, finished)
-                self.assertIn("has no reader", finished.stderr)
+                self.assertIn("has no reader", finished.said)
                 self.assert_stopped(bus, finished)
 
     def test_the_driver_is_left_as_it_was_found(self):
@@ -152,7 +152,7 @@ class EndingTest(MotorTest):
                 os.close(writing)
                 finished = started.finish()
             self.assertEqual(finished.status, 1, finished)
-            self.assertIn("has no reader", finished.stderr)
+            self.assertIn("has no reader", finished.said)
             self.assert_stopped(bus, finished)
 
 

@@ -31,7 +31,7 @@ class TroubleTest(MotorTest):
             self.assertEqual(run("set", bus.url, "motor.input-mode=3-wire").status, 0)
             finished = start(bus.url)
             self.assertEqual(finished.status, 8, finished)
-            self.assertIn("does not run", finished.stderr)
+            self.assertIn("does not run", finished.said)
             commands = bus.commands()
             self.assertEqual([c for c in commands if c & START_BITS], [START_BITS | 2], finished)
             self.assertEqual(commands[-1], STOP)  # one that no wiring takes for a start
@@ -43,7 +43,7 @@ class TroubleTest(MotorTest):
                 with SpoiltStart(bus, fault) as line:
                     finished = start(line.url, "--for", "1s", "--json")
                 self.assertEqual(line.spoilt, 1, finished)
-                self.assertIn("write register 125", finished.stderr)
+                self.assertIn("write register 125", finished.said)
                 self.assertEqual(finished.status, status, finished)
                 self.assertTrue(finished.records()[-1]["stop_confirmed"], finished)
                 self.assert_stopped(bus, finished)
@@ -69,8 +69,8 @@ class TroubleTest(MotorTest):
                     finished = started.finish()
                 self.assertEqual(finished.status, 5, finished)
                 self.assertLess(support.paced() - began, PATIENCE + support.SOON, finished)
-                self.assertIn("THE TOOL MAY STILL RUN", finished.stderr)
-                self.assertIn("stop it at the tool", finished.stderr)
+                self.assertIn("THE TOOL MAY STILL RUN", finished.said)
+                self.assertIn("stop it at the tool", finished.said)
                 self.assertFalse(finished.records()[-1]["stop_confirmed"], finished)
 
 

@@ -33,7 +33,7 @@ CASES = (
     ("spindle do station3 dir", "only", ["direction="]),
     ("spindle do station3 direction=", "only", ["direction=forward", "direction=loosening"]),
     ("spindle get station3 --ou", "only", ["--output"]),
-    ("spindle get station3 --output ", "only", ["table", "json", "csv", "svg"]),
+    ("spindle get station3 --output ", "only", ["table", "json", "csv", "svg", "wide", "value", "yaml"]),
     ("spindle -o j", "only", ["json"]),
     ("spindle list --profile doga-bm", "some", ["doga-bm", "doga-bmt"]),
     ("spindle list --profile doga-bm event.num", "only", ["event.number"]),

@@ -86,7 +86,7 @@ class Ipv6Test(unittest.TestCase):
             bound.bind(("::1", 0))
             finished = support.run("identify", f"tcp://[::1]:{bound.getsockname()[1]}")
         self.assertEqual(finished.status, 4, finished)
-        self.assertIn("[::1]", finished.stderr)
+        self.assertIn("[::1]", finished.said)
 
 
 class NameTest(unittest.TestCase):
@@ -112,7 +112,7 @@ class NameTest(unittest.TestCase):
             self.assertEqual(finished.status, 0, finished)
             finished = support.run("identify", "sttaion3", "--tools", file)
             self.assertEqual(finished.status, 2, finished)
-            self.assertIn("station3", finished.stderr)
+            self.assertIn("station3", finished.said)
 
 
 class SeveralTest(unittest.TestCase):
@@ -188,7 +188,7 @@ class GenerationTest(unittest.TestCase):
                 with self.subTest(command, profile=profile):
                     finished = support.run(*command, *profile)
                     self.assertEqual((finished.status, finished.stdout), (8, ""), finished)
-                    self.assertIn("4001", finished.stderr)
+                    self.assertIn("4001", finished.said)
         functions = {request.function for request in self.recorder.requests}
         self.assertEqual(functions, {support.REPORT_SERVER_ID})
 
@@ -204,7 +204,7 @@ class SimulatorTest(unittest.TestCase):
         with support.simulator() as url:
             finished = support.run("simulate", "doga-bm", "--listen", url)
             self.assertEqual((finished.status, finished.stdout), (4, ""), finished)
-            self.assertIn(url.rsplit(":", 1)[1], finished.stderr)
+            self.assertIn(url.rsplit(":", 1)[1], finished.said)
 
     def test_identities_of_all_lengths(self):
         for size in (12, 13, 17):

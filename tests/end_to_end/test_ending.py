@@ -186,9 +186,9 @@ class StreamTest(unittest.TestCase):
             with support.Running(*arguments, stdout=full) as running:
                 finished = running.finish()
         self.assertEqual(finished.status, 74, finished)
-        sentences = [line for line in finished.stderr.splitlines() if line.startswith("spindle: ")]
+        sentences = [line for line in finished.said.splitlines() if line.startswith("spindle: ")]
         self.assertEqual(len(sentences), 1, finished)
-        self.assertIn("standard output cannot be written: No space left on device; check", sentences[0])
+        self.assertIn("standard output cannot be written: No space left on device check", sentences[0])
         return finished
 
     def changes(self):
@@ -215,6 +215,8 @@ class StreamTest(unittest.TestCase):
                 for form in ([], ["--json"]):
                     if form and arguments[-1] in ("-", "--help"):
                         continue
+                    if not form and arguments[0] == "alarms":
+                        continue  # of a tool that is well it has nothing to say on standard output
                     with self.subTest(arguments, form=form):
                         self.check_full(*arguments, *form)
 
@@ -275,7 +277,8 @@ class StreamTest(unittest.TestCase):
                     if form == "json":
                         self.assertTrue(all(support.parse_json(line)["name"] for line in lines))
                     else:
-                        self.assertEqual(lines, whole.splitlines()[: len(lines)])
+                        behind = [line.partition(b",")[2] for line in whole.splitlines()]  # the time
+                        self.assertEqual([line.partition(b",")[2] for line in lines], behind[: len(lines)])
 
     def test_a_line_that_was_cut_off_stays_alone(self):
         with support.simulator() as url:
@@ -292,7 +295,8 @@ class StreamTest(unittest.TestCase):
                     if form == "json":
                         self.assertEqual([support.parse_json(line)["name"] for line in lines[1:]], ["p300"] * 2)
                     else:
-                        self.assertEqual(lines[1:3], lines[3:5])
+                        behind = [line.partition(b",")[2] for line in lines[1:]]  # the time
+                        self.assertEqual(behind[:2], behind[2:])
 
     def test_a_slow_reader_is_waited_for(self):
         """Also where another program made the pipe non-blocking."""
@@ -343,7 +347,7 @@ class StreamTest(unittest.TestCase):
                 [0], "do", url, "--profile", "doga-bm", "alarm-reset", "--accept-unverified"
             )
             self.assertEqual(asked.returncode, 2, asked)
-            self.assertIn("--yes", asked.stderr)
+            self.assertIn("--yes", asked.said)
 
     def test_closed_standard_error(self):
         with support.simulator() as url, support.Recorder(url) as recorder:

@@ -66,8 +66,8 @@ class BoundedTest(FilesTest):
             ):
                 with self.subTest(what=what, arguments=arguments):
                     ended = self.run_bounded(*arguments)
-                    self.assertIn(ended.returncode, (2, 3), ended.stderr[-500:])
-                    self.assertNotIn(b"internal", ended.stderr)
+                    self.assertIn(ended.returncode, (2, 3), ended.said[-500:])
+                    self.assertNotIn(b"internal", ended.said)
 
     def test_a_stop_that_has_a_url_reads_no_tools_file(self):
         os.mkfifo(self.tools)
@@ -96,9 +96,9 @@ class WhoseFileTest(FilesTest):
 
     def refused(self, finished, path, why):
         self.assertEqual(finished.status, 3, finished)
-        self.assertIn(path, finished.stderr)
-        self.assertIn("it is not read", finished.stderr)
-        self.assertIn(why, finished.stderr)
+        self.assertIn(path, finished.said)
+        self.assertIn("it is not read", finished.said)
+        self.assertIn(why, finished.said)
 
     def test_one_s_own_files_are_read(self):
         self.assertEqual(self.get().status, 0, self.get())
@@ -142,7 +142,7 @@ class WhoseFileTest(FilesTest):
         self.assertEqual(support.run("get", "sim:doga-bm", "preset.1.speed").status, 0)
         stopped = support.run("remote-stop", "station")
         self.assertEqual(stopped.status, 2, stopped)
-        self.assertIn("spindle.yaml: it is not read, because it belongs to", stopped.stderr)
+        self.assertIn("spindle.yaml: it is not read, because it belongs to", stopped.said)
         completed = support.run("__complete", "get", "")
         self.assertEqual((completed.status, completed.stderr), (0, ""))
         self.assertNotIn("station", completed.stdout)

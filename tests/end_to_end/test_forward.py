@@ -140,7 +140,7 @@ class DeliveryTest(ForwardTest):
             self.assertEqual(sinks_of(store)[broker.url]["waiting"], 0)
             again = forward_once(broker.url, store)
             self.assertEqual(again.status, 0, again)
-            self.assertIn("0 delivered", again.stderr)
+            self.assertIn("0 delivered", again.said)
             everything = tools_file("all.yaml", all={"url": broker.url, "events": "all"})
             self.assertEqual(forward_once("all", store, "--tools", everything).status, 0)
             others = [record for record in told if record["type"] == "event" and record not in results]
@@ -192,7 +192,7 @@ class DeliveryTest(ForwardTest):
             self.heard(listener, expected(store, 1, 3), "what was there came")
             second = forward_once(broker.url, store)
             self.assertEqual(second.status, 74, second)
-            self.assertIn(f"process {running.pid} forwards to sink", second.stderr)
+            self.assertIn(f"process {running.pid} forwards to sink", second.said)
 
 
 class TroubleTest(ForwardTest):
@@ -310,8 +310,8 @@ class RefusalTest(ForwardTest):
         ):
             finished = forward_once(url, store)
             self.assertEqual(finished.status, 2, finished)
-            self.assertIn(words, finished.stderr)
-            self.assertNotIn("secret", finished.stderr)
+            self.assertIn(words, finished.said)
+            self.assertNotIn("secret", finished.said)
 
 
 class EncryptionTest(ForwardTest):
@@ -344,16 +344,16 @@ class EncryptionTest(ForwardTest):
             self.assertEqual((good := self.attempt(broker, host="localhost", **ours)).status, 0, good)
             wrong = self.attempt(broker, **{"ca-file": str(self.certificates.stranger)})
             self.assertEqual(wrong.status, 4, wrong)
-            self.assertIn("certificate verify failed", wrong.stderr)
+            self.assertIn("certificate verify failed", wrong.said)
             system = self.attempt(broker)
             self.assertEqual(system.status, 4, system)
-            self.assertIn("certificate verify failed", system.stderr)
+            self.assertIn("certificate verify failed", system.said)
             missing = self.attempt(broker, **{"ca-file": "not-there.pem"})
             self.assertEqual(missing.status, 3, missing)
         with self.broker(self.certificates.elsewhere) as broker:
             wrong = self.attempt(broker, **ours)
             self.assertEqual(wrong.status, 4, wrong)
-            self.assertIn("host name verification failed", wrong.stderr)
+            self.assertIn("host name verification failed", wrong.said)
 
     def test_a_client_has_to_show_its_certificate_where_the_broker_asks(self):
         certificate, key = self.certificates.client
@@ -363,7 +363,7 @@ class EncryptionTest(ForwardTest):
             self.assertEqual(good.status, 0, good)
             none = self.attempt(broker, **ours)
             self.assertIn(none.status, (4, 5), none)
-            self.assertIn("certificate", none.stderr)
+            self.assertIn("certificate", none.said)
 
     def test_a_password_comes_from_a_file_of_its_own(self):
         folder = pathlib.Path(self.folder.name)
@@ -380,11 +380,11 @@ class EncryptionTest(ForwardTest):
             self.assertEqual(good.status, 0, good)
             bad = self.attempt(broker, **ours, **{"password-file": str(wrong)})
             self.assertEqual(bad.status, 6, bad)
-            self.assertIn("(135)", bad.stderr)
+            self.assertIn("(135)", bad.said)
             os.chmod(right, 0o644)
             open_to_all = self.attempt(broker, **ours, **{"password-file": str(right)})
             self.assertEqual(open_to_all.status, 3, open_to_all)
-            self.assertIn("a secret that all users of this computer can read", open_to_all.stderr)
+            self.assertIn("a secret that all users of this computer can read", open_to_all.said)
             for finished in (good, bad, open_to_all):
                 self.assertNotIn("sesame", finished.stdout + finished.stderr)
 
@@ -398,11 +398,11 @@ class CareTest(ForwardTest):
         trim = ("store", "trim", "--before", "now", "--store", store, "--yes")
         refused = support.run(*trim)
         self.assertEqual(refused.status, 2, refused)
-        self.assertIn(f"store forget {url}", refused.stderr)
+        self.assertIn(f"store forget {url}", refused.said)
         self.assertEqual(support.run("store", "forget", url, "--store", store).status, 2)
         unknown = support.run("store", "forget", "plant", "--store", store, "--yes")
         self.assertEqual(unknown.status, 2, unknown)
-        self.assertIn("'spindle store sinks'", unknown.stderr)
+        self.assertIn("'spindle store sinks'", unknown.said)
         forgotten = support.run("store", "forget", url, "--store", store, "--yes")
         self.assertEqual(forgotten.status, 0, forgotten)
         self.assertEqual(support.run(*trim).status, 0)
@@ -416,7 +416,7 @@ class CareTest(ForwardTest):
             places = tools_file("places.yaml", plant={"url": broker.url})
             refused = forward_once("plant", store, "--tools", places, "--from", "15")
             self.assertEqual(refused.status, 2, refused)
-            self.assertIn("14 events", refused.stderr)
+            self.assertIn("14 events", refused.said)
             said = forward_once("plant", store, "--tools", places, "--from", "15", "--yes")
             self.assertEqual(said.status, 0, said)
             self.heard(listener, expected(store, 15, 20), "the rest came")

@@ -186,8 +186,8 @@ class ForwardPostgresTest(unittest.TestCase):
     def assert_refused(self, finished, status, *words):
         self.assertEqual(finished.status, status, finished)
         for word in words:
-            self.assertIn(word, finished.stderr)
-        self.assertNotIn("hunter2", finished.stderr + finished.stdout)
+            self.assertIn(word, finished.said)
+        self.assertNotIn("hunter2", finished.said + finished.stdout)
 
     def test_a_wrong_schema_is_named(self):
         store = make_store("schema.db", 10)

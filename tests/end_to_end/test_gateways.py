@@ -227,8 +227,8 @@ class TransactionTest(GatewayTest):
         self.gateway("", ids=lambda asked: 0)
         finished = self.run_tool("get", "one", "voltage")
         self.assertEqual(finished.status, 5, finished)
-        self.assertIn("the answer has transaction id 0000 instead of", finished.stderr)
-        self.assertIn("transaction=ignored", finished.stderr)
+        self.assertIn("the answer has transaction id 0000 instead of", finished.said)
+        self.assertIn("transaction=ignored", finished.said)
 
     def test_url_tools_file_and_profile_have_the_key(self):
         off = {"zero": lambda asked: 0, "one more": lambda asked: (asked + 1) % 0x10000}
@@ -276,7 +276,7 @@ class TransactionTest(GatewayTest):
         with support.simulator("kolver-kducer", "--fault", "fixed-transaction=9") as url:
             refused = support.run("get", url, "--profile", "kolver-kducer", REGISTER)
             self.assertEqual(refused.status, 5, refused)
-            self.assertIn("transaction id 0009 instead of", refused.stderr)
+            self.assertIn("transaction id 0009 instead of", refused.said)
             read = support.run("get", f"{url}?transaction=ignored", "--profile", "kolver-kducer", REGISTER)
             self.assertEqual(read.status, 0, read)
 

@@ -64,7 +64,7 @@ class ReadingTest(GroupTest):
             [(value, "one")] * 2 + [("error", "gone")] + [(value, "two")] * 2 + [(value, "other")] * 2,
         )
         self.assertEqual(finished.records("error")[0]["exit_status"], 4)
-        self.assertIn("gone (tcp://", finished.stderr)
+        self.assertIn("gone (tcp://", finished.said)
 
     def test_get_everything(self):
         finished = support.run("get", "@line", "--json")
@@ -177,8 +177,8 @@ class SettingTest(GroupTest):
         for flags in ([], ["--no-input"]):
             finished = support.run("set", "@line", f"{TORQUE}=3.00", *flags)
             self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
-            self.assertIn("write 2 values to 2 tools (one, two)", finished.stderr)
-            self.assertIn("--yes", finished.stderr)
+            self.assertIn("write 2 values to 2 tools (one, two)", finished.said)
+            self.assertIn("--yes", finished.said)
         self.assertEqual((self.value(one), self.value(two)), ("2.71", "2.71"))
 
     def test_what_is_equal_is_not_written_nor_asked_about(self):
@@ -245,7 +245,7 @@ class InterruptionTest(GroupTest):
                     running.send_signal(signal.SIGTERM)
                     finished = running.finish()
                 self.assertEqual(finished.status, 143, finished)
-        self.assertIn("nothing was changed", finished.stderr)
+        self.assertIn("nothing was changed", finished.said)
         self.assertEqual(self.value(one), "2.71")
         self.assertEqual(self.changed(), [])
 
@@ -313,7 +313,7 @@ class OneToolTest(GroupTest):
                 with self.subTest(words):
                     finished = support.run(*words)
                     self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
-                    self.assertIn(said, finished.stderr)
+                    self.assertIn(said, finished.said)
             self.assertEqual(server.requests, [])
 
 

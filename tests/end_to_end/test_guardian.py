@@ -182,8 +182,8 @@ class SignalTest(unittest.TestCase):
                 run.send_signal(signal.SIGINT)
                 finished = run.finish()
             self.assertEqual(finished.status, 130, finished)
-            self.assertIn("THE TOOL MAY STILL RUN", finished.stderr)
-            self.assertIn(station.url, finished.stderr)
+            self.assertIn("THE TOOL MAY STILL RUN", finished.said)
+            self.assertIn(station.url, finished.said)
 
 
 class StopTest(unittest.TestCase):
@@ -219,8 +219,8 @@ class StopTest(unittest.TestCase):
         with test_remote_start.Station({"on": ["identity"], "reply": []}, **SLOW) as station:
             finished = self.stop(station.url)
             self.assertEqual(finished.status, 5, finished)
-            self.assertIn("no stop was sent", finished.stderr)
-            self.assertIn("--profile", finished.stderr)
+            self.assertIn("no stop was sent", finished.said)
+            self.assertIn("--profile", finished.said)
             self.assertEqual(station.writes(), [])
 
     def test_lines_that_lose_much(self):
@@ -270,7 +270,7 @@ class AssignedInputsTest(unittest.TestCase):
             finished = support.run("remote-start", bus.url, *blv.PROFILE, "--speed", "500",
                                    "--accept-unverified", "--yes")
             self.assertEqual(finished.status, 1, finished)
-            self.assertIn("no input of this driver has function 1", finished.stderr)
+            self.assertIn("no input of this driver has function 1", finished.said)
             self.assertEqual(bus.commands(), [])
 
 

@@ -258,8 +258,8 @@ class Judge:
         known = result != "unknown"
         self.demand(not known or decimal.Decimal(record["new"]) == now, f"WRONG NEW VALUE {record}, is {now}")
         right = {
-            "unknown": self.ordeal.finished.status != 0 and "reading it back failed" in self.ordeal.finished.stderr
-            or "is not known" in self.ordeal.finished.stderr,
+            "unknown": self.ordeal.finished.status != 0 and "reading it back failed" in self.ordeal.finished.said
+            or "is not known" in self.ordeal.finished.said,
             "written": now == wanted,
             "unchanged": now == before == wanted,
             "mismatch": now == before != wanted,

@@ -283,8 +283,8 @@ class LeasesTest(unittest.TestCase):
             with self.subTest(sink):
                 finished = support.run("record", "--lease", sink, "--tools", one.tools, "--store", one.store)
                 self.assertEqual(finished.status, 2, finished)
-                self.assertIn(words, finished.stderr)
-                self.assertNotIn("hunter2", finished.stderr)
+                self.assertIn(words, finished.said)
+                self.assertNotIn("hunter2", finished.said)
         finished = support.run("record", "--lease", "plant", "--lease-ttl", "900ms", "--tools", one.tools)
         self.assertEqual(finished.status, 2, finished)
 

@@ -103,7 +103,7 @@ class LocaleTest(unittest.TestCase):
                     with self.subTest(arguments, locale=environment.get("LC_ALL", "C.UTF-8")):
                         finished = support.run(*arguments, environment=environment)
                         self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
-                        self.assertIn(help_words, finished.stderr)
+                        self.assertIn(help_words, finished.said)
             values = support.run("get", url, "--profile", "doga-bm", TORQUE, "preset.1.speed", "--json")
             self.assertEqual([str(r["value"]) for r in values.records()], ["2.71", "1000"], values)
 

@@ -265,7 +265,7 @@ class OtherMasters(unittest.TestCase):
                 asked = support.run("get", server.url, "alarm.present", *PROFILE)
                 self.assertEqual(asked.status, 0, asked)
                 stop = support.run("remote-stop", server.url, *PROFILE)
-                self.assertNotIn("has this line open", stop.stderr)
+                self.assertNotIn("has this line open", stop.said)
                 watching.send_signal(signal.SIGINT)
                 watching.finish()
             support.wait_until(

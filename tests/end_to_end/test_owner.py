@@ -264,7 +264,7 @@ class TroubleTest(unittest.TestCase):
             os.kill(watching.pid, signal.SIGKILL)
             finished = asker.finish()
             self.assertEqual(finished.status, 5, finished)
-            self.assertIn(f"the spindle that has the line ended (process {watching.pid})", finished.stderr)
+            self.assertIn(f"the spindle that has the line ended (process {watching.pid})", finished.said)
 
     def test_a_read_goes_on_directly(self):
         with self.mute_owner("get", "@holding:2", "--json") as (asker, watching, silent):
@@ -299,7 +299,7 @@ class TroubleTest(unittest.TestCase):
             finished = support.quickest(lambda: folder.run("get", url, *PROFILE, "p2", "--connect-timeout", "20s"),
                                         support.SOON)
             self.assertIn(finished.status, (4, 5), finished)
-            self.assertIn("has no link to the tool", finished.stderr)
+            self.assertIn("has no link to the tool", finished.said)
 
     def test_a_folder_that_others_can_write_is_not_used(self):
         with EventServer() as server, Folder(mode=0o777) as folder:
@@ -348,7 +348,7 @@ class SerialTest(unittest.TestCase):
                     self.assertEqual(stopped.records("action")[0]["result"], "confirmed", stopped)
                     finished = run.finish()
                 self.assertEqual(finished.status, 1, finished)
-                self.assertIn("not by this program", finished.stderr)
+                self.assertIn("not by this program", finished.said)
 
 
 class StopTest(unittest.TestCase):
@@ -531,7 +531,7 @@ class GatewayTest(unittest.TestCase):
         with EventServer() as one, EventServer() as two, Folder() as folder:
             several = folder.run("serve", one.url, two.url, *PROFILE, "--listen", "0")
             self.assertEqual(several.status, 2, several)
-            self.assertIn("2 lines", several.stderr)
+            self.assertIn("2 lines", several.said)
             for text in ("x", "127.0.0.1", "1:2:3", "70000", ":"):
                 wrong = folder.run("serve", one.url, *PROFILE, "--listen", text)
                 self.assertEqual(wrong.status, 2, wrong)

@@ -82,7 +82,7 @@ class ReadingTest(unittest.TestCase):
                 support.run("get", url, *names, "-o", form).stdout for form in ("table", "csv")
             )
         self.assertRegex(table, r"^NAME +VALUE +UNIT *\npreset\.1\.target-torque +2\.71")
-        self.assertRegex(csv.replace("\r", ""), r"^name,value,unit\npreset\.1\.target-torque,2\.71,")
+        self.assertRegex(csv.replace("\r", ""), r"^time,target,name,value,unit,raw,label\n[^,]+,[^,]+,preset\.1\.target-torque,2\.71,,271,")
 
 
 if __name__ == "__main__":

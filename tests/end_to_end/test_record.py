@@ -298,7 +298,7 @@ class Recorded(unittest.TestCase):
             support.wait_until(lambda: tool.caught_up, "the recorder listens")
             second = support.run("record", tool.url, "--store", str(self.path), *PROFILE)
             self.assertNotEqual(second.status, 0)
-            self.assertIn(str(recorder.pid), second.stderr)
+            self.assertIn(str(recorder.pid), second.said)
 
     def test_a_full_disk_ends_nothing_and_loses_nothing(self):
         with EventServer() as tool, Recording(self.path, tool.url, *PROFILE) as recorder:

@@ -155,7 +155,7 @@ class FaultTest(BackupTest):
         finished = self.end_by(swap, 3)
         self.assertEqual(finished.status, 5, finished)
         self.assertEqual(len(self.server.writes), 3, finished)
-        self.assertIn("another tool answers there now", finished.stderr)
+        self.assertIn("another tool answers there now", finished.said)
 
     def test_changes_are_recorded(self):
         self.spoil()

@@ -49,7 +49,7 @@ class TableTest(unittest.TestCase):
             shown = screen.run("spindle get sim:doga-bm p2 --columns name,raw -o value")
             self.assertEqual(shown[0].split(), ["p2", "271"])
             shown = screen.run("spindle get sim:doga-bm p2 --columns nmae")
-            self.assertIn("'nmae' is no column here; did you mean 'name'?", " ".join(shown))
+            self.assertIn("'nmae' is no column here did you mean 'name'?", " ".join(" ".join(shown).split()))
 
     def test_a_tool_that_is_well_has_one_line_of_alarms(self):
         with Screen() as screen:

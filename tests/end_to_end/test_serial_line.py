@@ -145,7 +145,7 @@ class DialogueTest(unittest.TestCase):
             self.assertEqual(wrong.status, 5, wrong)
             nameless = run("get", f"{bus.url}?unit=1&baud=14400", "@holding:7")
             self.assertEqual(nameless.status, 4, nameless)
-            self.assertIn("14400 baud", nameless.stderr)
+            self.assertIn("14400 baud", nameless.said)
             right = run("get", f"{bus.url}?unit=1", "@holding:7")
             self.assertEqual(right.status, 0, right)
 
@@ -215,10 +215,10 @@ class PortTest(unittest.TestCase):
         with Bus("--fault", "close@2") as bus:
             finished = run("ping", f"{bus.url}?unit=1&echo=false", "-c", "5", "--interval", "10ms")
             self.assertEqual(finished.status, 9, finished)
-            self.assertIn("the serial port is gone", finished.stderr)
+            self.assertIn("the serial port is gone", finished.said)
             again = run("ping", f"{bus.url}?unit=1", "-c", "1")
             self.assertEqual(again.status, 4, again)
-            self.assertIn("there is no", again.stderr)
+            self.assertIn("there is no", again.said)
 
     def test_an_adapter_that_vanishes_while_an_answer_is_waited_for(self):
         with Bus("--fault", "lost") as bus:
@@ -229,7 +229,7 @@ class PortTest(unittest.TestCase):
                 bus.kill()
                 finished = waiting.finish()
             self.assertEqual(finished.status, 5, finished)
-            self.assertIn("the serial port is gone", finished.stderr)
+            self.assertIn("the serial port is gone", finished.said)
             self.assertLess(finished.paced, support.SOON)
 
     def test_ctrl_c_ends_a_wait_at_once(self):
@@ -260,7 +260,7 @@ class PortTest(unittest.TestCase):
             names = "".join(f'  d{unit}: {{url: "{bus.url}?unit={unit}", profile: {DRIVE}}}\n' for unit in (1, 2, 3))
             tools.write_text(f"tools:\n{names}groups:\n  all: [d1, d2, d3]\n", encoding="ascii")
             finished = support.run("identify", "@all", "--tools", str(tools), "--json")
-            self.assertNotIn("in use", finished.stderr)
+            self.assertNotIn("in use", finished.said)
             asked = {record["target"] for record in finished.records() if "target" in record}
             self.assertEqual(asked, {"d1", "d2", "d3"}, finished)
             bus.finish()

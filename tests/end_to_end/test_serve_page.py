@@ -279,12 +279,12 @@ class AccessTest(Served):
         for text, mode in ((TOKEN, 0o644), (TOKEN, 0o620), ("short", 0o600), (TOKEN + " " + TOKEN, 0o600), ("", 0o600)):
             done = support.run("serve", "--store", self.store, "--token-file", self.token_file(text, mode))
             self.assertEqual(done.status, 3, done)
-            self.assertNotIn(TOKEN, done.stderr)
+            self.assertNotIn(TOKEN, done.said)
 
     def test_other_computers_need_a_token(self):
         done = support.run("serve", "--store", self.store, "--listen", "0.0.0.0:0")
         self.assertEqual(done.status, 2, done)
-        self.assertIn("--token-file", done.stderr)
+        self.assertIn("--token-file", done.said)
         page = self.serve("--token-file", self.token_file(), listen="0.0.0.0:0")
         page.host = "127.0.0.1"
         self.assertEqual(page.ask(host="plant.example").status, 401)
@@ -294,7 +294,7 @@ class AccessTest(Served):
         page = self.serve()
         done = support.run("serve", "--store", self.store, "--listen", f"127.0.0.1:{page.port}")
         self.assertEqual(done.status, 4, done)
-        self.assertIn("another program listens there", done.stderr)
+        self.assertIn("another program listens there", done.said)
 
     def test_usage(self):
         for flags in (("--shift", "6"), ("--listen", "example.org:80"), ("--listen", "8470")):

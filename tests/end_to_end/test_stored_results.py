@@ -163,8 +163,8 @@ class ResultsTest(unittest.TestCase):
             with self.subTest(arguments):
                 finished = support.run(*arguments)
                 self.assertEqual(finished.status, 3, finished)
-                self.assertIn(".local/state/spindle/events.db: there is no store; 'spindle record' makes one",
-                              finished.stderr)
+                self.assertIn(".local/state/spindle/events.db: there is no store 'spindle record' makes one",
+                              finished.said)
         self.assertFalse((support.home().path / ".local").exists())
 
     def test_the_usual_store_is_that_of_the_user(self):
@@ -179,7 +179,7 @@ class ResultsTest(unittest.TestCase):
         path.write_text("no store\n" * 1000)
         finished = results("--store", path)
         self.assertEqual(finished.status, 3, finished)
-        self.assertIn(str(path), finished.stderr)
+        self.assertIn(str(path), finished.said)
 
 
 class CareTest(unittest.TestCase):
@@ -192,7 +192,7 @@ class CareTest(unittest.TestCase):
             lock.flush()
             finished = support.run("store", "trim", "--before", "1s", "--yes", "--store", store)
             self.assertEqual(finished.status, 74, finished)
-            self.assertIn("process 4711 writes it", finished.stderr)
+            self.assertIn("process 4711 writes it", finished.said)
             self.assertEqual(support.run("store", "check", "--store", store).status, 0)
         self.assertEqual(results("--store", store, "-q").stdout.count("fastening-ok"), 3)
 
@@ -208,7 +208,7 @@ class CareTest(unittest.TestCase):
         self.assertEqual(list(support.home().path.glob("copy.db.part*")), [])
         itself = support.run("store", "backup", store, "--store", store, "--force")
         self.assertEqual(itself.status, 2, itself)
-        self.assertIn("this is the store itself", itself.stderr)
+        self.assertIn("this is the store itself", itself.said)
         self.assertEqual(results("--store", store, "-q").stdout.count("fastening-ok"), 3)
 
     def test_an_export_is_everything(self):

@@ -50,7 +50,7 @@ class AddTest(ToolsTest):
         url = self.enterContext(support.simulator(BM))
         added = support.run("tools", "add", "station3", url)
         self.assertEqual(added.status, 0, added)
-        self.assertIn(str(made), added.stderr)
+        self.assertIn(str(made), added.said)
         self.assertIn(f'station3: {{url: "{url}", serial: ', made.read_text("utf-8"))
         self.assertEqual(support.run("get", "station3", "preset.1.speed").status, 0)
 
@@ -122,7 +122,7 @@ class AddTest(ToolsTest):
         for command in (("forward", "plant", "--dry-run"), ("record", "sim:doga-bm", "--lease", "plant")):
             finished = support.run(*command)
             self.assertEqual(finished.status, 3, finished)
-            self.assertIn("spindle.yaml:3:", finished.stderr)
+            self.assertIn("spindle.yaml:3:", finished.said)
 
     def test_ctrl_c_while_the_tool_is_asked_writes_nothing(self):
         silent = self.enterContext(Silent())
@@ -221,7 +221,7 @@ class NightTest(ToolsTest):
         self.assertEqual(self.drift(), (1, {"one": "same", "two": "different"}))
         refused = support.run(*backup)
         self.assertEqual(refused.status, 9, refused)
-        self.assertIn("--force", refused.stderr)
+        self.assertIn("--force", refused.said)
         (self.home / "golden/old.yaml").write_text("", "utf-8")
         shutil.copy(self.home / "golden/one.yaml", self.home / "golden/gone.yaml")
         finished = support.run("diff", "@all", "--dir", "golden", "--json")

@@ -42,8 +42,8 @@ class TypingTest(unittest.TestCase):
         self.assertEqual([(r["target"], r["value"]) for r in read.records("value")], [("bench", 20)])
         refused = self.spindle("set", "1.b=21")
         self.assertEqual(refused.status, 2, refused)
-        self.assertIn("bench", refused.stderr)
-        self.assertIn("--yes", refused.stderr)
+        self.assertIn("bench", refused.said)
+        self.assertIn("--yes", refused.said)
         self.assertEqual(self.server.writes, [])
         self.assertEqual(self.spindle("set", "1.b=21", "--yes").status, 0)
         self.assertEqual(self.server.value(1), 21)
@@ -82,8 +82,8 @@ class TypingTest(unittest.TestCase):
             lines.seek(0)
             refused = self.spindle("set", "bench", "-f", "-", stdin=lines)
         self.assertEqual(refused.status, 2, refused)
-        self.assertIn("standard input:2", refused.stderr)
-        self.assertIn("standard input:3", refused.stderr)
+        self.assertIn("standard input:2", refused.said)
+        self.assertIn("standard input:3", refused.said)
         self.assertEqual(len(self.server.writes), written)
 
     def test_a_change_is_told_by_its_id_and_taken_back(self):

@@ -58,7 +58,7 @@ class UpgradeTest(unittest.TestCase):
         self.assertEqual([(*row[:4], str(row[4])) for row in self.rows_of(store)], told)
         self.assertEqual(len(self.run_well("results", "--store", store, "--json").records("gap")), 2)
         checked = self.run_well("store", "check", "--store", store)
-        self.assertIn("26 rows, 8 numbers in gaps, 0 holes, the store is whole", checked.stderr)
+        self.assertIn("26 rows, 8 numbers in gaps, 0 holes, the store is whole", checked.said)
         self.run_well("report", "--store", store)
         self.assertEqual(self.version(store), 1, "reading has changed it")
 
@@ -84,7 +84,7 @@ class UpgradeTest(unittest.TestCase):
             tool = ("here", "--tools", tools)
             self.run_well("diff", backup, *tool, status=1)
             restored = self.run_well("restore", "here", backup, "--tools", tools, "--yes")
-            self.assertIn("2 written", restored.stderr)
+            self.assertIn("2 written", restored.said)
             value = self.run_well("get", *tool, "preset.1.target-torque", "--json").records("value")[0]
             self.assertEqual(str(value["value"]), "2.90")
             self.run_well("diff", backup, *tool)
@@ -95,7 +95,7 @@ class UpgradeTest(unittest.TestCase):
         with support.simulator("orientalmotor-blv", "--units", "1", listen="rtu+tcp://127.0.0.1:0") as url:
             tool = (url, "--profile", "orientalmotor-blv")
             restored = self.run_well("restore", url, backup, "--profile", "orientalmotor-blv", "--yes")
-            self.assertIn("2 written", restored.stderr)
+            self.assertIn("2 written", restored.said)
             self.run_well("diff", backup, *tool)
 
     # ---- what is newer ----
@@ -111,13 +111,13 @@ class UpgradeTest(unittest.TestCase):
                 self.assertEqual(len(re.findall(r"(?m)^format: 1$", text)), 1)
                 file.write_text(re.sub(r"(?m)^format: 1$", "format: 2", text))
                 finished = self.run_well(*(word.format(file) for word in arguments), status=3)
-                self.assertIn("format", finished.stderr + finished.stdout)
+                self.assertIn("format", finished.said + finished.stdout)
         store = self.copy("store.db")
         with contextlib.closing(sqlite3.connect(store)) as opened:
             opened.execute(f"PRAGMA user_version = {NEWEST + 1}")
         for arguments in (("results",), ("record", "sim:doga-bm")):
             finished = self.run_well(*arguments, "--store", store, status=3)
-            self.assertIn(f"is a store of version {NEWEST + 1}", finished.stderr)
+            self.assertIn(f"is a store of version {NEWEST + 1}", finished.said)
 
     # ---- what users write, and the record of changes ----
 

@@ -26,7 +26,7 @@ WRONG = [
     (["ping"], "TARGET", "--help"),
     (["use", "URL", "more"], "more", "--help"),
     (["simulate"], "PROFILE", "--help"),
-    (["list"], "profile", "--profile"),
+    (["list"], "profile", "spindle list doga-bm"),
     ([*GET, TORQUE, "--frobnicate"], "--frobnicate", "--help"),
     ([*GET, TORQUE, "--limit"], "--limit", "--limits"),
     ([*GET, TORQUE, "--timout", "1s"], "--timout", "--timeout"),
@@ -152,7 +152,7 @@ class UsageTest(unittest.TestCase):
                 finished = support.run("get", "sim:doga-bm", word)
                 self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
                 self.assertEqual(len(finished.sentences()), 1, finished)
-                self.assertNotIn("\x1b", finished.stderr)
+                self.assertNotIn("\x1b", finished.said)
 
     def test_help_and_version_are_data(self):
         for arguments in (["--help"], ["-h"], ["get", "--help"], ["profile", "show", "--help"], ["--version"]):
@@ -172,7 +172,7 @@ class BadFileTest(unittest.TestCase):
                 finished = support.run("profile", "check", file, "--json")
                 self.assertEqual(finished.status, 3, finished)
                 self.assertTrue(finished.records("error"), finished)
-                self.assertIn(file.name, finished.stderr)
+                self.assertIn(file.name, finished.said)
 
     def test_a_bad_profile_is_used_for_nothing(self):
         files = sorted((support.ROOT / "tests" / "profiles" / "bad").glob("*.yaml"))[:5]
@@ -191,7 +191,7 @@ class BadFileTest(unittest.TestCase):
             with self.subTest(option):
                 finished = support.run("get", "sim:doga-bm", TORQUE, option, folder / name)
                 self.assertEqual((finished.status, finished.stdout), (3, ""), finished)
-                self.assertIn(name, finished.stderr)
+                self.assertIn(name, finished.said)
 
     def test_bad_tools_files(self):
         texts = (

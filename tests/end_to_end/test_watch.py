@@ -194,7 +194,7 @@ class CompletenessTest(unittest.TestCase):
                     self.assertNotRegex(old, r"\bOK\b")
                     self.assertIn("push", new)
                     self.assertRegex(new, r"\bOK\b")
-                    self.assertIn("1 event, 1 OK", finished.stderr)
+                    self.assertIn("1 event, 1 OK", finished.said)
 
     def test_polling_without_arming(self):
         with EventServer() as server:
@@ -297,7 +297,7 @@ class EndingTest(unittest.TestCase):
             running.send_signal(signal.SIGINT)
             finished = running.finish()
             self.assertEqual(finished.status, 130, finished)
-            self.assertIn("1 event, 0 OK, 1 NG", finished.stderr)
+            self.assertIn("1 event, 0 OK, 1 NG", finished.said)
             self.assertNotIn("\x1b", finished.stdout)
 
     def test_second_signal_ends_at_once(self):
@@ -647,7 +647,7 @@ class ToolThatHangsUpTest(unittest.TestCase):
         with HangingUpServer() as server:
             finished = support.run("watch", server.url, "--profile", self.profile, "a", "--no-reconnect")
         self.assertEqual(finished.status, 5, finished)
-        self.assertIn(f"spindle: {server.url}: the tool closed the connection", finished.stderr)
+        self.assertIn(f"spindle: {server.url}: the tool closed the connection", finished.said)
 
 
 class UnknownToolTest(unittest.TestCase):
@@ -722,7 +722,7 @@ class UsageTest(unittest.TestCase):
         for length in ("0", "11", "14", "255"):
             finished = support.run("simulate", "doga-bm", "--identity-bytes", length)
             self.assertEqual((finished.status, finished.stdout), (2, ""), finished)
-            self.assertIn("12, 13, 17", finished.stderr)
+            self.assertIn("12, 13, 17", finished.said)
 
 
 class ValuesTest(unittest.TestCase):

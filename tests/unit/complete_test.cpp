@@ -192,3 +192,25 @@ TEST_CASE("complete: names of a tool that was seen") {
                       {tools, shipped(), &memory})
             .candidates.empty());
 }
+
+TEST_CASE("complete: where no tool is typed, the names are those of the default target") {
+  const files::Tools tools{
+      .path = "spindle.yaml",
+      .tools = {{.name = "station3", .url = "tcp://10.0.0.3", .profile = "doga-bm"},
+                {.name = "bare", .url = "tcp://10.0.0.4", .profile = ""}},
+      .groups = {{"line1", {"bare", "station3"}}}};
+  const auto count = [&](const Words& words, const std::string& usual) {
+    return cli::complete(words, cli::describe_grammar(), {tools, shipped(), nullptr, usual})
+        .candidates.size();
+  };
+  for (const std::string usual : {"station3", "@line1", "sim:doga-bm"}) {
+    CAPTURE(usual);
+    CHECK(count({"get", "event.num"}, usual) == 1);
+    CHECK(count({"get", "event.number", "event.num"}, usual) == 1);
+    CHECK(count({"set", "preset.1.target-t"}, usual) == 1);
+    // A tool that is typed is meant, also where nothing is known of it.
+    CHECK(count({"get", "bare", "event.num"}, usual) == 0);
+  }
+  CHECK(count({"get", "event.num"}, "") == 0);
+  CHECK(count({"get", "event.num"}, "bare") == 0);
+}
