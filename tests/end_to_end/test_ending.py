@@ -347,7 +347,7 @@ class StreamTest(unittest.TestCase):
                 [0], "do", url, "--profile", "doga-bm", "alarm-reset", "--accept-unverified"
             )
             self.assertEqual(asked.returncode, 2, asked)
-            self.assertIn("--yes", asked.said)
+            self.assertIn("--yes", asked.stderr)
 
     def test_closed_standard_error(self):
         with support.simulator() as url, support.Recorder(url) as recorder:

@@ -33,16 +33,15 @@ inline std::string_view need_of(const files::Key& key) {
   return {};
 }
 
-/// Words of a literal text, none of which is a macro.
-inline std::string literal(const std::string& text) {
-  std::string words;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    words += (words.empty() ? "" : " ") + mdoc_argument(text.substr(begin, end - begin));
-    begin = end + 1;
+/// The text of a cell that is filled, with an example in italics.
+inline std::string filled(const std::string& text, const std::string& example) {
+  std::string lines = mdoc_prose(example.empty() ? text : text + ", such as");
+  if (!example.empty()) {
+    std::string shown = mdoc_prose(example);
+    shown.pop_back();  // the last line's end
+    lines += fmt::format("\\fI{}\\fR\n", shown);
   }
-  return words;
+  return lines;
 }
 
 /// A row for each key with an example; below one that has a map the keys of that map.
@@ -52,14 +51,11 @@ inline std::string key_rows(const std::vector<files::Key>& keys, const Nodes& ma
   constexpr std::string_view step = "\\ \\ ";
   std::string rows;
   for (const files::Key& key : keys) {
-    const std::string_view space = indent.empty() ? "" : " Ns ";
-    rows += fmt::format(".It {}{}Ic {} Ta {}{}Ta\n", indent, space, mdoc_argument(key.name),
-                        need_of(key), need_of(key).empty() ? "" : " ");
     const std::string example = KeyExamples::example(maps, key.name);
     if (example.empty()) without.push_back(fmt::format("{}.{}", path, key.name));
     rows +=
-        mdoc_prose(value_of(key) + (example.empty() || key.inner != nullptr ? "" : ", such as"));
-    if (key.inner == nullptr && !example.empty()) rows += fmt::format(".Li {}\n", literal(example));
+        fmt::format("{}\\fB{}\\fR|{}|T{{\n{}T}}\n", indent, mdoc_escaped(key.name), need_of(key),
+                    filled(value_of(key), key.inner == nullptr ? example : std::string()));
     if (key.inner != nullptr) {
       const std::vector<files::Key> keys_inside = key.inner();
       Nodes inside;
@@ -86,8 +82,7 @@ inline std::string key_list(const files::KeyList& list, const KeyExamples& examp
                             std::vector<std::string>& without) {
   return fmt::format(
       ".Pp\nKeys of\n.Ic {} :\n"
-      ".Bl -column \"controller\\-model\" \"here or in a base\" \"decimal number\"\n"
-      ".It Sy Key Ta Sy Needed Ta Sy Value, with an example\n{}.El\n",
+      ".nh\n.TS\ntab(|);\nlb lb lbx\nl l lx.\nKey|Needed|Value, with an example\n{}.TE\n.hy\n",
       mdoc_argument(list.map), key_rows(list.keys, examples.maps(list.map), without, list.map));
 }
 
