@@ -75,9 +75,10 @@ constexpr auto heard_words = enum_table<sim::Heard>({{"connected", sim::Heard::c
                                                      {"disconnected", sim::Heard::disconnected}});
 
 void tell(sim::Heard heard, std::uint32_t connection, ByteView bytes, const Context& context) {
-  report::say_line(context.io, report::Severity::informational,
-                   fmt::format("{} client {} {} {}", report::to_text(context.clock.wall()),
-                               connection, heard_words.text(heard), to_hex(bytes)));
+  std::string line = fmt::format("{} client {} {}", report::to_text(context.clock.wall()),
+                                 connection, heard_words.text(heard));
+  if (!bytes.empty()) line += " " + to_hex(bytes);
+  report::say_frame(context.io, line);
 }
 
 /// What was heard and will not be answered, which a real tool would keep to itself.

@@ -220,7 +220,7 @@ class Stored(EventsTest):
         self.assert_ends(table, 0)
         rows = table.out.splitlines()
         self.assertEqual(len(rows), 1 + len(TORQUES))
-        self.assertEqual(rows[4].split(",")[:4], ["3", "15.000", "2.0625", "1457"])
+        self.assertEqual(rows[4].split(",")[1:5], ["3", "15.000", "2.0625", "1457"])
         drawn = support.run(SPINDLE, "results", "--store", self.store, "--curve", key, "-o", "svg")
         self.assert_ends(drawn, 0)
         self.assertIn("<svg", drawn.out)

@@ -68,7 +68,9 @@ class Session:
         program, *arguments = shlex.split(self._with_url(command))
         program = {"spindle": SPINDLE, "cat": "cat"}[program]
         outcome = support.run(program, *arguments, folder=self.folder)
-        lines = outcome.out.splitlines() + [f"! {line}" for line in outcome.err.splitlines()]
+        # How long the address is decides where a sentence goes on in the next line.
+        sentences = re.sub(r"\n  +", " ", outcome.err)
+        lines = outcome.out.splitlines() + [f"! {line}" for line in sentences.splitlines()]
         if outcome.status:
             lines.append(f"[{outcome.status}]")
         return [self._normal(line) for line in lines]
