@@ -311,6 +311,21 @@ Result<Parameter> parse_raw(std::string_view text) {
                    .note = {}};
 }
 
+/// A writable parameter of which a write to these registers would change only a part.
+const Parameter* torn_by(const Profile& profile, RegisterTable table, unsigned first,
+                         std::size_t count) {
+  const auto is_torn = [&](const Parameter& parameter) {
+    if (parameter.access != Access::read_write || parameter.table != table) return false;
+    const unsigned begin = parameter.written_at().value;
+    const unsigned end = begin + static_cast<unsigned>(register_count(parameter.encoding));
+    const bool shares = first < end && begin < first + count;
+    const bool holds_all = first <= begin && end <= first + count;
+    return shares && !holds_all;
+  };
+  const auto found = std::find_if(profile.parameters.begin(), profile.parameters.end(), is_torn);
+  return found == profile.parameters.end() ? nullptr : &*found;
+}
+
 /// Whether a writable parameter, an action, or the arming of events has this register.
 bool is_listed(const Profile& profile, RegisterTable table, RegisterAddress address) {
   const auto holds = [&](RegisterTable at, unsigned first, unsigned count) {
@@ -465,6 +480,14 @@ Result<void> Profile::may_write(RegisterTable table, RegisterAddress first,
                                      id, to_text(table), address.value),
               .hint = "'spindle list' and 'spindle do' show what can be written",
               .register_address = address.value});
+  }
+  if (const Parameter* torn = torn_by(*this, table, first.value, count)) {
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message = fmt::format("this is a part of {}, whose {} registers are written together",
+                               torn->name, register_count(torn->encoding)),
+        .hint = fmt::format("set {} itself", torn->name),
+        .register_address = first.value});
   }
   return {};
 }

@@ -89,16 +89,18 @@ std::string names_only(const std::vector<Entry>& entries, std::size_t from) {
   return wrapped("  also ", fmt::format("{}", fmt::join(names, ", ")), 4);
 }
 
-/// In so many lines, if need be with names alone at the end.
-std::string option_lines(const std::vector<OptionDescription>& options, std::size_t room) {
-  const std::vector<Entry> entries = entries_of(options);
-  for (std::size_t told = entries.size(); told > 0; --told) {
-    std::string text;
-    for (std::size_t at = 0; at < told; ++at) text += entries[at].text;
-    if (told < entries.size()) text += names_only(entries, told);
-    if (lines_in(text) <= room) return text;
-  }
-  return names_only(entries, 0);
+/// So many options are told; of the others only the names.
+std::string told_lines(const std::vector<Entry>& entries, std::size_t told) {
+  std::string text;
+  for (std::size_t at = 0; at < told; ++at) text += entries[at].text;
+  return told < entries.size() ? text + names_only(entries, told) : text;
+}
+
+/// How many can be told in so many lines.
+std::size_t told_in(const std::vector<Entry>& entries, std::size_t room) {
+  std::size_t told = entries.size();
+  while (told > 0 && lines_in(told_lines(entries, told)) > room) --told;
+  return told;
 }
 
 std::string indented(const std::vector<std::string>& lines) {
@@ -115,6 +117,24 @@ std::string command_lines(const std::vector<CommandDescription>& commands) {
     text += fmt::format("  {:<12}  {}\n", name, command.meaning);
   }
   return text;
+}
+
+/// What stands in front of the options.
+std::string head_of(const CommandDescription& command) {
+  const std::string space = command.synopsis.empty() ? "" : " ";
+  std::string text = fmt::format(
+      "{}\nExamples:\n{}\n{}", wrapped("", command.meaning, 0), indented(command.examples),
+      wrapped("Usage: spindle ", fmt::format("{}{}{}", command.name, space, command.synopsis), 4));
+  if (!command.commands.empty()) {
+    text += fmt::format("\nCommands:\n{}", command_lines(command.commands));
+  }
+  return text;
+}
+
+/// How many lines the options may take.
+std::size_t room_of(const CommandDescription& command) {
+  constexpr std::size_t around = 4;  // the heading and the last line, each behind an empty one
+  return most_lines - std::min(lines_in(head_of(command)) + around, most_lines);
 }
 
 }  // namespace
@@ -141,20 +161,21 @@ std::string program_help(const Description& description) {
 }
 
 std::string command_help(const CommandDescription& command) {
-  const std::string space = command.synopsis.empty() ? "" : " ";
-  std::string text = fmt::format(
-      "{}\nExamples:\n{}\n{}", wrapped("", command.meaning, 0), indented(command.examples),
-      wrapped("Usage: spindle ", fmt::format("{}{}{}", command.name, space, command.synopsis), 4));
-  if (!command.commands.empty()) {
-    text += fmt::format("\nCommands:\n{}", command_lines(command.commands));
-  }
-  constexpr std::size_t around = 4;  // the heading and the last line, each behind an empty one
+  std::string text = head_of(command);
   if (!command.options.empty()) {
-    const std::size_t used = lines_in(text) + around;
-    text += fmt::format("\nArguments and options:\n{}",
-                        option_lines(command.options, most_lines - std::min(used, most_lines)));
+    const auto entries = entries_of(command.options);
+    text += "\nArguments and options:\n" + told_lines(entries, told_in(entries, room_of(command)));
   }
   return text + "\nmore: 'man spindle'; options of every command: 'spindle --help'\n";
+}
+
+std::vector<OptionDescription> left_to_manual(const CommandDescription& command) {
+  const auto entries = entries_of(command.options);
+  std::vector<OptionDescription> left;
+  for (std::size_t at = told_in(entries, room_of(command)); at < entries.size(); ++at) {
+    left.push_back(*entries[at].option);
+  }
+  return left;
 }
 
 }  // namespace spindle::cli

@@ -79,6 +79,12 @@ Error of_value_or_unit(const Parameter& parameter, std::string_view typed) {
                   "write =VALUE for a value, or += and -= with a number without % for a step");
 }
 
+Error of_value_or_step(const Parameter& parameter, std::string_view typed) {
+  return bad_step(
+      parameter, fmt::format("'{}' may be a value, or a step", typed),
+      fmt::format("write ={0} for the value, or +={0} to add so much", typed.substr(1)));
+}
+
 }  // namespace
 
 Result<TypedAssignment> take_apart(const std::string& text, const Profile& profile) {
@@ -114,16 +120,24 @@ Result<std::vector<Parameter>> parameters_to_set(const std::string& name, const 
   }
   TRY_LET(const auto whole, catalogue::one_meant_by(name, profile));
   TRY_LET(auto parameter, profile.find(whole));
-  return std::vector<Parameter>{std::move(parameter)};
+  return std::vector<Parameter>{profile.marked(std::move(parameter))};
 }
 
 Result<std::optional<ValueStep>> step_of(const TypedAssignment& typed, const Parameter& parameter,
                                          const std::string& unit) {
   const bool is_number = is_plain_number(parameter, typed.value);
   const auto hundredths = percentage(typed.value);
+  const bool is_signed_share = is_number && hundredths && has_sign(typed.value);
+  if (!typed.sign && !is_signed_share) {
+    const bool may_be_step = is_number && typed.value.starts_with('+');
+    if (may_be_step) return tl::unexpected(of_value_or_step(parameter, typed.value));
+    return std::nullopt;
+  }
+  if (parameter.secrecy == catalogue::Secrecy::secret) {
+    return tl::unexpected(bad_step(parameter, "it is a secret, and the sum would show it",
+                                   "write the new value behind ="));
+  }
   if (!typed.sign) {
-    const bool is_step = is_number && hundredths && has_sign(typed.value);
-    if (!is_step) return std::nullopt;
     if (unit == percent) return tl::unexpected(of_value_or_unit(parameter, typed.value));
     const Decimal amount = hundredths->sign() == Sign::minus ? hundredths->negated() : *hundredths;
     return ValueStep{.sign = hundredths->sign(), .amount = amount, .is_percent = true};

@@ -76,8 +76,10 @@ Ended scan_network(const std::vector<link::NetworkInterface>& interfaces,
   }
   std::vector<std::string> names;
   for (const auto& each : interfaces) names.push_back(each.name);
-  ended.sentence = fmt::format("{} found in {} on {}", counted(ended.found, "tool"),
-                               to_text(options.duration), fmt::join(names, ", "));
+  const std::string time =
+      ended.error ? std::string() : fmt::format(" in {}", to_text(options.duration));
+  ended.sentence =
+      fmt::format("{} found{} on {}", counted(ended.found, "tool"), time, fmt::join(names, ", "));
   if (strange > 0) {
     ended.sentence += fmt::format("; {} understood", strange == 1 ? "1 datagram was not"
                                                                   : fmt::format("{} datagrams were "

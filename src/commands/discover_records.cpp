@@ -9,14 +9,16 @@
 namespace spindle::commands {
 namespace {
 
+using report::Align;
 using report::Cell;
+using report::left_out;
 
 const std::array<report::Column, 7> columns = {{{"SERIAL", "serial"},
                                                 {"MODEL", "model"},
                                                 {"FIRMWARE", "firmware"},
                                                 {"URL", "endpoint"},
-                                                {"MAC", "mac"},
-                                                {"IN USE", "in_use"},
+                                                {"MAC", "mac", Align::left, 0, left_out(1)},
+                                                {"IN USE", "in_use", Align::left, 0, left_out(2)},
                                                 {"NAME", "name"}}};
 
 template <typename Number>
@@ -84,26 +86,29 @@ Discovered discovered(const work::SweptTool& swept, const Context& context) {
   const work::Identification found = swept.identification.value_or(work::Identification());
   const catalogue::Identity& identity = found.identity;
   const bool has_unit = swept.unit.has_value();
-  report::Record record{.type = "discovered",
-                        .target = name.empty() ? endpoint : name,
-                        .time = context.clock.wall(),
-                        .fields = {{"found_by", std::string("sweep")},
-                                   {"endpoint", endpoint},
-                                   {"address", swept.address},
-                                   {"port", number(swept.port)},
-                                   {"unit", has_unit ? number(swept.unit->value) : Cell()},
-                                   {"serial", text_or_null(identity.serial)},
-                                   {"model", text_or_null(identity.tool_model),
-                                    swept.identification ? identity.tool_model : "does not say"},
-                                   {"tool_type", text_or_null(found.profile)},
-                                   {"tool_type_code", number_or_null(identity.tool_model_code)},
-                                   {"firmware", number_or_null(identity.firmware)},
-                                   {"mac", Cell()},
-                                   {"in_use", Cell()},
-                                   {"profile", text_or_null(found.profile)},
-                                   {"name", text_or_null(name)},
-                                   {"from", swept.address},
-                                   {"interface", Cell()}}};
+  // The table of an earlier map does not name a later tool.
+  const bool is_later = found.profile.empty() && found.generation == catalogue::Generation::later;
+  const std::string model = is_later ? std::string() : identity.tool_model;
+  report::Record record{
+      .type = "discovered",
+      .target = name.empty() ? endpoint : name,
+      .time = context.clock.wall(),
+      .fields = {{"found_by", std::string("sweep")},
+                 {"endpoint", endpoint},
+                 {"address", swept.address},
+                 {"port", number(swept.port)},
+                 {"unit", has_unit ? number(swept.unit->value) : Cell()},
+                 {"serial", text_or_null(identity.serial)},
+                 {"model", text_or_null(model), swept.identification ? model : "does not say"},
+                 {"tool_type", text_or_null(found.series)},
+                 {"tool_type_code", number_or_null(identity.tool_model_code)},
+                 {"firmware", number_or_null(identity.firmware)},
+                 {"mac", Cell()},
+                 {"in_use", Cell()},
+                 {"profile", text_or_null(found.profile)},
+                 {"name", text_or_null(name)},
+                 {"from", swept.address},
+                 {"interface", Cell()}}};
   return {std::move(record), endpoint, identity.serial, found.profile, found.profile, name};
 }
 

@@ -13,6 +13,9 @@
 namespace spindle::commands {
 namespace {
 
+/// A hall has fewer tools; a flood of false answers has more.
+constexpr std::size_t most_new = 256;
+
 /// Lower-case letters and digits, and single hyphens between them.
 std::string as_name(const std::string& text) {
   std::string name;
@@ -35,8 +38,8 @@ std::string as_name(const std::string& text) {
 /// "bmt-2401190042", or by its address where it says nothing of itself; with a number behind it
 /// where the name is taken.
 std::string free_name(const Discovered& tool, std::set<std::string>& taken) {
-  std::string name =
-      as_name(tool.serial.empty() ? tool.endpoint.substr(tool.endpoint.find("//")) : tool.serial);
+  std::string name = as_name(tool.serial);
+  if (name.empty()) name = as_name(tool.endpoint.substr(tool.endpoint.find("//")));
   const std::string kind = as_name(tool.kind);
   name = (kind.empty() ? "tool" : kind) + "-" + name;
   std::string free = name;
@@ -52,6 +55,28 @@ bool is_same_place(const link::Endpoint& entry, const link::Endpoint& found) {
   const bool has_ports = entry.port && found.port;
   const bool has_units = entry.unit && found.unit;
   return (!has_ports || entry.port == found.port) && (!has_units || entry.unit == found.unit);
+}
+
+/// A tool that answers as several units of its address is one tool.
+bool is_same_tool(const files::NewTool& earlier, const Discovered& tool) {
+  if (tool.serial.empty() || earlier.serial != tool.serial) return false;
+  const auto one = link::parse_endpoint(earlier.url);
+  const auto other = link::parse_endpoint(tool.endpoint);
+  return one && other && one->host == other->host && one->port == other->port;
+}
+
+/// Whether the file has it by its serial number, at another place: which of both is right is for
+/// the user to say.
+bool is_moved(const Discovered& tool, const Context& context) {
+  if (tool.serial.empty()) return false;
+  for (const files::Tool& known : context.tools.tools) {
+    if (known.serial != tool.serial) continue;
+    context.renderer.note(fmt::format(
+        "{} is not added: {} of {} has its serial number {}, and {}; mend the url there",
+        tool.endpoint, known.name, context.tools.path, tool.serial, known.url));
+    return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -76,9 +101,9 @@ Result<std::vector<std::string>> add_to_tools_file(const std::vector<Discovered>
   for (const Discovered& tool : found) {
     const bool is_known =
         !tool.name.empty() || std::any_of(tools.begin(), tools.end(), [&](const auto& earlier) {
-          return earlier.url == tool.endpoint;
+          return earlier.url == tool.endpoint || is_same_tool(earlier, tool);
         });
-    if (is_known || tool.endpoint.empty()) continue;
+    if (is_known || tool.endpoint.empty() || is_moved(tool, context)) continue;
     tools.push_back({.name = free_name(tool, taken),
                      .url = tool.endpoint,
                      .profile = tool.profile,
@@ -92,6 +117,13 @@ Result<std::vector<std::string>> add_to_tools_file(const std::vector<Discovered>
     return tl::unexpected(Error{.code = Errc::bad_file,
                                 .message = "no tools file was found to which tools can be added",
                                 .hint = "make one first: 'spindle tools init'"});
+  }
+  if (tools.size() > most_new) {
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message =
+            fmt::format("{} are too many to be added at once", counted(tools.size(), "new tool")),
+        .hint = "this may be a flood of answers: look at them first, without --write"});
   }
   TRY_LET(const std::string before, context.disk.read_trusted(path));
   std::string after = before;

@@ -8,6 +8,7 @@
 #include "backup_paths.hpp"
 #include "listing.hpp"
 #include "progress.hpp"
+#include "raw_need.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/duration.hpp"
@@ -71,12 +72,14 @@ files::Dump make_dump(const OpenTool& tool, RegisterSurvey survey, const Context
 /// What it refers to does not change while it runs.
 class DumpRegisters final : public Verb<Wanted, Outcome> {
  public:
-  explicit DumpRegisters(const DumpOptions& options) : options_(&options) {}
-
-  /// Registers that the command line names are read whatever they mean.
-  [[nodiscard]] Need need() const override {
-    return options_->registers ? Need::raw_registers : Need::named_registers;
+  DumpRegisters(const DumpOptions& options, const Context& context) : options_(&options) {
+    if (!options.registers) return;
+    need_ = options.secrets == Secrets::leave_out ? need_of_raw({*options.registers}, context)
+                                                  : Need::raw_registers;
   }
+
+  /// Registers that the command line names are read whatever they mean, but for secrets.
+  [[nodiscard]] Need need() const override { return need_; }
 
   Result<Plan> plan(const catalogue::Profile& profile, const Target& /*target*/) const override {
     Wanted wanted;
@@ -94,6 +97,11 @@ class DumpRegisters final : public Verb<Wanted, Outcome> {
     return tl::unexpected(Error{.code = Errc::usage,
                                 .message = "there is no register to read",
                                 .hint = "say which: --registers 0..999"});
+  }
+
+  Result<Plan> examine(OpenTool& tool, Plan plan, Context& /*context*/) const override {
+    if (need_ != Need::raw_secrets) return plan;
+    return this->plan(tool.device.profile(), tool.target);
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
@@ -150,6 +158,7 @@ class DumpRegisters final : public Verb<Wanted, Outcome> {
   }
 
   const DumpOptions* options_;
+  Need need_ = Need::named_registers;
 };
 
 }  // namespace
@@ -165,7 +174,7 @@ Result<Outcome> dump(const DumpOptions& options, Context& context) {
     error.name = options.file;
     return tl::unexpected(std::move(error));
   }
-  return run_verb(DumpRegisters(options), {.tools = {std::move(target)}}, 1, context);
+  return run_verb(DumpRegisters(options, context), {.tools = {std::move(target)}}, 1, context);
 }
 
 }  // namespace spindle::commands

@@ -13,6 +13,7 @@
 #include "comparison.hpp"
 #include "diff_side.hpp"
 #include "progress.hpp"
+#include "raw_need.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
@@ -199,13 +200,24 @@ Profile profile_of(const files::Dump& dump, const Context& context) {
   return profile ? std::move(*profile) : Profile();
 }
 
+std::vector<RegisterSpan> spans_of(const files::Dump& dump) {
+  std::vector<RegisterSpan> spans;
+  for (const files::DumpRun& run : dump.runs) {
+    const auto last = static_cast<std::uint16_t>(run.from + run.values.size() - 1);
+    spans.push_back({run.table, run.from, last});
+  }
+  return spans;
+}
+
 /// A tool that is asked for the registers of a dump.
 class DumpDiff final : public Verb<std::monostate, Outcome> {
  public:
-  DumpDiff(const DumpSides& sides, const DiffOptions& options)
-      : sides_(&sides), options_(&options) {}
+  DumpDiff(const DumpSides& sides, const DiffOptions& options, const Context& context)
+      : sides_(&sides),
+        options_(&options),
+        need_(need_of_raw(spans_of(sides.a ? *sides.a : *sides.b), context)) {}
 
-  [[nodiscard]] Need need() const override { return Need::raw_registers; }
+  [[nodiscard]] Need need() const override { return need_; }
 
   Result<Plan> plan(const Profile& /*profile*/, const Target& /*target*/) const override {
     return Plan();
@@ -216,11 +228,8 @@ class DumpDiff final : public Verb<std::monostate, Outcome> {
     const files::Dump& dump = sides_->a ? *sides_->a : *sides_->b;
     std::vector<link::RegisterRange> wanted;
     Images images;
-    for (const files::DumpRun& run : dump.runs) {
-      const auto last = static_cast<std::uint16_t>(run.from + run.values.size() - 1);
-      for (const auto& range : askable({run.table, run.from, last}, profile)) {
-        wanted.push_back(range);
-      }
+    for (const RegisterSpan& span : spans_of(dump)) {
+      for (const auto& range : askable(span, profile)) wanted.push_back(range);
     }
     auto survey = [&] {
       ProgressLine progress(context);
@@ -250,6 +259,7 @@ class DumpDiff final : public Verb<std::monostate, Outcome> {
 
   const DumpSides* sides_;
   const DiffOptions* options_;
+  Need need_;
 };
 
 /// The profile by which registers are named; empty where the dumps do not agree, or it is not
@@ -294,7 +304,8 @@ Result<Outcome> diff_dumps(const DumpSides& sides, const DiffOptions& options, C
               .message = fmt::format("a dump is raw registers, and {} parameters by name", what),
               .hint = "compare a dump with another dump, or with a tool"});
   }
-  return run_verb(DumpDiff(sides, options), {.tools = {std::move(*other.target)}}, 1, context);
+  return run_verb(DumpDiff(sides, options, context), {.tools = {std::move(*other.target)}}, 1,
+                  context);
 }
 
 }  // namespace spindle::commands

@@ -36,8 +36,7 @@ void tell_news(const work::BlockSearchNews& news, const Context& context) {
           fmt::format("waiting for an event: drive one screw (Ctrl-C ends it; given up after {})",
                       to_text(patience)));
     case Kind::event:
-      return context.renderer.note(
-          fmt::format("event {} was pushed; looking for it, which only reads", news.number));
+      return context.renderer.note(fmt::format("event {} was pushed; looking for it", news.number));
     case Kind::again:
       return context.renderer.note(
           fmt::format("{} places hold event {}: drive another screw, to tell them apart",
@@ -129,24 +128,13 @@ class FindBlock final : public Verb<BlockSearch, Outcome> {
                    {"count", number(events.count)},
                    {"event_number", number(*result.number)},
                    {"profile", text}}};
-    TRY(tell_profile(record, text, context));
+    TRY(report::is_table(context.user.format)
+            ? show_profile(text, context)
+            : context.renderer.line(record, fmt::to_string(*seen_->event_block)));
     context.renderer.note(
         fmt::format("save these lines as {}.yaml, and use it with --profile or "
                     "in the tools file",
                     seen_->id));
-    return {};
-  }
-
-  /// Lines that can be saved, for people; else the record.
-  Result<void> tell_profile(const report::Record& record, std::string_view text,
-                            Context& context) const {
-    if (!report::is_table(context.user.format)) {
-      return context.renderer.line(record, fmt::to_string(*seen_->event_block));
-    }
-    text.remove_suffix(1);  // the last line's end
-    for (const std::string_view line : split(text, '\n')) {
-      TRY(context.renderer.line({}, line));
-    }
     return {};
   }
 
@@ -184,7 +172,11 @@ Result<Outcome> find_block(const DoOptions& options, const Targets& targets, Con
 std::string search_in_words(const Profile& profile, const Target& target) {
   if (!profile.events || !profile.events->search) return {};
   const BlockSearch& search = *profile.events->search;
-  return fmt::format("{} (reads only): 'spindle do {} {}'", search.title, shell_word(target.shown),
+  const auto& arm = profile.events->arm;
+  const std::string writes =
+      arm ? fmt::format("writes only {}, which makes the tool tell its events", arm->address)
+          : std::string("reads only");
+  return fmt::format("{} ({}): 'spindle do {} {}'", search.title, writes, shell_word(target.shown),
                      search.name);
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "listing.hpp"
+#include "raw_need.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/catalogue/short_name.hpp"
@@ -11,21 +12,15 @@ namespace {
 
 bool is_raw(const std::string& name) { return name.starts_with('@'); }
 
-/// Whether one of these raw registers is a secret of some product: then the tool is asked first
-/// what it is.
-bool may_be_secret(const std::vector<std::string>& names, const Context& context) {
-  const auto wanted = catalogue::Profile().describe(names);
-  if (!wanted) return false;
-  for (const catalogue::Profile& profile : context.profiles.load_all()) {
-    for (const catalogue::Parameter& secret : profile.parameters) {
-      if (secret.secrecy == catalogue::Secrecy::open) continue;
-      const bool is_wanted = std::any_of(
-          wanted->begin(), wanted->end(),
-          [&](const catalogue::Parameter& raw) { return catalogue::share_registers(raw, secret); });
-      if (is_wanted) return true;
-    }
+std::vector<RegisterSpan> spans_of(const std::vector<std::string>& names) {
+  std::vector<RegisterSpan> spans;
+  for (const catalogue::Parameter& raw :
+       catalogue::Profile().describe(names).value_or(std::vector<catalogue::Parameter>())) {
+    const auto count = static_cast<std::uint16_t>(catalogue::register_count(raw.encoding));
+    const auto last = static_cast<std::uint16_t>(raw.address.value + count - 1);
+    spans.push_back({raw.table, raw.address.value, last});
   }
-  return false;
+  return spans;
 }
 
 class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
@@ -34,7 +29,7 @@ class Get final : public Verb<std::vector<catalogue::Parameter>, Outcome> {
     const auto& names = options.names;
     const bool raw_only = !names.empty() && std::all_of(names.begin(), names.end(), is_raw);
     if (!raw_only) return;
-    need_ = may_be_secret(names, context) ? Need::raw_secrets : Need::raw_registers;
+    need_ = need_of_raw(spans_of(names), context);
   }
 
   [[nodiscard]] Need need() const override { return need_; }

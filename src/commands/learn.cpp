@@ -66,7 +66,7 @@ std::string sentence_of(const LearnPlan& plan, const LearnResult& result, Durati
     case Learned::none:
       return fmt::format(
           "none of {} followed {} through {}: its register is not among those "
-          "that the tool shows from {} to {}",
+          "that the tool shows from {} to {}, or follows later than within a second",
           counted(result.readable, "register"), plan.what.follows, seen, plan.where.from,
           plan.where.to);
     case Learned::unreadable:
@@ -90,6 +90,11 @@ class Learn final : public Verb<LearnPlan, Outcome> {
     return plan;
   }
 
+  Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
+    TRY(check_base(tool.device.profile(), tool.target, options_->file, context));
+    return plan;
+  }
+
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
     const auto result = watch(tool, plan, context);
     if (!result) return tl::unexpected(result.error());
@@ -98,26 +103,32 @@ class Learn final : public Verb<LearnPlan, Outcome> {
     std::vector<std::uint16_t> candidates;
     for (const work::Follower& each : result->followers) candidates.push_back(each.address);
     Listing listing(context, action_columns());
+    std::string text;
     if (result->how == Learned::one) {
       outcome.succeed();
       name_tool(tool, context.clock, *seen_);
       listing.add(action_record(learned_action(plan, result->followers.front(), seen_->seen),
                                 tool.target.shown, context.clock));
-      TRY_LET(const auto told, tell_profile(plan, *result, context));
-      sentence += told;
+      text = profile_text(plan, *result);
     } else {
       outcome.negate();
     }
-    return finish(listing, outcome,
-                  {.counts = {{"action", plan.what.name},
-                              {"how", std::string(work::learned_words.text(result->how))},
-                              {"candidates", report::Words(candidates)},
-                              {"numbers", report::Words(result->numbers)},
-                              {"looked_at", count(result->readable)},
-                              {"file", report::text_or_null(options_->file)}},
-                   .sentence = std::move(sentence),
-                   .target = tool.target.shown},
-                  context);
+    TRY(listing.end());
+    if (!text.empty()) {
+      TRY_LET(const auto told, tell_profile(text, context));
+      sentence += told;
+    }
+    return tell({.counts = {{"action", plan.what.name},
+                            {"how", std::string(work::learned_words.text(result->how))},
+                            {"candidates", report::Words(candidates)},
+                            {"numbers", report::Words(result->numbers)},
+                            {"looked_at", count(result->readable)},
+                            {"file", report::text_or_null(options_->file)},
+                            {"profile", report::text_or_null(text)}},
+                 .sentence = std::move(sentence),
+                 .target = tool.target.shown},
+                outcome, context)
+        .map([&] { return outcome; });
   }
 
  private:
@@ -127,7 +138,7 @@ class Learn final : public Verb<LearnPlan, Outcome> {
       const std::string left = counted(news.candidates, "register");
       if (news.kind == work::LearnNews::Kind::ready) {
         context.renderer.note(
-            fmt::format("{} is {}; now {} on the tool, {} times, some seconds apart ({} looked at)",
+            fmt::format("{} is {}; now {}, {} times, some seconds apart ({} looked at)",
                         plan.what.follows, news.to, plan.what.deed, plan.changes, left));
       } else {
         context.renderer.note(fmt::format("{} of {}: {} {} -> {}; {} may be the one", news.changes,
@@ -139,21 +150,29 @@ class Learn final : public Verb<LearnPlan, Outcome> {
                                 progress.counter(tool.target.shown + ": registers asked"));
   }
 
-  /// Writes the profile, or shows it; returns how the summary goes on.
-  Result<std::string> tell_profile(const Plan& plan, const LearnResult& result,
-                                   Context& context) const {
+  [[nodiscard]] std::string profile_text(const Plan& plan, const LearnResult& result) const {
     const work::Follower& follower = result.followers.front();
     seen_->action = {plan.what, follower.address, follower.value.value_or(0)};
     seen_->remarks = {fmt::format(
         "Register {} followed {} through {} ({}). That a write to it acts was not tried.",
         follower.address, plan.what.follows, counted(result.numbers.size() - 1, "change"),
         numbers_in_words(result.numbers))};
-    const std::string text = files::render_user_profile(*seen_);
+    return files::render_user_profile(*seen_);
+  }
+
+  /// Writes the profile, or shows it; returns how the summary goes on. What was found by hand is
+  /// shown also where it cannot be written.
+  Result<std::string> tell_profile(const std::string& text, Context& context) const {
     if (options_->file.empty()) {
-      context.renderer.note("lines for a profile of your own (-f FILE writes them):\n" + text);
+      TRY(show_profile(text, context));
+      context.renderer.note("these are lines for a profile of your own; -f FILE writes them");
       return std::string();
     }
-    TRY(context.disk.write(options_->file, text, Overwrite::refuse, Privacy::usual));
+    auto written = context.disk.write(options_->file, text, Overwrite::refuse, Privacy::usual);
+    if (!written) {
+      TRY(show_profile(text, context));
+      return tl::unexpected(std::move(written.error()));
+    }
     return fmt::format("; {} has it: use it with --profile {}, or in the tools file",
                        options_->file, shell_word(options_->file));
   }

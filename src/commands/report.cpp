@@ -67,6 +67,13 @@ Result<void> write_page(const Assessed& assessed, const ReportZone& zone,
   return context.disk.write(options.file, page, options.overwrite, Privacy::usual);
 }
 
+/// On a terminal no line is wider than it, unless all was wanted.
+std::string fitted_to_screen(const std::string& line, const Context& context) {
+  const auto& columns = context.io.out_columns;
+  const bool is_fitted = context.user.format == report::Format::table && columns && columns() > 0;
+  return is_fitted ? report::wrapped(line, columns()) : line;
+}
+
 Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
                          const ReportOptions& options, store::Reader& reader, Context& context) {
   if (!options.file.empty()) {
@@ -76,8 +83,10 @@ Result<void> tell_report(const Assessed& assessed, const ReportZone& zone,
   if (report::is_table(context.user.format)) {
     if (!options.file.empty()) return {};
     for (const std::string& line : report_lines(assessed, zone)) {
-      auto told = context.renderer.line({}, line);
-      if (!told) return told;
+      const std::string fitting = fitted_to_screen(line, context);
+      for (const std::string_view part : split(fitting, '\n')) {
+        TRY(context.renderer.line({}, part));
+      }
     }
     return {};
   }

@@ -7,6 +7,7 @@
 
 #include "listing.hpp"
 #include "progress.hpp"
+#include "raw_need.hpp"
 #include "records.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
@@ -68,9 +69,10 @@ std::size_t count_unread(const RegisterSpan& span, const catalogue::Profile& pro
 
 class ScanRegisters final : public Verb<std::monostate, Outcome> {
  public:
-  explicit ScanRegisters(const ScanOptions& options) : options_(&options) {}
+  ScanRegisters(const ScanOptions& options, const Context& context)
+      : options_(&options), need_(need_of_raw({*options.registers}, context)) {}
 
-  [[nodiscard]] Need need() const override { return Need::raw_registers; }
+  [[nodiscard]] Need need() const override { return need_; }
 
   Result<Plan> plan(const catalogue::Profile& /*profile*/,
                     const Target& /*target*/) const override {
@@ -121,13 +123,14 @@ class ScanRegisters final : public Verb<std::monostate, Outcome> {
   }
 
   const ScanOptions* options_;
+  Need need_;
 };
 
 }  // namespace
 
 Result<Outcome> scan_registers(const ScanOptions& options, Context& context) {
   TRY_LET(auto target, resolve_target(options.bus, context));
-  return run_verb(ScanRegisters(options), {.tools = {std::move(target)}}, 1, context);
+  return run_verb(ScanRegisters(options, context), {.tools = {std::move(target)}}, 1, context);
 }
 
 }  // namespace spindle::commands

@@ -27,11 +27,11 @@ class Set final : public Verb<SetPlan, SetResult> {
   [[nodiscard]] bool changes_tools() const override { return true; }
   /// Where no names are used nothing has to be known of the registers.
   [[nodiscard]] Need need() const override {
-    const bool raw_only =
-        options_->raw == RawWrites::ask && !texts_->empty() &&
-        std::all_of(texts_->begin(), texts_->end(),
-                    [](const PlacedText& assignment) { return is_raw(assignment.text); });
-    return raw_only ? Need::raw_writes : Need::named_registers;
+    const auto raw = std::count_if(texts_->begin(), texts_->end(),
+                                   [](const PlacedText& text) { return is_raw(text.text); });
+    if (options_->raw != RawWrites::ask || raw == 0) return Need::named_registers;
+    const bool is_all = raw == std::ssize(*texts_);
+    return is_all ? Need::raw_writes : Need::mixed_writes;
   }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 

@@ -369,7 +369,9 @@ bool is_raw(const std::string& assignment) { return assignment.starts_with('@');
 std::string raw_in_words(const std::vector<PlacedText>& assignments) {
   std::vector<std::string> raw;
   for (const PlacedText& assignment : assignments) {
-    if (is_raw(assignment.text)) raw.push_back(assignment.text);
+    // What is written may be a secret: which registers these are is known to the profile only.
+    if (is_raw(assignment.text))
+      raw.push_back(assignment.text.substr(0, assignment.text.find('=')));
   }
   if (raw.empty()) return {};
   return fmt::format("write {}, of which it may not be known what it does", fmt::join(raw, ", "));

@@ -17,6 +17,9 @@ using report::Field;
 using report::Record;
 using report::Tone;
 
+/// The unit of the torque in front of it, with which it stays.
+constexpr std::string_view unit_key = "torque_unit";
+
 /// Columns of the stream that say nothing of a result.
 constexpr std::array<std::string_view, 5> not_of_result = {"time", "target", "kind", "source",
                                                            "text"};
@@ -28,6 +31,10 @@ bool has(const std::vector<Column>& columns, std::string_view key) {
 
 std::string text_of(const Field& field) {
   return field.shown.empty() ? report::to_text(field.cell) : field.shown;
+}
+
+void add_unit(const std::string& unit, Field& to) {
+  if (!unit.empty() && !to.shown.empty()) to.shown += " " + unit;
 }
 
 /// "preset 1" and "2.72 N.m": a head has a word, and perhaps a unit behind it.
@@ -43,22 +50,39 @@ std::string labelled(const Column& column, std::string text) {
   return label + " " + text;
 }
 
+/// What goes last where there is little room. The result and the count of NG stay.
+constexpr std::uint8_t rank_of_kept = 250;
+constexpr std::uint8_t rank_of_link = 251;
+constexpr std::uint8_t rank_of_ok = 252;
+
+/// Whole or not at all, so it is drawn as numbers are.
+Column on_board(const Column& column) {
+  report::Room room = report::left_out(column.room.rank == 0 ? rank_of_kept : column.room.rank);
+  if (column.key == "result") room = {};
+  return {"", column.key, Align::right, 0, room};
+}
+
 }  // namespace
 
 WatchBoard::WatchBoard(std::vector<std::string> targets, const std::vector<Column>& columns) {
   for (std::string& target : targets) tools_.push_back({.target = std::move(target)});
   const bool has_results = has(columns, "result");
-  columns_ = {{"", "target"}, {"", "link"}};
+  columns_ = {{"", "target"}, {"", "link", Align::left, 0, report::left_out(rank_of_link)}};
   for (const Column& column : columns) {
     const bool is_kind = column.key == "kind" && !has_results;
     const bool is_left_out =
         std::find(not_of_result.begin(), not_of_result.end(), column.key) != not_of_result.end();
     if (is_left_out && !is_kind) continue;
+    if (column.key == unit_key && !of_result_.empty()) {
+      with_unit_ = of_result_.back().key;
+      continue;
+    }
     of_result_.push_back(column);
-    columns_.push_back({"", column.key, Align::left, 0, report::left_out(column.room.rank)});
+    columns_.push_back(on_board(column));
   }
   if (!has_results) return;
-  columns_.insert(columns_.end(), {{"", "ok", Align::right}, {"", "ng", Align::right}});
+  columns_.push_back({"", "ok", Align::right, 0, report::left_out(rank_of_ok)});
+  columns_.push_back({"", "ng", Align::right});
 }
 
 WatchBoard::Tool* WatchBoard::find(const std::string& target) {
@@ -79,7 +103,10 @@ void WatchBoard::note(const Record& record, const std::string& preset_key) {
   const bool counts = result == nullptr || !verdict.empty();
   for (const Column& column : of_result_) {
     const Field* const field = record.find(column.key);
-    if (field != nullptr && (counts || column.key == preset_key)) note_cell(*field, column, *tool);
+    if (field == nullptr || !(counts || column.key == preset_key)) continue;
+    note_cell(*field, column, *tool);
+    const Field* const unit = column.key == with_unit_ ? record.find(unit_key) : nullptr;
+    if (unit != nullptr) add_unit(text_of(*unit), tool->cells[column.key]);
   }
 }
 
@@ -96,8 +123,7 @@ void WatchBoard::note_link(const Record& record, Tool& tool) const {
 void WatchBoard::note_cell(const Field& field, const Column& column, Tool& tool) const {
   Field noted = field;
   const std::string text = text_of(field);
-  const bool is_word =
-      column.key == "result" || column.key == "kind" || column.key == "torque_unit";
+  const bool is_word = column.key == "result" || column.key == "kind";
   noted.shown = text.empty() || is_word ? text : labelled(column, text);
   noted.cell = text;
   tool.cells[column.key] = std::move(noted);

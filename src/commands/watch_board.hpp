@@ -46,6 +46,7 @@ class WatchBoard {
   std::vector<Tool> tools_ = {};
   std::vector<report::Column> of_result_ = {};  ///< that are taken from the stream
   std::vector<report::Column> columns_ = {};    ///< of the board
+  std::string with_unit_ = {};  ///< the column whose unit the next one of the stream says, by key
 };
 
 }  // namespace spindle::commands

@@ -13,6 +13,11 @@
 namespace spindle::device {
 namespace {
 
+/// Which tool it is, as a profile of the user's own names it.
+std::string text_of(const catalogue::Identity& identity) {
+  return fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
+}
+
 /// How often the last event is read before giving up on one that stands still meanwhile.
 constexpr int max_event_reads = 5;
 
@@ -339,6 +344,7 @@ void Device::set_retries(unsigned retries) {
 
 void Device::use(const catalogue::Profile& profile, catalogue::Identity identity) {
   profile_ = &profile;
+  identity_text_ = text_of(identity);
   identity_ = std::move(identity);
   session_->set_rules(demux_rules(*profile_, session_->options().rules.framing, at_));
   session_->hide(secrets_of(*profile_));
@@ -357,8 +363,7 @@ Result<void> Device::require_known_registers() {
   auto identity = catalogue::decode_identity(facts, answer.value_or(Bytes()));
   const catalogue::Judgement judgement = catalogue::judge(*profile_, identity);
   registers_known_ = judgement == catalogue::Judgement::fits;
-  identity_text_ =
-      fmt::format("serial {}, firmware {}", identity.serial, identity.firmware.value_or(0));
+  identity_text_ = text_of(identity);
   if (!registers_known_) return tl::unexpected(misfit(judgement, identity));
   identity_ = std::move(identity);
   return ask_more();

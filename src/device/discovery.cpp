@@ -14,6 +14,9 @@ using catalogue::Slice;
 
 constexpr std::size_t head_bytes = 4;
 
+/// 224.0.0.0: from here on no address is that of one computer (RFC 1112, section 4; RFC 919).
+constexpr std::uint32_t first_group = 0xE0000000;
+
 ByteView part_of(ByteView answer, const Slice& slice) {
   return answer.subspan(slice.offset, slice.size);
 }
@@ -66,7 +69,9 @@ std::optional<FoundTool> decode_found(const catalogue::DiscoverySpec& spec,
                  .mac = mac_in(answer, spec.mac),
                  .firmware = number_in(answer, spec.firmware),
                  .kind = number_in(answer, spec.kind)};
-  if (const auto address = number_in(answer, spec.address).value_or(0); address != 0) {
+  const auto address = number_in(answer, spec.address).value_or(0);
+  if (address >= first_group) return std::nullopt;  // no tool can be there
+  if (address != 0) {
     tool.address = ipv4_text(address);
   }
   if (const auto port = number_in(answer, spec.tool_port).value_or(0); port != 0) {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "bad_frames.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/curve.hpp"
 #include "spindle/catalogue/event_layout.hpp"
@@ -78,9 +79,6 @@ std::string_view reason_of(Sequence novelty, EventOrigin origin) {
 /// What a tool pushes because it was armed comes within this time. What comes later has happened.
 constexpr Duration held_comes_within = std::chrono::seconds(1);
 
-/// Frames that cannot be what they say they are are told at once, then this often.
-constexpr Duration bad_frames_told_every = std::chrono::minutes(1);
-
 /// A frame that came unasked, as it was understood.
 struct Heard {
   catalogue::PushedFrame frame = {};
@@ -102,7 +100,7 @@ class CounterSource : public EventSource {
 
   Result<void> attach(Device& device, Duration unseen) override;
   void forget() override {
-    curves_.flush();
+    tell_rest();
     tracker_ = {};
     first_.reset();
   }
@@ -113,14 +111,19 @@ class CounterSource : public EventSource {
     if (auto heard = understand(frame)) hear(std::move(*heard));
   }
   void handle_waiting() override;
-  [[nodiscard]] TimePoint next_due() const override { return curves_.next_due(); }
+  [[nodiscard]] TimePoint next_due() const override {
+    return std::min({curves_.next_due(), bad_events_.next_due(), bad_curves_.next_due()});
+  }
   Result<void> run_due(const Ask& /*ask*/) override {
-    curves_.run_due(clock_->now());
+    const TimePoint now = clock_->now();
+    curves_.run_due(now);
+    tell_bad_events(bad_events_.due(now));
+    tell_bad_curves(bad_curves_.due(now));
     return {};
   }
   void disarm() override {
     handle_waiting();
-    curves_.flush();
+    tell_rest();
   }
 
  protected:
@@ -144,6 +147,9 @@ class CounterSource : public EventSource {
   void judge(EventOrigin origin, const Registers& block, WallTime time);
   void judge_unread_first(const Registers& block, WallTime time);
   void note_bad(const link::Spontaneous& frame, const std::string& why);
+  void tell_bad_events(const std::optional<BadFrames::News>& news);
+  void tell_bad_curves(const std::optional<BadFrames::News>& news);
+  void tell_rest();
 
   catalogue::EventLayout layout_;
   catalogue::EventFrames frames_;
@@ -152,8 +158,8 @@ class CounterSource : public EventSource {
   CurveCollector curves_;
   bool has_place_ = true;
   bool was_away_ = false;  ///< the next event is the first behind a new connection
-  std::size_t bad_frames_ = 0;
-  std::optional<TimePoint> bad_told_at_ = std::nullopt;
+  BadFrames bad_events_ = {};
+  BadFrames bad_curves_ = {};
   Device* device_ = nullptr;
   EventTracker tracker_ = {};
   /// How long the tool was not listened to behind the last event that was recalled.
@@ -175,7 +181,7 @@ void CounterSource::recall(std::optional<LastEvent> last) {
 /// happens in between is either pushed or fetched.
 Result<void> CounterSource::attach(Device& device, Duration unseen) {
   device_ = &device;
-  curves_.flush();  // the rest of it went the old connection's way
+  tell_rest();  // more of it went the old connection's way
   if (!has_place_) return attach_unread(unseen);
   if (tracker_.last()) {
     tracker_.look_again(std::exchange(unseen_, std::nullopt).value_or(unseen));
@@ -280,21 +286,26 @@ void CounterSource::hear(Heard heard) {
                      heard.wall);
 }
 
-/// What cannot be understood is said, though a line that is full of it says so once in a while.
 void CounterSource::note_bad(const link::Spontaneous& frame, const std::string& why) {
-  ++bad_frames_;
-  const TimePoint now = clock_->now();
-  if (bad_told_at_ && now < *bad_told_at_ + bad_frames_told_every) return;
-  bad_told_at_ = now;
-  const std::size_t frames = std::exchange(bad_frames_, 0);
-  const std::string reason = fmt::format(
-      "{} that came unasked could not be understood; the last has function 0x{:02X}, but {}",
-      counted(frames, "frame"), frame.pdu.function, why);
   if (frames_.holds_event(frame.pdu.function)) {
-    tell_(EventGap{.missed = std::nullopt, .reason = reason});
+    tell_bad_events(bad_events_.note(frame, why, clock_->now()));
   } else {
-    tell_(ToolCurve{.time = frame.wall, .is_whole = false, .trouble = reason});
+    tell_bad_curves(bad_curves_.note(frame, why, clock_->now()));
   }
+}
+
+void CounterSource::tell_bad_events(const std::optional<BadFrames::News>& news) {
+  if (news) tell_(EventGap{.missed = std::nullopt, .reason = news->reason});
+}
+
+void CounterSource::tell_bad_curves(const std::optional<BadFrames::News>& news) {
+  if (news) tell_(ToolCurve{.time = news->time, .is_whole = false, .trouble = news->reason});
+}
+
+void CounterSource::tell_rest() {
+  curves_.flush();
+  tell_bad_events(bad_events_.rest());
+  tell_bad_curves(bad_curves_.rest());
 }
 
 /// The first event of a tool whose last one cannot be read. What comes while it may answer to the

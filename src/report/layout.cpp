@@ -320,10 +320,12 @@ std::size_t draw_line(Row row, std::string_view texts, const Table& table, std::
     const std::size_t begin = used + pending;
     const std::size_t free = table.layout.room > begin ? table.layout.room - begin : 0;
     const bool is_last = at + 1 == row.size();
+    const bool is_right = table.columns[at].align == Align::right;
+    // A part of a number is another number.
+    if (is_right && row[at].width > free) continue;
     const std::string text =
         fitted(row[at].in(texts), is_last ? free : std::min(wanted, free), Keep::beginning);
     const std::size_t width = display_width(text);
-    const bool is_right = table.columns[at].align == Align::right;
     const std::size_t padding = std::min(wanted > width ? wanted - width : 0, free - width);
     if (is_right) pending += padding;
     if (!text.empty()) {

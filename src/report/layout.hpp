@@ -61,7 +61,8 @@ struct Table {
 /// cells.
 void draw_row(Row row, std::string_view texts, const Table& table, RowKind kind, std::string& out);
 
-/// The same as one line of at most `layout.room` cells, cut where it has to be, without its end.
+/// The same as one line of at most `layout.room` cells, without its end. Texts are cut where they
+/// have to be; what stands at the right, as numbers do, is left out instead.
 /// Returns how many cells it takes.
 std::size_t draw_line(Row row, std::string_view texts, const Table& table, std::string& out);
 

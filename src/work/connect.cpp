@@ -121,9 +121,23 @@ Result<void> find_profile(OpenTool& tool, Need need, const Environment& environm
   return use_found(tool, std::move(identification), need);
 }
 
+/// The user may name a profile that the tool cannot prove, but not one that opens what is closed.
+Result<void> check_named(const OpenTool& tool, const Identification& identification) {
+  const bool is_closed = !identification.candidates.empty() &&
+                         identification.matched->writes == catalogue::Writes::listed;
+  if (!is_closed) return {};
+  return tl::unexpected(with_target(
+      Error{.code = Errc::mismatch,
+            .message = fmt::format("it says that it is of profile {}, not of {}, which was named",
+                                   identification.matched->id, tool.profile->id),
+            .hint = "leave the profile out, or name the one that it says"},
+      tool.target));
+}
+
 /// A tool that can say what it is may not take every write. What cannot is what the user says.
 Result<void> recognise(OpenTool& tool, const Environment& environment) {
-  if (!tool.target.profile.empty()) return tool.device.require_known_registers();
+  const bool is_named = !tool.target.profile.empty();
+  if (is_named && tool.profile->identity) return tool.device.require_known_registers();
   if (tool.target.endpoint.medium != link::Medium::tcp) return {};
   const auto answer = tool.device.report_server_id();
   constexpr std::array silent = {Errc::exception_response, Errc::no_answer, Errc::closed,
@@ -133,6 +147,7 @@ Result<void> recognise(OpenTool& tool, const Environment& environment) {
   if (says_nothing) return {};
   if (!answer) return tl::unexpected(answer.error());
   TRY_LET(auto identification, match_identity(*answer, {}, environment));
+  if (is_named) return check_named(tool, identification);
   if (!identification.candidates.empty()) {
     return use_found(tool, std::move(identification), Need::raw_writes);
   }
@@ -275,7 +290,9 @@ Result<OpenTool> open_as_named(const Target& target, catalogue::Profile profile,
     return tool;
   }
   auto known = [&] {
-    if (need == Need::raw_writes) return recognise(*tool, environment);
+    const bool is_named = !target.profile.empty();
+    const bool writes_raw = need == Need::raw_writes || (need == Need::mixed_writes && is_named);
+    if (writes_raw) return recognise(*tool, environment);
     return target.profile.empty() ? find_profile(*tool, need, environment)
                                   : tool->device.require_known_registers();
   }();

@@ -14,6 +14,8 @@ namespace {
 
 using link::NetworkInterface;
 
+constexpr Duration second_question = std::chrono::seconds(1);
+
 std::string in_words(const std::vector<NetworkInterface>& interfaces) {
   std::vector<std::string> names;
   for (const NetworkInterface& each : interfaces) {
@@ -105,7 +107,9 @@ Result<ScanResult> scan_group(const catalogue::DiscoverySpec& spec,
   device::FoundTools found;
   for (TimePoint now = clock.now(); now < end; now = clock.now()) {
     if (now >= next_question) {
-      next_question = now + spec.every;
+      // The first question may be lost on its way, and few scans last longer than one more.
+      next_question =
+          now + (questions.empty() ? std::min(spec.every, second_question) : spec.every);
       questions.insert(++number);
       auto faults = sockets->send(device::discovery_question(spec, number));
       if (questions.size() == 1)

@@ -6,9 +6,6 @@
 namespace spindle::work {
 namespace {
 
-/// Moments that a register may need to follow.
-constexpr std::size_t moments_to_settle = 2;
-
 template <typename Map, typename Drops>
 void drop_if(Map& map, Drops drops) {
   for (auto at = map.begin(); at != map.end();) at = drops(*at) ? map.erase(at) : std::next(at);
@@ -16,8 +13,8 @@ void drop_if(Map& map, Drops drops) {
 
 }  // namespace
 
-FollowerSearch::FollowerSearch(catalogue::LearnedBy by, const Moment& first)
-    : by_(by), numbers_({first.watched}), last_(first.watched) {
+FollowerSearch::FollowerSearch(catalogue::LearnedBy by, const Moment& first, std::size_t settling)
+    : by_(by), settling_(settling), numbers_({first.watched}), last_(first.watched) {
   for (const auto& [address, value] : first.registers) {
     candidates_[address] = {.held = {{first.watched, value}}, .rest = value, .now = value};
   }
@@ -40,7 +37,7 @@ bool FollowerSearch::keeps(Candidate& candidate, std::uint16_t watched, std::uin
 
 bool FollowerSearch::take_value(const Moment& moment) {
   settled_ = moment.watched == last_ ? settled_ + 1 : 0;
-  if (settled_ < moments_to_settle) return false;
+  if (settled_ < settling_) return false;
   drop_if(candidates_, [&](auto& each) {
     const auto now = moment.registers.find(each.first);
     return now == moment.registers.end() || !keeps(each.second, moment.watched, now->second);
@@ -65,7 +62,7 @@ bool FollowerSearch::clears(Candidate& candidate, std::uint16_t watched, std::ui
   if (is_off && (stands || is_clearing_)) candidate.shown.insert(now);
   if (!stands) return true;
   if (!is_off) return candidate.moments == 0;
-  return ++candidate.moments <= moments_to_settle;
+  return ++candidate.moments <= settling_;
 }
 
 bool FollowerSearch::take_clearing(const Moment& moment) {
@@ -78,7 +75,7 @@ bool FollowerSearch::take_clearing(const Moment& moment) {
     const auto now = moment.registers.find(each.first);
     return now == moment.registers.end() || !clears(each.second, moment.watched, now->second);
   });
-  const bool ends = is_clearing_ && (settled_++ >= moments_to_settle || moment.watched != 0);
+  const bool ends = is_clearing_ && (settled_++ >= settling_ || moment.watched != 0);
   if (!ends) return false;
   close_clearing();
   numbers_.push_back(cleared_);

@@ -15,6 +15,9 @@ namespace {
 // From one moment to the next. A change that a person makes by hand lasts longer.
 constexpr Duration moment_pause = std::chrono::milliseconds(150);
 
+// A register may follow about a second later.
+constexpr std::size_t moments_to_settle = 6;
+
 // Where several still follow, so many times the changes are waited for.
 constexpr std::size_t patience = 2;
 
@@ -150,7 +153,7 @@ Result<LearnResult> learn_register(OpenTool& tool, const LearnPlan& plan, Clock&
     TRY_LET(const auto moment, reader.read());
     const TimePoint now = clock.now();
     if (moment && !search) {
-      search.emplace(plan.what.by, *moment);
+      search.emplace(plan.what.by, *moment, moments_to_settle);
       tell({.to = moment->watched, .candidates = survey.answered});
     } else if (moment) {
       std::uint16_t before = search->numbers().back();

@@ -161,6 +161,16 @@ class Multicast(DiscoverTest):
         self.assertEqual(len({tool["serial"] for tool in tools}), len(tools))
         self.assertLess(finished.paced, support.SOON)
 
+    def test_addresses_that_no_tool_can_have(self):
+        tools, summary = self.found(lambda number: [
+            answer(number, address="255.255.255.255"), answer(number, serial="2", address="239.1.1.1")], status=1)
+        self.assertEqual((tools, summary["found"], summary["strange"]), ([], 0, 2))
+
+    def test_a_question_that_was_lost_is_asked_again(self):
+        with Responder(lambda number: [], self.port) as responder:
+            self.discover("--interface", "lo", "--for", "1500ms", "--json", status=1)
+        self.assertEqual(len(responder.questions), 2)
+
     def test_nothing_found_says_why_it_may_be(self):
         finished = self.discover("--interface", "lo", "--for", "200ms", status=1)
         self.assertEqual(finished.stdout, "")
@@ -214,6 +224,26 @@ class Writing(DiscoverTest):
         self.assertEqual(again.records("summary")[0]["added"], [])
         self.assertEqual(self.tools.read_text("utf-8"), after)
 
+    def test_a_tool_that_has_moved_is_told_and_not_added_again(self):
+        self.tools.write_text('tools:\n  press: {url: "tcp://10.0.0.1", serial: "2401190043"}\n', "utf-8")
+        finished = self.write("--yes", "--json")
+        self.assertEqual(finished.records("summary")[0]["added"], ["bmt-2401190042"])
+        self.assertIn("press of", finished.said)
+        self.assertIn("has its serial number 2401190043, and tcp://10.0.0.1; mend the url there", finished.said)
+        self.assertNotIn("192.168.1.101", self.tools.read_text("utf-8"))
+
+    def test_a_flood_is_not_added(self):
+        self.tools.write_text(self.BEFORE, "utf-8")
+
+        def flood(number):
+            for tool in range(300):
+                yield answer(number, serial=f"{tool:010}", address=f"10.0.{tool // 250}.{tool % 250 + 1}")
+        with Responder(flood, self.port):
+            finished = self.discover("--interface", "lo", "--for", "2s", "--write", "--yes", "--tools", self.tools,
+                                     status=2)
+        self.assertIn("too many to be added at once", finished.said)
+        self.assertEqual(self.tools.read_text("utf-8"), self.BEFORE)
+
     def test_without_a_yes_nothing_is_written(self):
         self.tools.write_text(self.BEFORE, "utf-8")
         finished = self.write(status=2)
@@ -264,6 +294,13 @@ class Sweep(unittest.TestCase):
         finished = self.sweep("127.0.0.1", "--port", device.port, "--units", "1-3", "--json")
         self.assertEqual([(tool["unit"], tool["endpoint"]) for tool in finished.records("discovered")],
                          [(unit, f"tcp://127.0.0.1:{device.port}?unit={unit}") for unit in (1, 2, 3)])
+        # All of them are one tool.
+        with tempfile.TemporaryDirectory(prefix="spindle-discover-") as folder:
+            tools = pathlib.Path(folder) / "tools.yaml"
+            tools.write_text("tools: {}\n", "utf-8")
+            added = self.sweep("127.0.0.1", "--port", device.port, "--units", "1-3", "--write", "--yes", "--tools",
+                               tools, "--json")
+        self.assertEqual(len(added.records("summary")[0]["added"]), 1, added)
 
     def test_what_is_too_much_or_no_network(self):
         for typed, why in (("10.0.0.0/8", "16777216 addresses are more than a sweep asks"),

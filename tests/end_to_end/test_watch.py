@@ -442,10 +442,9 @@ class TerminalTest(unittest.TestCase):
             shown = b""
             support.wait_until(lambda: server.armed, "the watch arms the output")
             with contextlib.suppress(OSError):  # the end of the terminal
-                for kind in (1, 2):
-                    before = shown.count(b"of 1 tool connected")
+                for kind, counts in ((1, b"1 OK  0 NG"), (2, b"1 OK  1 NG")):
                     server.event(kind)
-                    while shown.count(b"of 1 tool connected") <= before:
+                    while counts not in shown:
                         self.assertTrue(support.is_readable(terminal))
                         shown += os.read(terminal, 4096)
                 while support.is_readable(terminal):
@@ -454,11 +453,11 @@ class TerminalTest(unittest.TestCase):
             os.close(terminal)
         text = shown.decode()
         self.assertEqual(os.waitstatus_to_exitcode(status), 0, text)
-        self.assertIn("1 of 1 tool connected, 1 result, 0 NG", text)
-        self.assertIn("1 of 1 tool connected, 2 results, 1 NG", text)
-        # What stays on the screen has no status line: each was wiped before the next record.
+        self.assertIn("preset 1  torque 2.72  OK  1 OK  0 NG", text)
+        self.assertIn("preset 2  torque 2.73  NG  1 OK  1 NG", text)
+        # What stays on the screen has no line of the board: each was wiped before the next record.
         lines = [line.rsplit("\r\x1b[K", 1)[-1] for line in text.split("\r\n")]
-        self.assertEqual([line for line in lines if "tool connected" in line], [])
+        self.assertEqual([line for line in lines if " NG" in line and "events" not in line and "push" not in line], [])
 
 
 class ReconnectingTest(unittest.TestCase):

@@ -304,14 +304,19 @@ class Gen2Device:
 
     def happen(self, block, form=0x65, places=None):
         """An event: it stands at its places (or some of them), and is pushed where a client armed that."""
+        self.hold(block, self.event_places if places is None else places)
         with self.lock:
-            for place in self.event_places if places is None else places:
-                for at, word in enumerate(struct.unpack(f">{EVENT_WORDS}H", block)):
-                    self.input[place + at] = word
-                self.input.setdefault(place + EVENT_WORDS, 0)
             armed = self.armed
         if armed:
             self.push(pushed(form, block))
+
+    def hold(self, block, places):
+        """An event stands there, and nothing is pushed."""
+        with self.lock:
+            for place in places:
+                for at, word in enumerate(struct.unpack(f">{EVENT_WORDS}H", block)):
+                    self.input[place + at] = word
+                self.input.setdefault(place + EVENT_WORDS, 0)
 
     def show(self, register, word, *mirrors):
         """The user does something on the tool: its status says it, and so do holding registers."""

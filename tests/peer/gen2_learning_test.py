@@ -96,6 +96,18 @@ class FindEventBlock(LearningTest):
         self.assert_ends(outcome, 0)
         self.assertEqual([value["value"] for value in outcome.of_type("value")], [777, 2.0625])
 
+    def test_what_it_shows_people_can_be_saved_as_it_stands(self):
+        self.device.event_places = [5300]
+        numbers = itertools.count(100)
+        with Person((lambda: self.device.happen(event_block(number=next(numbers))) for _ in itertools.count()), pause=0.7):
+            outcome = support.run(SPINDLE, "do", self.url, "find-event-block")
+        self.assert_ends(outcome, 0)
+        path = pathlib.Path(self.folder.name) / "my-tool.yaml"
+        path.write_text(outcome.out, "utf-8")
+        self.check(path)
+        self.assertIn("\n  first: 5300", outcome.out)
+        self.assertIn("serial 2401190042, firmware 4002", outcome.out)
+
     def test_in_two_parts_where_108_are_refused(self):
         self.device.event_places = [6400]
         self.device.longest_read = 107
@@ -118,10 +130,8 @@ class FindEventBlock(LearningTest):
     def test_what_only_looks_like_it_is_not_taken_for_it(self):
         one = event_block(number=9, torque=2.5)
         other = event_block(number=9, torque=1.5)  # the same number and time
-        def happen():
-            self.device.happen(other, places=[900])
-            self.device.happen(one, places=[])
-        outcome = self.find(events=(happen for _ in itertools.count()), status=1)
+        self.device.hold(other, [900])
+        outcome = self.find(events=(lambda: self.device.happen(one, places=[]) for _ in itertools.count()), status=1)
         self.assertEqual(outcome.of_type("block"), [])
         self.assertIn(900, outcome.of_type("summary")[0]["similar"])
 
@@ -151,7 +161,7 @@ class Learn(LearningTest):
         with self.device.lock:
             return any(function == 4 and data[2:] == b"\0\x01" for function, data in self.device.requests)
 
-    def learn(self, what, deeds, *arguments, status=0, pause=2.0):
+    def learn(self, what, deeds, *arguments, status=0, pause=2.5):
         with Person(deeds, pause, self.is_watched):
             outcome = spindle("learn", self.url, what, *arguments)
         self.assert_ends(outcome, status)
@@ -180,6 +190,32 @@ class Learn(LearningTest):
         # A file that is there is never written over.
         again = spindle("learn", self.url, "select-preset", "-f", str(self.file))
         self.assert_ends(again, 2)
+
+    def test_what_cannot_be_written_is_shown(self):
+        self.device.show(PRESET, 5, 5010)
+        nowhere = pathlib.Path(self.folder.name) / "none" / "my-bmt.yaml"
+        early = spindle("learn", self.url, "select-preset", "-f", str(nowhere))
+        self.assert_ends(early, 2)
+        self.assertIn("there is no folder", early.err)
+
+        def vanish():
+            self.folder.cleanup()
+            self.device.show(PRESET, 7, 5010)
+
+        deeds = itertools.chain([vanish], self.presets(5010))
+        with Person(deeds, 2.5, self.is_watched):
+            outcome = support.run(SPINDLE, "learn", self.url, "select-preset", "-f", str(self.file))
+        self.assert_ends(outcome, 74)
+        self.assertIn("\nextends: doga-gen2\n", outcome.out)
+        self.assertIn("register: 5010", outcome.out)
+
+    def test_a_profile_that_would_not_be_found_is_refused_before_anything_is_done(self):
+        base = pathlib.Path(self.folder.name) / "bases" / "my-base.yaml"
+        base.parent.mkdir()
+        base.write_text("format: 1\nid: my-base\nextends: doga-gen2\ntitle: \"One of ours\"\n", "utf-8")
+        outcome = spindle("learn", self.url, "lock", "--profile", str(base), "-f", str(self.file))
+        self.assert_ends(outcome, 2)
+        self.assertIn(f"found only beside {base}", " ".join(outcome.err.split()))
 
     def test_none_follows(self):
         outcome = self.learn("select-preset", self.presets(), "-f", str(self.file), status=1)

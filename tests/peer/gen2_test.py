@@ -9,7 +9,7 @@ import unittest
 import gen2_device
 import support
 from gen2_device import Gen2Device, curve, event_block, f32, pushed
-from support import spindle
+from support import SPINDLE, spindle
 
 PASSWORD, UNIT, TARGET_1 = 3705, 3657, 2
 
@@ -240,6 +240,23 @@ class Writing(Gen2Test):
                     self.assertNotEqual(outcome.status, 0, outcome)
         self.assertEqual(self.written(), [])
 
+    def test_a_profile_that_no_tool_can_prove_opens_nothing(self):
+        for profile in ("kolver-kducer", "huanyang-fc01", "eastron-sdm72d-m"):
+            for assignments in (["@holding:5000=1"], ["@holding:3652=1"], ["@holding:5000=1", "@holding:12=1"]):
+                with self.subTest(profile=profile, assignments=assignments):
+                    outcome = spindle("set", f"{self.url}?unit=1", *assignments, "--raw", "--yes", "--profile", profile)
+                    self.assert_ends(outcome, 8)
+                    self.assertIn("it says that it is of profile doga-gen2", outcome.err)
+        mixed = spindle("set", f"{self.url}?unit=1", "program=1", "@holding:5000=1", "--raw", "--yes",
+                        "--profile", "kolver-kducer")
+        self.assertNotEqual(mixed.status, 0, mixed)
+        self.assertEqual(self.written(), [])
+
+    def test_half_of_a_value_is_not_written(self):
+        for register in (TARGET_1, TARGET_1 + 1):
+            self.ask("set", f"@holding:{register}=1", "--raw", "--yes", status=2)
+        self.assertEqual(self.written(), [])
+
     def test_the_commands_are_no_settings(self):
         for register in (5000, 5001, 5350):
             outcome = spindle("set", self.url, f"@holding:{register}=1", "--raw", "--yes")
@@ -312,6 +329,29 @@ class Secret(Gen2Test):
         self.assertEqual(self.device.number(PASSWORD), 1234)
         self.assertNotIn("4711", outcome.out + outcome.err)
         self.assertNotIn("1234", outcome.out + outcome.err)
+
+    def test_no_sum_of_it_is_shown(self):
+        for step in ("control.password+=1", "control.password=+5%", f"@holding:{PASSWORD}+=1"):
+            outcome = self.ask("set", step, "--raw", "--dry-run", status=2)
+            for number in ("4711", "4712", "4946"):
+                self.assertNotIn(number, outcome.out + outcome.err)
+
+    def test_is_not_dumped(self):
+        span = ("--registers", f"{PASSWORD - 5}..{PASSWORD + 5}")
+        for profile in ((), ("--profile", "doga-bm"), ("--profile", "doga-gen2"), ("--profile", "kolver-kducer")):
+            for more in ((), ("--verbose",)):
+                with self.subTest(profile=profile, more=more):
+                    outcome = support.run(SPINDLE, "dump", f"{self.url}?unit=1", "-", *span, *profile, *more)
+                    self.assert_ends(outcome, 0)
+                    self.assertIn(f"from: {PASSWORD + 1}", outcome.out)
+                    self.assertNotIn("4711", outcome.out + outcome.err)
+                    self.assertNotIn("12 67", outcome.err)
+        scanned = support.run(SPINDLE, "scan", f"{self.url}?unit=1", *span, "--verbose")
+        self.assert_ends(scanned, 0)
+        self.assertNotIn("4711", scanned.out + scanned.err)
+        self.assertNotIn("12 67", scanned.err)
+        asked = support.run(SPINDLE, "dump", f"{self.url}?unit=1", "-", *span, "--include-secrets")
+        self.assertIn("4711", asked.out)
 
     def test_is_not_watched(self):
         self.ask("watch", "control.password", "--count", "1", status=2)

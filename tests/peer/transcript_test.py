@@ -29,6 +29,8 @@ from pymodbus.transaction import ModbusRtuFramer, ModbusSocketFramer  # noqa: E4
 FOLDER = HERE / "transcripts"
 
 PATTERNS = (
+    (re.compile(r"\(change [0-9a-f]{8}\)"), "(change ID)"),
+    (re.compile(r'"change_id":"[0-9a-f]{8}"'), '"change_id":"ID"'),
     (re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z"), "YYYY-MM-DDThh:mm:ss.mmmZ"),
     (re.compile(r"\d{4}-\d\d-\d\dT\d{6}\.\d{3}Z"), "YYYY-MM-DDThhmmss.mmmZ"),
     (re.compile(r"\b\d+(\.\d+)? ms$"), "N ms"),

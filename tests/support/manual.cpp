@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "cli/help.hpp"
 #include "spindle/base/text.hpp"
 
 namespace spindle::test {
@@ -122,9 +123,8 @@ std::string heading_of(const cli::CommandDescription& command) {
 
 std::string command_text(const cli::CommandDescription& command) {
   std::string text = heading_of(command) + mdoc_prose(sentence(command.meaning));
-  text += option_list(command.options);
+  text += option_list(cli::left_to_manual(command));
   if (command.appendix != nullptr) text += appendix_text(command.appendix());
-  if (!command.examples.empty()) text += ".Pp\nExamples:\n" + mdoc_literal(command.examples);
   for (const cli::CommandDescription& below : command.commands) text += command_text(below);
   return text;
 }
@@ -208,9 +208,7 @@ std::vector<Placeholder> manual_placeholders(const cli::Description& description
   std::string commands;
   for (const cli::CommandDescription& command : description.commands)
     commands += command_text(command);
-  return {{"COMMANDS", std::move(commands)},
-          {"COMMON_OPTIONS", option_list(description.common)},
-          {"EXIT_STATUS", exit_status_list()}};
+  return {{"COMMANDS", std::move(commands)}, {"EXIT_STATUS", exit_status_list()}};
 }
 
 Result<std::string> expand_template(std::string_view source,

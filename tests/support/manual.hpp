@@ -17,7 +17,8 @@ struct Placeholder {
   std::string text;
 };
 
-/// COMMANDS, COMMON_OPTIONS and EXIT_STATUS: what the program itself knows.
+/// COMMANDS, without what the help of a command says, and EXIT_STATUS: what the program itself
+/// knows.
 std::vector<Placeholder> manual_placeholders(const cli::Description& description);
 
 /// The page. Error `bad_file` for a placeholder of the source that is none of `placeholders`.

@@ -13,6 +13,8 @@
 //                         motor drivers on one serial line, alive as long as the transcript
 //   %alarm URL UNIT CODE  an alarm occurs on one of them; %warning the same; %power URL UNIT
 //                         switches one off and on; %setter URL UNIT DURATION keeps it busy
+//   %fails URL WHY        opening it fails: name-not-found, no-route, connect-timeout, reset,
+//                         port-busy or port-unusable
 //   %interface NAME ADDRESS   this computer has such a network interface, which can send to groups
 //   %datagram HEX         what comes back for each question to a group, with the question's number
 //                         in its first two bytes
@@ -252,6 +254,16 @@ class Stage {
     interfaces_.push_back(
         {.name = words.at(1), .address = words.at(2), .is_up = true, .is_multicast = true});
   }
+  void add_failure(const std::string& url, const std::string& why) {
+    static const std::map<std::string, Errc> words = {{"name-not-found", Errc::name_not_found},
+                                                      {"no-route", Errc::no_route},
+                                                      {"connect-timeout", Errc::connect_timeout},
+                                                      {"reset", Errc::reset},
+                                                      {"port-busy", Errc::port_busy},
+                                                      {"port-unusable", Errc::port_unusable}};
+    failures_[key_of(link::parse_endpoint(url).value(), 502)] = words.at(why);
+  }
+
   void add_datagram(const std::string& hex) {
     Bytes bytes;
     for (std::size_t at = 0; at + 1 < hex.size(); at += 2) {
@@ -409,12 +421,21 @@ class Stage {
     return answer;
   }
 
+  static std::string key_of(const link::Endpoint& endpoint, std::uint16_t usual_port) {
+    return endpoint.medium == link::Medium::tcp
+               ? address(endpoint.host, endpoint.port.value_or(usual_port))
+               : commands::shared_line(endpoint);
+  }
+
   Result<std::unique_ptr<link::Transport>> open(const link::Endpoint& endpoint,
                                                 const catalogue::LinkSpec& facts) {
     const bool serial = endpoint.medium != link::Medium::tcp;
-    const auto found =
-        tools_.find(serial ? commands::shared_line(endpoint)
-                           : address(endpoint.host, endpoint.port.value_or(facts.port)));
+    const std::string key = key_of(endpoint, facts.port);
+    if (const auto failure = failures_.find(key); failure != failures_.end()) {
+      return tl::unexpected(Error{
+          .code = failure->second, .tried = "report server id", .waited = std::chrono::seconds(3)});
+    }
+    const auto found = tools_.find(key);
     if (found == tools_.end() && serial) {
       return posix::line_opener(clock_, *interrupt_)(endpoint, facts, Duration::zero());
     }
@@ -432,6 +453,7 @@ class Stage {
   const Interrupt calm_;
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
+  std::map<std::string, Errc> failures_ = {};  ///< of opening a URL
   std::vector<std::string> answers_;
   Lines too_wide_;
   test::MemoryDisk disk_;
@@ -512,6 +534,7 @@ class Player {
     if (words.at(0) == "hide") stage_.hide_progress();
     if (words.at(0) == "interface") stage_.add_interface(words);
     if (words.at(0) == "datagram") stage_.add_datagram(words.at(1));
+    if (words.at(0) == "fails") stage_.add_failure(words.at(1), words.at(2));
     if (words.at(0) == "edit") edit(words.at(1), words.at(2), words.at(3));
   }
 

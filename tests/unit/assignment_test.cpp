@@ -39,7 +39,6 @@ std::string result(const char* before, const ValueStep& change) {
 TEST_CASE("what was a value before there were steps is one still") {
   CHECK(step("1.target-torque=2.8") == "value 2.8");
   CHECK(step("1.target-torque=-0.1") == "value -0.1");
-  CHECK(step("1.target-torque=+0.1") == "value +0.1");
   CHECK(step("1.target-torque=5%") == "value 5%");  // refused as a value of another unit
   CHECK(step("preset.1.mode=TC/AM") == "value TC/AM");
 }
@@ -58,6 +57,11 @@ TEST_CASE("a percentage of what is counted in percent may mean either") {
   CHECK(step("1.torque-limit=+5%", "%").find("may be a part of the value") != std::string::npos);
   CHECK(step("1.torque-limit-=5%", "%").find("may be a part of the value") != std::string::npos);
   CHECK(step("1.torque-limit+=5", "%") == "+5");
+}
+
+TEST_CASE("a number with a plus may mean either") {
+  CHECK(step("1.target-torque=+0.1") == "'+0.1' may be a value, or a step");
+  CHECK(step("1.target-torque=+5Ncm") == "'+5Ncm' may be a value, or a step");
 }
 
 TEST_CASE("what is no step is refused") {

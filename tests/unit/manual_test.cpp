@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "cli/grammar.hpp"
+#include "cli/help.hpp"
 #include "files/known_keys.hpp"
 #include "spindle/files/profile_store.hpp"
 #include "spindle/files/tools_file.hpp"
@@ -181,7 +182,7 @@ TEST_CASE("manual: commands, their options and every exit status are there") {
   for (const cli::CommandDescription& command : description.commands) {
     CAPTURE(command.name);
     CHECK(page.find("\n.Ss " + test::mdoc_argument(command.name)) != std::string::npos);
-    for (const cli::OptionDescription& option : command.options) {
+    for (const cli::OptionDescription& option : cli::left_to_manual(command)) {
       CHECK(page.find((option.is_argument() ? "Ar " : "Fl ") +
                       test::mdoc_argument(option.names.back().substr(
                           option.is_argument() ? 0 : 1))) != std::string::npos);

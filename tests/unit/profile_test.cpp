@@ -389,7 +389,10 @@ TEST_CASE("where writes are listed nothing else may be written") {
     return profile.may_write(table, {static_cast<std::uint16_t>(first)}, count).has_value();
   };
   CHECK(allows(RegisterTable::holding, 10, 2));
-  CHECK(allows(RegisterTable::holding, 11));
+  const auto half = profile.may_write(RegisterTable::holding, {11}, 1);
+  REQUIRE_FALSE(half);
+  CHECK(message_of(half.error()) ==
+        "this is a part of torque, whose 2 registers are written together");
   CHECK(allows(RegisterTable::holding, 40));
   CHECK(allows(RegisterTable::coil, 10));
   CHECK(allows(RegisterTable::holding, 5000));

@@ -2,6 +2,8 @@
 
 #include <doctest/doctest.h>
 
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,39 @@ TEST_CASE("each tool has a line: its link, its last result, its counts") {
         Texts{"station3  connected         number 1962  preset 2  2.72 N.m  NG  1 OK  1 NG",
               "station4  reconnecting (3)                                       0 OK  0 NG"});
   CHECK(texts(board, 9, 66)[0] == "station3  connected         preset 2  2.72 N.m  NG  1 OK  1 NG");
+}
+
+TEST_CASE("no number is cut, and NG stays to the last") {
+  WatchBoard board({"press"}, columns);
+  board.note(link_of("press", "connected"), "preset");
+  for (int count = 0; count < 14; ++count) board.note(result("press", "OK"), "preset");
+  board.note(result("press", "NG", 2), "preset");
+  const std::set<std::string> whole = {"1962", "2", "2.72", "14", "1"};
+  for (std::size_t room = 80; room >= 16; --room) {
+    CAPTURE(room);
+    const std::string line = texts(board, 1, room)[0];
+    CAPTURE(line);
+    CHECK(line.size() <= room);
+    CHECK(line.find("NG") != std::string::npos);
+    CHECK(line.find("1 NG") != std::string::npos);
+    std::istringstream words(line);
+    for (std::string word; words >> word;) {
+      if (word.find_first_of("0123456789") != std::string::npos) CHECK(whole.contains(word));
+    }
+  }
+}
+
+TEST_CASE("a torque whose unit each result says has it beside it") {
+  std::vector<Column> with_unit = columns;
+  with_unit[4].title = "TORQUE";
+  with_unit.insert(with_unit.begin() + 5, {"UNIT", "torque_unit", Align::left, 4});
+  WatchBoard board({"a"}, with_unit);
+  board.note(link_of("a", "connected"), "preset");
+  Record event = result("a", "OK");
+  event.fields.push_back({"torque_unit", "kgf.cm"});
+  board.note(event, "preset");
+  CHECK(texts(board, 9, 99)[0].find("torque 2.72 kgf.cm") != std::string::npos);
+  CHECK(texts(board, 9, 30)[0].find("kgf") == std::string::npos);
 }
 
 TEST_CASE("what is no result tells the preset, and counts nothing") {

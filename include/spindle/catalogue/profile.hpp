@@ -496,7 +496,8 @@ class Profile {
   [[nodiscard]] bool writable(modbus::RegisterTable table, modbus::RegisterAddress address) const;
 
   /// Whether the profile allows a write to these registers at all, whatever the user says. Error
-  /// `read_only` where only listed registers may be written (`writes`), and one of these is none.
+  /// `read_only` where only listed registers may be written (`writes`), and one of these is none;
+  /// `usage` where it would write a part of a parameter, such as half of a float.
   [[nodiscard]] Result<void> may_write(modbus::RegisterTable table, modbus::RegisterAddress first,
                                        std::size_t count) const;
 

@@ -24,6 +24,7 @@ enum class Need : std::uint8_t {
   named_registers,  ///< that they are those of the profile
   raw_registers,    ///< nothing
   raw_writes,       ///< nothing, unless the tool says that it is of a profile
+  mixed_writes,     ///< as of named registers, and raw ones are written beside them
   raw_secrets,      ///< nothing, but a tool that says what it is keeps its secrets
   stop,             ///< the same as of named registers, and nothing else is asked before it is sent
 };
@@ -49,11 +50,13 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 /// Connects. For named registers a profile that is not known is found by FC 11h, and a tool with
 /// other registers than the profile's (`wrong_generation`), or one that is another product
 /// (`mismatch`), is refused. For raw writes it is the same of a tool whose profile was named, or
-/// that can say over TCP what it is; another one is left as it is. For raw secrets a tool that says
-/// over TCP what it is goes on with the profile that fits, where that has secrets. A torque unit
-/// that the profile says where to read is read; error `mismatch` where the tools file says another
-/// one. A tool whose port and profile are not named is asked where it was last seen, and goes on
-/// there if it says the serial number that it had.
+/// that can say over TCP what it is; another one is left as it is. Where the profile that was named
+/// cannot be proven, a tool that says that it is of another one, which allows only listed writes,
+/// is refused (`mismatch`). For raw secrets a tool that says over TCP what it is goes on with the
+/// profile that fits, where that has secrets. A torque unit that the profile says where to read is
+/// read; error `mismatch` where the tools file says another one. A tool whose port and profile are
+/// not named is asked where it was last seen, and goes on there if it says the serial number that
+/// it had.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            const Environment& environment);
 

@@ -27,11 +27,11 @@ struct Follower {
 };
 
 /// Leaves out registers that do not follow what a tool says, moment by moment. Pure. The moments
-/// are given in their order; of a change of what is watched the first two moments behind it may
-/// still show the old state, as registers need not change at once.
+/// are given in their order; of a change of what is watched the first `settling` moments behind it
+/// may still show the old state, as registers need not change at once.
 class FollowerSearch {
  public:
-  FollowerSearch(catalogue::LearnedBy by, const Moment& first);
+  FollowerSearch(catalogue::LearnedBy by, const Moment& first, std::size_t settling = 2);
 
   /// Takes the next moment. Returns whether a change came to its end by it: what is watched has
   /// another number than before, and has had it for long enough.
@@ -66,6 +66,7 @@ class FollowerSearch {
   [[nodiscard]] bool clears(Candidate& candidate, std::uint16_t watched, std::uint16_t now) const;
 
   catalogue::LearnedBy by_;
+  std::size_t settling_;
   std::map<std::uint16_t, Candidate> candidates_ = {};
   std::vector<std::uint16_t> numbers_;
   std::uint16_t last_;         ///< what was watched at the moment before
