@@ -50,6 +50,34 @@ class TypingTest(unittest.TestCase):
         self.assertEqual(self.spindle("use", "-").status, 0)
         self.assertEqual(self.spindle("get", "1.b").status, 2)
 
+    def test_words_in_brackets_arrive_as_they_are_typed(self):
+        unreached = self.spindle("get", "[::1]:9", "@holding:0", "--connect-timeout", "2s")
+        self.assertEqual(unreached.status, 4, unreached)
+        bare = self.spindle("get", "[::1]", "@holding:0", "--connect-timeout", "2s")
+        self.assertEqual(bare.status, 4, bare)
+        self.assertIn("tcp://[::1]:502", bare.said)
+        pair = self.spindle("set", "bench", "[1.a=11,1.b=12]")
+        self.assertEqual(pair.status, 2, pair)
+        self.assertIn("[1.a", pair.said)
+        self.assertEqual(self.server.writes, [])
+
+    def test_files_of_the_shell_are_no_serial_ports(self):
+        saved = self.spindle("backup", "bench", "-f", "/dev/stdout")
+        with tempfile.TemporaryFile() as backup:
+            backup.write(saved.stdout.encode())
+            for word in ("/dev/stdin", "/dev/fd/0"):
+                backup.seek(0)
+                same = self.spindle("restore", "bench", word, stdin=backup)
+                self.assertEqual(same.status, 0, same)
+        self.assertEqual(self.server.writes, [])
+
+    def test_a_file_of_values_may_begin_with_a_mark(self):
+        values = self.home / "values.set"
+        values.write_bytes(b"\xef\xbb\xbf1.a=11\r\n1.b=12\r\n")
+        self.addCleanup(values.unlink)
+        self.assertEqual(self.spindle("set", "bench", "-f", "values.set").status, 0)
+        self.assertEqual([self.server.value(n) for n in (0, 1)], [11, 12])
+
     def test_the_environment_names_one_too(self):
         variable = {"SPINDLE_TARGET": "bench"}
         self.assertEqual(self.spindle("get", "1.b", environment=variable).status, 0)
