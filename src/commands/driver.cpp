@@ -28,7 +28,10 @@ Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addr
                  .is_group = are_several && addressing == Addressing::unicast};
 }
 
-Error doubtful(const std::string& word, std::string_view what, const Context& context) {
+namespace {
+
+Error doubtful(const DoubtfulWord& doubt, std::string_view what, const Context& context) {
+  const std::string& word = doubt.word;
   Error error{.code = Errc::usage,
               .message = fmt::format("'{}' is the name of a tool, and of {}", word, what),
               .hint = "behind -- no word is a tool"};
@@ -39,6 +42,22 @@ Error doubtful(const std::string& word, std::string_view what, const Context& co
     error.remedy.right += " " + shell_word(typed);
   }
   return error;
+}
+
+}  // namespace
+
+Result<void> check_doubtful(const Otherwise& otherwise, const catalogue::Profile& profile,
+                            const Context& context) {
+  for (const DoubtfulWord& doubt : context.user.doubtful) {
+    std::string_view meaning;
+    if (doubt.profile.empty()) {
+      meaning = otherwise(doubt.word, profile);
+    } else if (const auto usual = context.profiles.load(doubt.profile)) {
+      meaning = otherwise(doubt.word, *usual);
+    }
+    if (!meaning.empty()) return tl::unexpected(doubtful(doubt, meaning, context));
+  }
+  return {};
 }
 
 Targets reopening(Targets targets) {

@@ -70,10 +70,10 @@ Result<Outcome> run_verb(const V& verb, const Targets& targets, std::size_t jobs
 /// A word that was taken for a tool must not be meant as something else.
 template <typename V>
 auto VerbRun<V>::plan_for(const Profile& profile, const Target& target) const -> Result<Plan> {
-  for (const std::string& word : context_->user.doubtful) {
-    const std::string_view meaning = verb_->otherwise(word, profile);
-    if (!meaning.empty()) return tl::unexpected(doubtful(word, meaning, *context_));
-  }
+  const auto otherwise = [&](const std::string& word, const Profile& of) {
+    return verb_->otherwise(word, of);
+  };
+  TRY(check_doubtful(otherwise, profile, *context_));
   return verb_->plan(profile, target);
 }
 
