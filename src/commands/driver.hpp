@@ -50,6 +50,13 @@ std::string failed_in_words(std::size_t failed, std::size_t of);
 /// Before something is written: what the profile says of a tool with this firmware.
 void tell_caution(const OpenTool& tool, const Context& context);
 
+/// What people should know of how this tool was opened.
+void tell_remarks(const OpenTool& tool, const Context& context);
+
+/// Opens a tool on which nothing is changed, and tells them.
+Result<OpenTool> open_to_read(const Target& target, catalogue::Profile profile,
+                              const Context& context);
+
 /// Whether such a failure says that the request is wrong rather than that the tool is not there.
 bool rejects_all(const Error& error);
 

@@ -32,7 +32,8 @@ Result<void> WatchedTool::adopt_profile(const std::string& profile) {
 }
 
 Result<void> WatchedTool::find_profile(const Context& context) {
-  auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, context);
+  auto tool =
+      open_tool(target_, catalogue::Profile(), Need::named_registers, Purpose::listen, context);
   if (!tool) return do_without_profile(std::move(tool.error()), context);
   target_ = tool->target;
   target_.profile = tool->profile->id;
