@@ -332,6 +332,26 @@ Result<std::optional<OpenTool>> open_where_seen(const Target& target, const Seen
   return std::nullopt;
 }
 
+/// The tools file may say whose an entry is. No other tool is changed in its place; a stop goes
+/// before everything.
+Result<void> check_serial(OpenTool& tool, Need need, Purpose purpose,
+                          const Environment& environment) {
+  const auto& identity = tool.device.identity();
+  std::string difference = identity ? other_serial(tool.target, identity->serial) : "";
+  if (difference.empty()) return {};
+  if (purpose != Purpose::change || need == Need::stop) {
+    tool.remarks.push_back("warning: " + difference);
+    return {};
+  }
+  return tl::unexpected(with_target(
+      Error{.code = Errc::mismatch,
+            .message = std::move(difference),
+            .hint = fmt::format("nothing was written; if it was exchanged, change 'serial' of {} "
+                                "in {}",
+                                tool.target.shown, environment.tools.path)},
+      tool.target));
+}
+
 }  // namespace
 
 void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
@@ -349,13 +369,25 @@ void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
   }
 }
 
+std::string other_serial(const Target& target, const std::string& serial) {
+  if (target.serial.empty() || serial.empty() || target.serial == serial) return {};
+  return fmt::format("serial number {} answers, and the tools file says {}: it is another tool",
+                     serial, target.serial);
+}
+
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            Purpose purpose, const Environment& environment) {
   if (const auto seen = recall_place(target, need, purpose, environment)) {
     TRY_LET(auto tool, open_where_seen(target, *seen, need, environment));
-    if (tool) return std::move(*tool);
+    if (tool) {
+      TRY(check_serial(*tool, need, purpose, environment));
+      return std::move(*tool);
+    }
   }
   auto tool = open_as_named(target, std::move(profile), need, environment);
+  if (tool) {
+    TRY(check_serial(*tool, need, purpose, environment));
+  }
   if (tool && need == Need::named_registers && tool->device.identity()) {
     remember_tool(*tool, *tool->device.identity(), tool->profile->id, environment);
   }

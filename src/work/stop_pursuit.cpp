@@ -109,6 +109,7 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
   if (!answer) return {};
   const auto& facts = *profile_->identity;
   const auto identity = catalogue::decode_identity(facts, *answer);
+  serial_ = identity.serial;
   const auto generation = catalogue::generation_of(facts, identity);
   const bool has_others =
       generation == catalogue::Generation::later || generation == catalogue::Generation::earlier;
@@ -124,6 +125,7 @@ Result<device::Device> StopPursuit::connect_unknown() {
   environment_.common = usual;
   if (!tool) return tl::unexpected(std::move(tool.error()));
   generation_is_checked_ = true;
+  if (tool->device.identity()) serial_ = tool->device.identity()->serial;
   auto adopted = adopt(std::move(tool->profile));
   if (!adopted) return tl::unexpected(std::move(adopted.error()));
   tool->device.session().set_answer_timeout(usual.timeout.value_or(profile_->link.answer));

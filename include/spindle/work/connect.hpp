@@ -63,9 +63,14 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 /// over TCP what it is goes on with the profile that fits, where that has secrets. A torque unit
 /// that the profile says where to read is read; error `mismatch` where the tools file says another
 /// one. A tool that is only read, and whose port and profile are not named, is asked where one was
-/// seen, if that is one port, and goes on there if it says the serial number that it had.
+/// seen, if that is one port, and goes on there if it says the serial number that it had. Error
+/// `mismatch` where a tool is to be changed that has another serial number than the tools file
+/// says; otherwise that is a remark, and so it is of a stop.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            Purpose purpose, const Environment& environment);
+
+/// What differs where a tool says another serial number than the tools file; empty: nothing does.
+std::string other_serial(const Target& target, const std::string& serial);
 
 /// Keeps in the user's cache where a tool over TCP was that said this of itself, unless its profile
 /// is from the tools file. What cannot be kept is told to those who ask for every decision only.
