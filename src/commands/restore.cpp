@@ -25,9 +25,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
   [[nodiscard]] bool changes_tools() const override { return true; }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
   [[nodiscard]] Basis question_basis() const override { return Basis::tool; }
-
-  [[nodiscard]] std::string_view otherwise(const std::string& word,
-                                           const Profile& profile) const override {
+  std::string_view otherwise(const std::string& word, const Profile& profile) const override {
     return catalogue::is_meant(word, profile) ? "a parameter" : "";
   }
 
@@ -119,9 +117,8 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     }
     const bool planned = is_dry_run() && !all.is_rejected;
     Summary summary = planned ? restore_plan_summary(counts, {}) : restore_summary(counts, {}, {});
-    if (counts.rolled_back > 0) {
+    if (counts.rolled_back > 0)
       summary.sentence += fmt::format(", {} rolled back", counts.rolled_back);
-    }
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;
