@@ -3,6 +3,7 @@
 import os
 import pathlib
 import shutil
+import subprocess
 import tempfile
 import unittest
 
@@ -70,6 +71,15 @@ class TypingTest(unittest.TestCase):
                 same = self.spindle("restore", "bench", word, stdin=backup)
                 self.assertEqual(same.status, 0, same)
         self.assertEqual(self.server.writes, [])
+
+    def test_a_backup_may_come_from_a_program_that_is_slow(self):
+        self.assertEqual(self.spindle("backup", "bench", "-f", "slow.yaml").status, 0)
+        self.addCleanup((self.home / "slow.yaml").unlink)
+        with subprocess.Popen(
+            ["sh", "-c", "sleep 0.3; cat slow.yaml"], cwd=self.home, stdout=subprocess.PIPE
+        ) as slow:
+            same = self.spindle("restore", "bench", "/dev/stdin", stdin=slow.stdout)
+        self.assertEqual(same.status, 0, same)
 
     def test_a_file_of_values_may_begin_with_a_mark(self):
         values = self.home / "values.set"
