@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -89,7 +90,8 @@ class Binder {
   /// An argument, or all that follow where `into` is a list.
   template <typename Into>
   void argument(const std::string& name, Into& into, std::string_view meaning) {
-    app_->add_option(name, into, std::string(meaning));
+    CLI::Option* added = app_->add_option(name, into, std::string(meaning));
+    if constexpr (!std::is_same_v<Into, std::string>) take_as_typed(added);
   }
 
   /// The same, without which the command makes no sense.
@@ -131,6 +133,7 @@ class Binder {
     return app_->add_option(names, into, std::string(meaning))
         ->type_name(placeholder)
         ->expected(1)
+        ->allow_extra_args(false)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
 
@@ -155,6 +158,14 @@ class Binder {
   static Error missing(std::string_view path, std::string_view argument);
 
  private:
+  /// CLI11 takes what follows for more words of a list where it "allows extra arguments", and then
+  /// also [a,b] for two of them. That many words are never there, so it goes on taking them.
+  static void take_as_typed(CLI::Option* list) {
+    list->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->expected(CLI::detail::expected_max_vector_size - 1)
+        ->allow_extra_args(false);
+  }
+
   static CLI::Option* named(CLI::Option* option, const std::string& placeholder) {
     return option->type_name(placeholder)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   }

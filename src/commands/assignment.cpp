@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "spindle/base/byte_order_mark.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/catalogue/short_name.hpp"
 #include "spindle/catalogue/unit.hpp"
@@ -215,6 +216,7 @@ Result<std::vector<PlacedText>> texts_to_set(const SetOptions& options, const Co
   } else {
     TRY_LET(content, context.disk.read(options.file));
   }
+  if (content.starts_with(byte_order_mark)) content.erase(0, byte_order_mark.size());
   const std::string name = is_stream ? "standard input" : options.file;
   const auto lines = assignments_in(content, name);
   if (lines.empty()) {

@@ -76,7 +76,8 @@ Result<void> ask_away_from(OpenTool& tool, std::string_view what, const Context&
   TRY(ask_consent(what, context));
   const Target known = known_target(tool);
   TRY_LET(auto profile, load_profile(known, context));
-  TRY_LET(auto again, open_tool(known, std::move(profile), Need::named_registers, context));
+  TRY_LET(auto again,
+          open_tool(known, std::move(profile), Need::named_registers, Purpose::change, context));
   const auto now = again.device.identity();
   if (identity && now && identity->serial != now->serial) {
     return tl::unexpected(with_target(

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "backup_paths.hpp"
+#include "driver.hpp"
 #include "progress.hpp"
 #include "spindle/work/connect.hpp"
 
@@ -43,8 +44,9 @@ Result<SideContent> read_tool(OpenTool& tool, const Context& context) {
 
 Result<SideContent> read_tool(const Target& target, const Context& context) {
   auto content = load_profile(target, context).and_then([&](Profile profile) {
-    return open_tool(target, std::move(profile), Need::named_registers, context)
-        .and_then([&](OpenTool tool) { return read_tool(tool, context); });
+    return open_to_read(target, std::move(profile), context).and_then([&](OpenTool tool) {
+      return read_tool(tool, context);
+    });
   });
   if (!content) content.error() = with_target(std::move(content.error()), target);
   return content;

@@ -59,7 +59,7 @@ Summary listed(const Outcome& outcome, const std::string& target) {
 Result<Outcome> list_actions(const Target& target, Context& context) {
   TRY_LET(auto profile, load_profile(target, context));
   if (target.profile.empty()) {
-    TRY_LET(auto tool, open_tool(target, catalogue::Profile(), Need::named_registers, context));
+    TRY_LET(auto tool, open_to_read(target, catalogue::Profile(), context));
     profile = tool.device.profile();
   }
   Outcome outcome;

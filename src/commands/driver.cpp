@@ -28,10 +28,16 @@ Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addr
                  .is_group = are_several && addressing == Addressing::unicast};
 }
 
-Error doubtful(const std::string& word, std::string_view what, const Context& context) {
+namespace {
+
+Error doubtful(const DoubtfulWord& doubt, std::string_view what, const Context& context) {
+  const std::string& word = doubt.word;
   Error error{.code = Errc::usage,
               .message = fmt::format("'{}' is the name of a tool, and of {}", word, what),
               .hint = "behind -- no word is a tool"};
+  if (!doubt.profile.empty()) {
+    error.hint += "; without a default target, as after 'spindle use -', it is the tool";
+  }
   error.remedy.right = "spindle";
   bool is_marked = false;
   for (const std::string& typed : context.io.typed) {
@@ -39,6 +45,22 @@ Error doubtful(const std::string& word, std::string_view what, const Context& co
     error.remedy.right += " " + shell_word(typed);
   }
   return error;
+}
+
+}  // namespace
+
+Result<void> check_doubtful(const Otherwise& otherwise, const catalogue::Profile& profile,
+                            const Context& context) {
+  for (const DoubtfulWord& doubt : context.user.doubtful) {
+    std::string_view meaning;
+    if (doubt.profile.empty()) {
+      meaning = otherwise(doubt.word, profile);
+    } else if (const auto usual = context.profiles.load(doubt.profile)) {
+      meaning = otherwise(doubt.word, *usual);
+    }
+    if (!meaning.empty()) return tl::unexpected(doubtful(doubt, meaning, context));
+  }
+  return {};
 }
 
 Targets reopening(Targets targets) {
@@ -53,6 +75,19 @@ void tell_caution(const OpenTool& tool, const Context& context) {
   if (caution.empty()) return;
   context.renderer.note(fmt::format("warning: {}: firmware {}: {}", tool.target.shown,
                                     identity->firmware.value_or(0), caution));
+}
+
+void tell_remarks(const OpenTool& tool, const Context& context) {
+  for (const std::string& remark : tool.remarks) {
+    context.renderer.note(fmt::format("{}: {}", tool.target.shown, remark));
+  }
+}
+
+Result<OpenTool> open_to_read(const Target& target, catalogue::Profile profile,
+                              const Context& context) {
+  auto tool = open_tool(target, std::move(profile), Need::named_registers, Purpose::read, context);
+  if (tool) tell_remarks(*tool, context);
+  return tool;
 }
 
 Result<void> begin_turn(const Target& target, const Context& context) {

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -24,8 +26,14 @@ namespace spindle::commands {
 Result<Targets> resolve_one_or_group(const std::vector<std::string>& texts, Addressing addressing,
                                      const Context& context);
 
-/// Error `usage` where a word that was taken for a tool may also mean something else.
-Error doubtful(const std::string& word, std::string_view what, const Context& context);
+/// What a word means otherwise than as a tool, by a profile, such as "a parameter"; empty: nothing.
+using Otherwise =
+    std::function<std::string_view(const std::string& word, const catalogue::Profile& profile)>;
+
+/// Error `usage` where a word that was taken for a tool may also mean something else. `profile` is
+/// that of a tool that is meant.
+Result<void> check_doubtful(const Otherwise& otherwise, const catalogue::Profile& profile,
+                            const Context& context);
 
 /// The same targets, whose connections are opened once more where the tools close them.
 Targets reopening(Targets targets);
@@ -41,6 +49,13 @@ std::string failed_in_words(std::size_t failed, std::size_t of);
 
 /// Before something is written: what the profile says of a tool with this firmware.
 void tell_caution(const OpenTool& tool, const Context& context);
+
+/// What people should know of how this tool was opened.
+void tell_remarks(const OpenTool& tool, const Context& context);
+
+/// Opens a tool on which nothing is changed, and tells them.
+Result<OpenTool> open_to_read(const Target& target, catalogue::Profile profile,
+                              const Context& context);
 
 /// Whether such a failure says that the request is wrong rather than that the tool is not there.
 bool rejects_all(const Error& error);

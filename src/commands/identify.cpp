@@ -86,6 +86,10 @@ Result<Identified> identify_one(OpenTool& tool, const Context& context) {
       met.found.identity.notes.push_back(std::move(words));
     }
   }
+  if (const auto difference = other_serial(tool.target, met.found.identity.serial);
+      !difference.empty()) {
+    context.renderer.note(fmt::format("{}: warning: {}", tool.target.shown, difference));
+  }
   Identified identified{identity_record(tool, met.found, met.round_trip, context.clock),
                         std::move(met.misfit)};
   if (const std::string& version = met.found.identity.version; !version.empty()) {

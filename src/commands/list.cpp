@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "driver.hpp"
 #include "list_fold.hpp"
 #include "listing.hpp"
 #include "records.hpp"
@@ -52,7 +53,7 @@ Result<Subject> of_target(const ListOptions& options, const Context& context) {
     TRY_LET(auto profile, context.profiles.load(target.profile));
     return Subject{target.shown, with_units_of(target, std::move(profile)), std::move(patterns)};
   }
-  TRY_LET(auto tool, open_tool(target, catalogue::Profile(), Need::named_registers, context));
+  TRY_LET(auto tool, open_to_read(target, catalogue::Profile(), context));
   return Subject{target.shown, with_units_of(target, tool.device.profile()), std::move(patterns)};
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "spindle/base/text.hpp"
@@ -35,13 +36,28 @@ Result<void> check_file(const SortedWords& sorted, const Context& context) {
   return by_url ? Result<void>() : tl::unexpected(*context.tools.left_out);
 }
 
+/// The default target of a user who names tools, if there is one that can be used.
+std::optional<Target> unnamed_default(const Context& context) {
+  const auto usual = work::default_target(context);
+  if (!usual || !*usual) return std::nullopt;
+  auto targets = resolve_targets({(*usual)->text}, context);
+  if (!targets || targets->empty()) return std::nullopt;
+  return std::move(targets->front());
+}
+
 /// Names of tools that may be those of something else, too: behind a first tool, whose they would
-/// be.
-std::vector<std::string> doubtful_of(const std::vector<std::string>& targets) {
-  std::vector<std::string> doubtful;
-  for (std::size_t index = 1; index < targets.size(); ++index) {
+/// be, or where a default one could be meant.
+std::vector<DoubtfulWord> doubtful_of(const std::vector<std::string>& targets,
+                                      const Context& context) {
+  std::vector<DoubtfulWord> doubtful;
+  for (std::size_t index = 0; index < targets.size(); ++index) {
     const std::string& word = targets[index];
-    if (!names_group(word) && !link::looks_like_url(word)) doubtful.push_back(word);
+    if (names_group(word) || link::looks_like_url(word)) continue;
+    if (index > 0) {
+      doubtful.push_back({word});
+    } else if (const auto usual = unnamed_default(context)) {
+      doubtful.push_back({word, usual->profile});
+    }
   }
   return doubtful;
 }
@@ -93,13 +109,16 @@ Result<SortedWords> sort_words(const TypedWords& typed, OtherWords kind, std::st
         kind == OtherWords::none || (may_be_target && looks_like_target(words[index], context));
     (is_tool ? sorted.targets : sorted.others).push_back(words[index]);
   }
-  if (sorted.targets.empty()) {
+  const bool is_named = !sorted.targets.empty();
+  if (!is_named) {
     TRY(take_default(sorted, kind, command, context));
   }
   if (kind != OtherWords::none) {
     TRY(check_file(sorted, context));
   }
-  if (kind == OtherWords::names) context.user.doubtful = doubtful_of(sorted.targets);
+  if (kind == OtherWords::names && is_named) {
+    context.user.doubtful = doubtful_of(sorted.targets, context);
+  }
   if (kind == OtherWords::assignments) {
     TRY(check_assignments(sorted, context));
   }

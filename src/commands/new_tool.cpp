@@ -94,7 +94,7 @@ Result<NewEntry> entry_as_typed(const ToolAddOptions& options, const std::string
 Result<void> ask_who_it_is(NewEntry& entry, const Context& context) {
   const Target& target = entry.target;
   auto met = load_profile(target, context).and_then([&](catalogue::Profile profile) {
-    return open_tool(target, std::move(profile), Need::raw_registers, context)
+    return open_tool(target, std::move(profile), Need::raw_registers, Purpose::read, context)
         .and_then([&](OpenTool tool) {
           return work::meet(tool, context).map([&](Meeting meeting) {
             const auto& matched = meeting.found.matched;

@@ -24,7 +24,8 @@ Result<Outcome> remote_start(const RemoteStartOptions& options, Context& context
                    [&](const std::string& sentence) { context.renderer.note(sentence); });
   const device::OpenTransport open_transport = lines.opener();
   const Context own = with_lines(context, open_transport);
-  TRY_LET(auto opened, open_prepared(*target, Need::named_registers, own, plan_for));
+  TRY_LET(auto opened,
+          open_prepared(*target, Need::named_registers, Purpose::change, own, plan_for));
   auto& [tool, plan] = opened;
   TRY(plan->on(tool, context)->ask());
   const auto mode = options.stop.value_or(catalogue::StopMode::decelerate);

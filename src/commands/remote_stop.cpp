@@ -163,6 +163,10 @@ Result<Outcome> remote_stop(const RemoteStopOptions& options, Context& context) 
   for (std::size_t index = 0; index < pursuits.size(); ++index) {
     const Result<device::StopResult> result = pursuits[index]->result();
     if (result) listing.add(stop_record(*result, targets[index], context.clock));
+    const std::string difference = other_serial(targets[index], pursuits[index]->serial());
+    if (!difference.empty()) {
+      context.renderer.note(fmt::format("{}: warning: {}", targets[index].shown, difference));
+    }
     if (result == device::StopResult::sent) ++unproven;
     const auto failure = failure_of(result, targets[index], pursuits[index]->profile());
     failure ? fail(*failure) : outcome.succeed();

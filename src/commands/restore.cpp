@@ -8,6 +8,7 @@
 #include "restore_run.hpp"
 #include "run_verb.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/short_name.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -24,6 +25,9 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
   [[nodiscard]] bool changes_tools() const override { return true; }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
   [[nodiscard]] Basis question_basis() const override { return Basis::tool; }
+  std::string_view otherwise(const std::string& word, const Profile& profile) const override {
+    return catalogue::is_meant(word, profile) ? "a parameter" : "";
+  }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
     return plan_by_profile(backups_->at(target.shown), *options_, profile);
@@ -53,9 +57,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
       names.push_back(target.shown);
     }
     if (names.empty()) return {};
-    if (can_ask(context)) {
-      TRY(show_plans(planned, context));
-    }
+    if (can_ask(context)) TRY(show_plans(planned, context));
     return ask_consent(fmt::format("write {} to {}{}", counted(writes, "parameter"),
                                    is_group_ ? tools_in_words(names, of) : names.front(),
                                    stores() ? ", and save" : ""),
@@ -115,9 +117,8 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     }
     const bool planned = is_dry_run() && !all.is_rejected;
     Summary summary = planned ? restore_plan_summary(counts, {}) : restore_summary(counts, {}, {});
-    if (counts.rolled_back > 0) {
+    if (counts.rolled_back > 0)
       summary.sentence += fmt::format(", {} rolled back", counts.rolled_back);
-    }
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;

@@ -36,6 +36,9 @@ class VerbRun {
   Result<Outcome> on_group(const std::vector<Target>& tools);
 
  private:
+  [[nodiscard]] Purpose purpose() const {
+    return verb_->changes_tools() ? Purpose::change : Purpose::read;
+  }
   Result<Plan> plan_for(const Profile& profile, const Target& target) const;
   Result<Opened<Plan>> open(const Target& target, Context& context) const;
   Result<Opened<Plan>> open_again(const Planned<Plan>& planned, Context& context) const;
@@ -70,10 +73,10 @@ Result<Outcome> run_verb(const V& verb, const Targets& targets, std::size_t jobs
 /// A word that was taken for a tool must not be meant as something else.
 template <typename V>
 auto VerbRun<V>::plan_for(const Profile& profile, const Target& target) const -> Result<Plan> {
-  for (const std::string& word : context_->user.doubtful) {
-    const std::string_view meaning = verb_->otherwise(word, profile);
-    if (!meaning.empty()) return tl::unexpected(doubtful(word, meaning, *context_));
-  }
+  const auto otherwise = [&](const std::string& word, const Profile& of) {
+    return verb_->otherwise(word, of);
+  };
+  TRY(check_doubtful(otherwise, profile, *context_));
   return verb_->plan(profile, target);
 }
 
@@ -92,12 +95,14 @@ Result<Outcome> VerbRun<V>::on_one(const Target& target) {
     if (verb_->question_basis() != basis) return plan;
     return ask_for_one(asked, std::move(plan));
   };
-  auto opened = open_prepared(target, verb_->need(), *context_, [&](const Profile& profile) {
-    return plan_for(profile, target).and_then([&](Plan plan) {
-      return ask_by(V::Basis::profile, target, std::move(plan));
-    });
-  });
+  auto opened =
+      open_prepared(target, verb_->need(), purpose(), *context_, [&](const Profile& profile) {
+        return plan_for(profile, target).and_then([&](Plan plan) {
+          return ask_by(V::Basis::profile, target, std::move(plan));
+        });
+      });
   if (!opened) return tl::unexpected(std::move(opened.error()));
+  tell_remarks(opened->tool, *context_);
   if (verb_->changes_tools()) tell_caution(opened->tool, *context_);
   const auto plan = verb_->examine(opened->tool, std::move(opened->prepared), *context_)
                         .and_then([&](Plan known) {
@@ -124,9 +129,10 @@ auto VerbRun<V>::finish(OpenTool& tool, const Plan& plan, Context& context) cons
 
 template <typename V>
 auto VerbRun<V>::open(const Target& target, Context& context) const -> Result<Opened<Plan>> {
-  auto opened = open_prepared(target, verb_->need(), context,
+  auto opened = open_prepared(target, verb_->need(), purpose(), context,
                               [&](const Profile& profile) { return plan_for(profile, target); });
   if (!opened) return opened;
+  tell_remarks(opened->tool, context);
   if (verb_->changes_tools()) tell_caution(opened->tool, context);
   auto plan = verb_->examine(opened->tool, std::move(opened->prepared), context);
   if (!plan) return tl::unexpected(std::move(plan.error()));
@@ -167,7 +173,7 @@ auto VerbRun<V>::plan_by_profile(const Target& target, const Context& context) c
     if (auto meant = check_addressing(target, *profile); !meant)
       return tl::unexpected(meant.error());
   } else {
-    auto tool = open_tool(target, Profile(), Need::named_registers, context);
+    auto tool = open_tool(target, Profile(), Need::named_registers, purpose(), context);
     if (!tool) return tl::unexpected(std::move(tool.error()));
     known = known_target(*tool);
     *profile = *tool->profile;
@@ -225,7 +231,7 @@ auto VerbRun<V>::open_again(const Planned<Plan>& planned, Context& context) cons
     -> Result<Opened<Plan>> {
   auto profile = load_profile(planned.target, context);
   if (!profile) return tl::unexpected(std::move(profile.error()));
-  auto tool = open_tool(planned.target, std::move(*profile), verb_->need(), context);
+  auto tool = open_tool(planned.target, std::move(*profile), verb_->need(), purpose(), context);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   auto plan = verb_->confirm(*tool, planned.plan, context);
   if (!plan) return tl::unexpected(with_target(std::move(plan.error()), tool->target));

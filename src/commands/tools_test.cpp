@@ -71,11 +71,8 @@ report::Record failed_record(const Target& target, const Error& error, const Clo
                      {"code", std::string(info(error.status()).name)}}};
 }
 
-/// What it refers to does not change while it runs.
 class Test final : public Verb<std::monostate, Tested> {
  public:
-  explicit Test(const files::Tools& tools) : tools_(&tools) {}
-
   [[nodiscard]] Need need() const override { return Need::raw_registers; }
 
   Result<Plan> plan(const catalogue::Profile& /*profile*/,
@@ -134,13 +131,8 @@ class Test final : public Verb<std::monostate, Tested> {
       found.push_back(fmt::format("no profile fits what it says of itself: {}",
                                   fmt::join(met.found.identity.notes, "; ")));
     }
-    const std::string& serial = met.found.identity.serial;
-    const std::string expected = serial_in_file(tool.target.shown);
-    if (!expected.empty() && !serial.empty() && expected != serial) {
-      found.push_back(
-          fmt::format("serial number {} answers, and the tools file says {}: it is another tool",
-                      serial, expected));
-    }
+    std::string difference = other_serial(tool.target, met.found.identity.serial);
+    if (!difference.empty()) found.push_back(std::move(difference));
     const std::string unit = tool.target.torque_unit;
     if (met.misfit || unit.empty() || tool.profile->torque_unit_from.empty()) return found;
     TRY(work::read_torque_unit(tool));
@@ -153,12 +145,6 @@ class Test final : public Verb<std::monostate, Tested> {
     return found;
   }
 
-  [[nodiscard]] std::string serial_in_file(const std::string& name) const {
-    const auto known = std::find_if(tools_->tools.begin(), tools_->tools.end(),
-                                    [&](const files::Tool& tool) { return tool.name == name; });
-    return known == tools_->tools.end() ? std::string() : known->serial;
-  }
-
   static Result<Done> tell_failure(const Target& target, const Error& error, Context& context) {
     Tested tested;
     tested.outcome.fail(error);
@@ -167,8 +153,6 @@ class Test final : public Verb<std::monostate, Tested> {
     listing.add(with_target(error, target));
     return finish(listing, tested.outcome).map([&](const Outcome&) { return tested; });
   }
-
-  const files::Tools* tools_;
 };
 
 }  // namespace
@@ -188,8 +172,7 @@ Result<Outcome> test_tools(const ToolsTestOptions& options, Context& context) {
                                 .hint = "'spindle tools add NAME URL' adds one"});
   }
   TRY_LET(auto tools, resolve_compatible_targets(names, context));
-  return run_verb(Test(context.tools), {.tools = std::move(tools), .is_group = true}, options.jobs,
-                  context);
+  return run_verb(Test(), {.tools = std::move(tools), .is_group = true}, options.jobs, context);
 }
 
 }  // namespace spindle::commands

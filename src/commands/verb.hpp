@@ -71,7 +71,8 @@ class Verb {
   /// What has to be known of the registers before they are used.
   [[nodiscard]] virtual Need need() const { return Need::named_registers; }
   [[nodiscard]] virtual Fit fit() const { return Fit::none; }
-  /// Whether tools are changed, so that the tools of a group are planned as a whole.
+  /// Whether tools are changed, so that the tools of a group are planned as a whole, and each has
+  /// to be the one that is meant (see Purpose).
   [[nodiscard]] virtual bool changes_tools() const { return false; }
   [[nodiscard]] virtual Basis basis() const { return Basis::profile; }
   [[nodiscard]] virtual Basis question_basis() const { return Basis::profile; }

@@ -104,10 +104,10 @@ Result<device::WatchPlan> plan_watch(const WatchOptions& options,
 Result<void> check_watch(const WatchOptions& options, const WatchedTool& tool, ProfileShelf& shelf,
                          const Context& context) {
   if (tool.known() == nullptr) return check_for_any_profile(options, shelf, context);
-  for (const std::string& word : context.user.doubtful) {
-    if (!catalogue::is_meant(word, tool.known()->profile)) continue;
-    return tl::unexpected(doubtful(word, "a parameter", context));
-  }
+  const auto otherwise = [](const std::string& word, const catalogue::Profile& profile) {
+    return std::string_view(catalogue::is_meant(word, profile) ? "a parameter" : "");
+  };
+  TRY(check_doubtful(otherwise, tool.known()->profile, context));
   return plan_watch(options, tool.known()->profile).map([](const device::WatchPlan&) {});
 }
 

@@ -32,7 +32,8 @@ Result<void> WatchedTool::adopt_profile(const std::string& profile) {
 }
 
 Result<void> WatchedTool::find_profile(const Context& context) {
-  auto tool = open_tool(target_, catalogue::Profile(), Need::named_registers, context);
+  auto tool =
+      open_tool(target_, catalogue::Profile(), Need::named_registers, Purpose::listen, context);
   if (!tool) return do_without_profile(std::move(tool.error()), context);
   target_ = tool->target;
   target_.profile = tool->profile->id;
@@ -62,6 +63,14 @@ Result<void> WatchedTool::do_without_profile(Error why, const Context& context) 
   return {};
 }
 
+/// Once, however often it is opened.
+void WatchedTool::tell_other_serial(const device::Device& device) {
+  if (!device.identity() || std::exchange(serial_is_checked_, true)) return;
+  const std::string difference = other_serial(target_, device.identity()->serial);
+  if (difference.empty()) return;
+  context_->renderer.note(fmt::format("{}: warning: {}", target_.shown, difference));
+}
+
 Result<device::Watcher::Link> WatchedTool::open(Duration patience,
                                                 const device::OpenTransport& open_transport) {
   Context hurried = with_lines(*context_, open_transport);
@@ -76,6 +85,7 @@ Result<device::Watcher::Link> WatchedTool::open(Duration patience,
       connect_device(target_, known_->profile, hurried, SimulatedOperator::working, late_answers_);
   if (!device) return tl::unexpected(std::move(device.error()));
   TRY(device->require_known_registers());
+  tell_other_serial(*device);
   late_answers_ =
       link::SessionOptions::LateAnswers::possible;  // it is opened again after trouble only
   if (known_->profile.link.loopback) {

@@ -60,6 +60,7 @@ class WatchedTool {
               const Context& context)
       : target_(std::move(target)), names_(&names), shelf_(&shelf), context_(&context) {}
 
+  void tell_other_serial(const device::Device& device);
   Result<void> find_profile(const Context& context);
   Result<void> do_without_profile(Error why, const Context& context);
   Result<void> adopt_profile(const std::string& profile);
@@ -69,6 +70,7 @@ class WatchedTool {
   ProfileShelf* shelf_;
   const Context* context_;
   const KnownProfile* known_ = nullptr;
+  bool serial_is_checked_ = false;
   link::SessionOptions::LateAnswers late_answers_ = link::SessionOptions::LateAnswers::none;
 };
 

@@ -7,13 +7,13 @@
 #include <optional>
 #include <utility>
 
+#include "spindle/base/byte_order_mark.hpp"
 #include "spindle/base/utf8.hpp"
 
 namespace spindle::files {
 namespace {
 
 constexpr std::size_t most_fields = 100;
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 Error fault(const std::string& path, std::size_t line, std::string message, std::string hint = {}) {
   return {.code = Errc::bad_file,

@@ -403,10 +403,25 @@ bool is_bare_host(std::string_view text) {
   return !host.empty() && std::all_of(host.begin(), host.end(), is_host_character);
 }
 
+/// Whether a path is one of the devices that are files, streams or memory to a program, and no
+/// line: what a shell gives for <(command), too.
+bool is_file_device(std::string_view path) {
+  constexpr std::string_view folder = "/dev/";
+  constexpr std::array<std::string_view, 8> names = {"stdin", "stdout", "stderr", "null",
+                                                     "full",  "zero",   "random", "urandom"};
+  constexpr std::array<std::string_view, 3> folders = {"fd/", "shm/", "mqueue/"};
+  const std::string_view name = path.substr(folder.size());
+  return name.empty() || std::find(names.begin(), names.end(), name) != names.end() ||
+         std::any_of(folders.begin(), folders.end(),
+                     [&](std::string_view below) { return name.starts_with(below); });
+}
+
 /// The device of a serial port by the name that a kernel or another system gives it; COM1 is the
 /// first port of the board, which Linux counts from 0. Empty: it is no such name.
 std::string bare_port(std::string_view text) {
-  if (text.starts_with("/dev/")) return std::string(text);
+  if (text.starts_with("/dev/")) {
+    return is_file_device(text) ? std::string() : std::string(text);
+  }
   for (const std::string_view kind : {"ttyUSB", "ttyACM", "ttyS", "ttyAMA"}) {
     if (text.starts_with(kind) && is_number(text.substr(kind.size()))) {
       return fmt::format("/dev/{}", text);

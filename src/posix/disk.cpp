@@ -90,6 +90,8 @@ Result<std::string> read_file(const std::string& path) {
   if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) {
     return tl::unexpected(not_a_file(Errc::bad_file, path));
   }
+  // What a shell gives for <(command) is written while it is read.
+  if (S_ISFIFO(about.st_mode)) static_cast<void>(::fcntl(file.number(), F_SETFL, O_RDONLY));
   std::string text;
   int code = EINTR;
   while (code == EINTR) code = read_whole(file.number(), text);

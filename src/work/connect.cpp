@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "spindle/base/text.hpp"
 #include "spindle/work/identification.hpp"
+#include "spindle/work/other_port.hpp"
 #include "spindle/work/simulated_tool.hpp"
 #include "spindle/work/tool_memory.hpp"
 #include "spindle/work/trace.hpp"
@@ -189,22 +192,6 @@ Result<void> take_torque_unit(OpenTool& tool) {
       tool.target));
 }
 
-/// The port that was tried was not chosen when neither URL nor profile names one.
-std::string other_port_hint(const Target& target, const Environment& environment) {
-  const auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
-  if (seen && *seen) {
-    return fmt::format("no port is named, and serial number {} was seen at port {}: add :{}",
-                       (*seen)->serial, (*seen)->port, (*seen)->port);
-  }
-  for (const files::ProfileEntry& entry : environment.profiles.list()) {
-    const auto profile = environment.profiles.load(entry.id);
-    if (!profile || profile->link.port == catalogue::LinkSpec().port) continue;
-    return fmt::format("no port is named, and {} tools listen on port {}: add :{} or --profile {}",
-                       profile->series, profile->link.port, profile->link.port, profile->id);
-  }
-  return {};
-}
-
 bool is_wrong_port(const Error& error) {
   return error.code == Errc::connection_refused || error.code == Errc::connect_timeout;
 }
@@ -309,16 +296,21 @@ void tell_memory(const Target& target, const std::string& sentence,
   if (trace.decision) trace.decision(link::Decision::memory, sentence);
 }
 
-/// What was last seen behind a host whose port is not named. It only says where to ask.
-std::optional<SeenTool> recall_place(const Target& target, Need need,
+/// What was last seen behind a host whose port is not named. It only says where to ask. The serial
+/// number proves the tool that was seen, not the one that is meant: so only who reads is taken
+/// there, and only where there is one port to choose from.
+std::optional<SeenTool> recall_place(const Target& target, Need need, Purpose purpose,
                                      const Environment& environment) {
-  const bool is_proven = need == Need::named_registers || need == Need::stop;
+  const bool is_proven = need == Need::named_registers && purpose == Purpose::read;
   const bool is_open = target.endpoint.medium == link::Medium::tcp && !target.endpoint.port &&
                        target.profile.empty() && target.fault.empty();
   if (!is_proven || !is_open) return std::nullopt;
-  auto seen = ToolMemory(environment.disk, environment.cache_folder).recall(target.endpoint);
-  if (seen) return std::move(*seen);
-  tell_memory(target, fmt::format("nothing: {}", describe(seen.error())), environment);
+  const ToolMemory memory(environment.disk, environment.cache_folder);
+  const auto seen = memory.seen_behind(target.endpoint);
+  auto place = memory.recall(target.endpoint);
+  if (seen && place) return has_one_port(*seen) ? std::move(*place) : std::nullopt;
+  const Error& why = seen ? place.error() : seen.error();
+  tell_memory(target, fmt::format("nothing: {}", describe(why)), environment);
   return std::nullopt;
 }
 
@@ -338,6 +330,9 @@ Result<std::optional<OpenTool>> open_where_seen(const Target& target, const Seen
   }
   const auto serial = tool && tool->device.identity() ? tool->device.identity()->serial : "";
   if (serial == seen.serial) {
+    tool->remarks.push_back(
+        fmt::format("no port is named: this is port {}, where serial number {} was seen before",
+                    seen.port, seen.serial));
     tell_memory(target,
                 fmt::format("port {}, profile {} and serial number {}, from {}; the tool says the "
                             "same",
@@ -352,6 +347,26 @@ Result<std::optional<OpenTool>> open_where_seen(const Target& target, const Seen
               environment);
   static_cast<void>(memory.forget(seen));  // it is a cache
   return std::nullopt;
+}
+
+/// The tools file may say whose an entry is. No other tool is changed in its place; a stop goes
+/// before everything.
+Result<void> check_serial(OpenTool& tool, Need need, Purpose purpose,
+                          const Environment& environment) {
+  const auto& identity = tool.device.identity();
+  std::string difference = identity ? other_serial(tool.target, identity->serial) : "";
+  if (difference.empty()) return {};
+  if (purpose != Purpose::change || need == Need::stop) {
+    tool.remarks.push_back("warning: " + difference);
+    return {};
+  }
+  return tl::unexpected(with_target(
+      Error{.code = Errc::mismatch,
+            .message = std::move(difference),
+            .hint = fmt::format("nothing was written; if it was exchanged, change 'serial' of {} "
+                                "in {}",
+                                tool.target.shown, environment.tools.path)},
+      tool.target));
 }
 
 }  // namespace
@@ -371,13 +386,25 @@ void remember_tool(const OpenTool& tool, const catalogue::Identity& identity,
   }
 }
 
+std::string other_serial(const Target& target, const std::string& serial) {
+  if (target.serial.empty() || serial.empty() || target.serial == serial) return {};
+  return fmt::format("serial number {} answers, and the tools file says {}: it is another tool",
+                     serial, target.serial);
+}
+
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
-                           const Environment& environment) {
-  if (const auto seen = recall_place(target, need, environment)) {
+                           Purpose purpose, const Environment& environment) {
+  if (const auto seen = recall_place(target, need, purpose, environment)) {
     TRY_LET(auto tool, open_where_seen(target, *seen, need, environment));
-    if (tool) return std::move(*tool);
+    if (tool) {
+      TRY(check_serial(*tool, need, purpose, environment));
+      return std::move(*tool);
+    }
   }
   auto tool = open_as_named(target, std::move(profile), need, environment);
+  if (tool) {
+    TRY(check_serial(*tool, need, purpose, environment));
+  }
   if (tool && need == Need::named_registers && tool->device.identity()) {
     remember_tool(*tool, *tool->device.identity(), tool->profile->id, environment);
   }

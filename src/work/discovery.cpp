@@ -124,7 +124,6 @@ Result<ScanResult> scan_group(const catalogue::DiscoverySpec& spec,
     }
     switch (found.add(*tool)) {
       case device::FoundTools::Added::yes:
-        ++result.found;
         tell({*tool, datagram->from, datagram->interface});
         break;
       case device::FoundTools::Added::no_room:

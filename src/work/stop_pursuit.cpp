@@ -69,9 +69,11 @@ Result<StopResult> StopPursuit::result() {
   if (report.result != StopResult::unconfirmed || !last_) return report.result;
   Error error = *last_;
   if (profile_ == nullptr && !is_hopeless(error)) {
-    error.hint =
-        "no stop was sent, as it is not known what the tool is: name its profile with --profile, "
-        "and stop it at the tool";
+    const std::string helps = error.code == Errc::connection_refused ? error.hint : "";
+    error.hint = fmt::format(
+        "no stop was sent, as it is not known what the tool is: {}, and stop "
+        "it at the tool",
+        helps.empty() ? "name its profile with --profile" : helps);
   }
   return tl::unexpected(std::move(error));
 }
@@ -107,6 +109,7 @@ Result<void> StopPursuit::check_generation(device::Device& device) {
   if (!answer) return {};
   const auto& facts = *profile_->identity;
   const auto identity = catalogue::decode_identity(facts, *answer);
+  serial_ = identity.serial;
   const auto generation = catalogue::generation_of(facts, identity);
   const bool has_others =
       generation == catalogue::Generation::later || generation == catalogue::Generation::earlier;
@@ -118,10 +121,11 @@ Result<device::Device> StopPursuit::connect_unknown() {
   const Duration patience = usual.timeout.value_or(catalogue::LinkSpec().answer);
   environment_.common.retries = 0;  // a question that got lost is asked on a new connection
   if (++questions_ <= soon_repeated) environment_.common.timeout = std::min(patience, soon);
-  auto tool = open_tool(target_, Profile(), Need::stop, environment_);
+  auto tool = open_tool(target_, Profile(), Need::stop, Purpose::change, environment_);
   environment_.common = usual;
   if (!tool) return tl::unexpected(std::move(tool.error()));
   generation_is_checked_ = true;
+  if (tool->device.identity()) serial_ = tool->device.identity()->serial;
   auto adopted = adopt(std::move(tool->profile));
   if (!adopted) return tl::unexpected(std::move(adopted.error()));
   tool->device.session().set_answer_timeout(usual.timeout.value_or(profile_->link.answer));

@@ -66,6 +66,7 @@ Target target_of_tool(const files::Tool& tool, const Environment& environment) {
   }
   target->torque_unit = tool.torque_unit;
   target->verified = tool.verified;
+  target->serial = tool.serial;
   return std::move(*target);
 }
 

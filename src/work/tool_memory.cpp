@@ -55,6 +55,11 @@ Error broken(const std::string& path) {
 
 }  // namespace
 
+bool has_one_port(const std::vector<SeenTool>& seen) {
+  return std::all_of(seen.begin(), seen.end(),
+                     [&](const SeenTool& tool) { return tool.port == seen.front().port; });
+}
+
 std::string ToolMemory::path() const { return folder_.empty() ? folder_ : folder_ + "/tools-seen"; }
 
 Result<std::vector<SeenTool>> ToolMemory::read() const {
@@ -93,6 +98,12 @@ Result<std::optional<SeenTool>> ToolMemory::recall(const link::Endpoint& endpoin
   return newest == tools.rend() ? std::nullopt : std::optional(*newest);
 }
 
+Result<std::vector<SeenTool>> ToolMemory::seen_behind(const link::Endpoint& endpoint) const {
+  TRY_LET(auto tools, read());
+  std::erase_if(tools, [&](const SeenTool& tool) { return tool.host != endpoint.host; });
+  return tools;
+}
+
 /// A file that is broken is made anew; one of another user is left alone.
 Result<void> ToolMemory::remember(const SeenTool& tool) const {
   const bool is_fit = is_field(tool.host) && is_field(tool.profile) && is_field(tool.serial) &&
@@ -103,7 +114,7 @@ Result<void> ToolMemory::remember(const SeenTool& tool) const {
     return tl::unexpected(std::move(known.error()));
   }
   std::vector<SeenTool> tools = known ? std::move(*known) : std::vector<SeenTool>();
-  if (std::find(tools.begin(), tools.end(), tool) != tools.end()) return {};
+  if (!tools.empty() && tools.back() == tool) return {};
   std::erase_if(tools, [&](const SeenTool& other) { return is_at(other, tool); });
   tools.push_back(tool);
   return write(tools);

@@ -3,6 +3,7 @@
 import os
 import pathlib
 import shutil
+import subprocess
 import tempfile
 import unittest
 
@@ -49,6 +50,43 @@ class TypingTest(unittest.TestCase):
         self.assertEqual(self.server.value(1), 21)
         self.assertEqual(self.spindle("use", "-").status, 0)
         self.assertEqual(self.spindle("get", "1.b").status, 2)
+
+    def test_words_in_brackets_arrive_as_they_are_typed(self):
+        unreached = self.spindle("get", "[::1]:9", "@holding:0", "--connect-timeout", "2s")
+        self.assertEqual(unreached.status, 4, unreached)
+        bare = self.spindle("get", "[::1]", "@holding:0", "--connect-timeout", "2s")
+        self.assertEqual(bare.status, 4, bare)
+        self.assertIn("tcp://[::1]:502", bare.said)
+        pair = self.spindle("set", "bench", "[1.a=11,1.b=12]")
+        self.assertEqual(pair.status, 2, pair)
+        self.assertIn("[1.a", pair.said)
+        self.assertEqual(self.server.writes, [])
+
+    def test_files_of_the_shell_are_no_serial_ports(self):
+        self.assertEqual(self.spindle("backup", "bench", "-f", "saved.yaml").status, 0)
+        self.addCleanup((self.home / "saved.yaml").unlink)
+        with (self.home / "saved.yaml").open("rb") as backup:
+            for word in ("/dev/stdin", "/dev/fd/0"):
+                backup.seek(0)
+                same = self.spindle("restore", "bench", word, stdin=backup)
+                self.assertEqual(same.status, 0, same)
+        self.assertEqual(self.server.writes, [])
+
+    def test_a_backup_may_come_from_a_program_that_is_slow(self):
+        self.assertEqual(self.spindle("backup", "bench", "-f", "slow.yaml").status, 0)
+        self.addCleanup((self.home / "slow.yaml").unlink)
+        with subprocess.Popen(
+            ["sh", "-c", "sleep 0.3; cat slow.yaml"], cwd=self.home, stdout=subprocess.PIPE
+        ) as slow:
+            same = self.spindle("restore", "bench", "/dev/stdin", stdin=slow.stdout)
+        self.assertEqual(same.status, 0, same)
+
+    def test_a_file_of_values_may_begin_with_a_mark(self):
+        values = self.home / "values.set"
+        values.write_bytes(b"\xef\xbb\xbf1.a=11\r\n1.b=12\r\n")
+        self.addCleanup(values.unlink)
+        self.assertEqual(self.spindle("set", "bench", "-f", "values.set").status, 0)
+        self.assertEqual([self.server.value(n) for n in (0, 1)], [11, 12])
 
     def test_the_environment_names_one_too(self):
         variable = {"SPINDLE_TARGET": "bench"}

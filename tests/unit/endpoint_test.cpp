@@ -294,16 +294,57 @@ TEST_CASE("an address or a serial port alone is a target") {
 }
 
 TEST_CASE("a URL is told from a name") {
-  for (const std::string_view url :
-       {"tcp://h", "rtu:///d", "rtu+tcp://h:1", "sim:doga-bm", "tpc://h", "http:", "station:5000",
-        "10.0.0.7:5000", "st3:1", "10.0.0.7", "[::1]", "[::1]:5000", "/dev/ttyUSB0",
-        "/dev/ttyUSB0?unit=3", "ttyUSB0", "COM3"}) {
+  for (const std::string_view url : {"tcp://h",
+                                     "rtu:///d",
+                                     "rtu+tcp://h:1",
+                                     "sim:doga-bm",
+                                     "tpc://h",
+                                     "http:",
+                                     "station:5000",
+                                     "10.0.0.7:5000",
+                                     "st3:1",
+                                     "10.0.0.7",
+                                     "[::1]",
+                                     "[::1]:5000",
+                                     "/dev/ttyUSB0",
+                                     "/dev/ttyUSB0?unit=3",
+                                     "/dev/pts/3",
+                                     "/dev/rfcomm0",
+                                     "/dev/cu.usbserial",
+                                     "/dev/serial/by-id/x",
+                                     "/dev/driver-line",
+                                     "/dev/nullmodem",
+                                     "ttyUSB0",
+                                     "COM3"}) {
     CAPTURE(url);
     CHECK(looks_like_url(url));
   }
-  for (const std::string_view name :
-       {"", "station3", "@line1", ":5000", "10.0.0", "10.0.0.7.8", "a.b.c.d", "[ab]*", "[ab]:1",
-        "preset.1.speed", "p242", "@holding:2", "/home/x", "COM", "COM0", "ttyUSB", "st3:x"}) {
+  for (const std::string_view name : {"",
+                                      "station3",
+                                      "@line1",
+                                      ":5000",
+                                      "10.0.0",
+                                      "10.0.0.7.8",
+                                      "a.b.c.d",
+                                      "[ab]*",
+                                      "[ab]:1",
+                                      "preset.1.speed",
+                                      "p242",
+                                      "@holding:2",
+                                      "/home/x",
+                                      "COM",
+                                      "COM0",
+                                      "ttyUSB",
+                                      "st3:x",
+                                      "/dev/fd/63",
+                                      "/dev/stdin",
+                                      "/dev/stdout",
+                                      "/dev/stderr",
+                                      "/dev/null",
+                                      "/dev/full",
+                                      "/dev/zero",
+                                      "/dev/shm/values.yaml",
+                                      "/dev/"}) {
     CAPTURE(name);
     CHECK_FALSE(looks_like_url(name));
   }

@@ -340,6 +340,16 @@ TEST_CASE("arguments that look like options, or are negative, arrive behind -- a
   CHECK(good("get t -5").run);  // a number is no option; no parameter has such a name
 }
 
+TEST_CASE("words with brackets around them arrive as they were typed") {
+  // What help is wanted of is a list of words, as targets are.
+  for (const std::string word : {"[get]", "[get,set]", "[::1]", "[a=1,b=2]"}) {
+    CAPTURE(word);
+    const auto asked = parse({"help", word});
+    REQUIRE_FALSE(asked);
+    CHECK(asked.error().message.find(word) != std::string::npos);
+  }
+}
+
 TEST_CASE("help and version are commands, too, and spindle alone is a question for help") {
   CHECK(good("").text == good("--help").text);
   CHECK(good("help").text == good("--help").text);

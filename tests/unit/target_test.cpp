@@ -83,7 +83,7 @@ Result<OpenTool> open(const std::string& text, Need need, Bench& bench) {
   if (!target) return tl::unexpected(target.error());
   auto profile = load_profile(*target, context);
   if (!profile) return tl::unexpected(profile.error());
-  return open_tool(*target, std::move(*profile), need, context);
+  return open_tool(*target, std::move(*profile), need, Purpose::read, context);
 }
 
 }  // namespace
@@ -209,7 +209,7 @@ TEST_CASE("names are checked before connecting where the profile is known") {
   const Environment context = bench.context();
   const auto target = resolve_target("station3", context);
   const auto opened = open_prepared(
-      *target, Need::named_registers, context,
+      *target, Need::named_registers, Purpose::read, context,
       [](const catalogue::Profile& profile) { return profile.select({"preset.1.torqe"}); });
   REQUIRE_FALSE(opened.has_value());
   CHECK(opened.error().code == Errc::unknown_name);

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <string>
+#include <vector>
 
 #include "support/memory_disk.hpp"
 
@@ -43,6 +44,30 @@ TEST_CASE("what was seen behind a host is remembered, the last one counts") {
   CHECK(memory.recall(endpoint("tcp://192.168.10.23")).value() == exchanged);
   CHECK(files.text("/cache/spindle/tools-seen") ==
         "spindle tools seen 1\n192.168.10.23\t\t5000\tdoga-bm\t1021100043\n");
+}
+
+TEST_CASE("the tool that was seen last is the last one, also of those that are known") {
+  test::MemoryDisk files;
+  const Disk disk = files.functions();
+  const ToolMemory memory(disk, "/cache/spindle");
+  SeenTool other = station3;
+  other.port = 5001;
+  other.serial = "1021100043";
+  SeenTool elsewhere = station3;
+  elsewhere.host = "192.168.10.24";
+  const auto host = endpoint("tcp://192.168.10.23");
+  CHECK(memory.seen_behind(host).value().empty());
+  REQUIRE(memory.remember(station3));
+  REQUIRE(memory.remember(other));
+  REQUIRE(memory.remember(elsewhere));
+  CHECK(memory.recall(host).value() == other);
+  CHECK(memory.seen_behind(host).value() == std::vector{station3, other});
+  REQUIRE(memory.remember(station3));
+  CHECK(memory.recall(host).value() == station3);
+  CHECK(memory.seen_behind(host).value() == std::vector{other, station3});
+  CHECK_FALSE(has_one_port(memory.seen_behind(host).value()));
+  REQUIRE(memory.forget(other));
+  CHECK(has_one_port(memory.seen_behind(host).value()));
 }
 
 TEST_CASE("a file that is broken is none, and is made anew") {

@@ -59,6 +59,13 @@ TEST_CASE("order and places are kept; lines and columns count from 1") {
   CHECK(inner.find("x")->items.at(1).at == SourceLocation{0, 4, 13});
 }
 
+TEST_CASE("a byte order mark in front is no part of the text") {
+  const Parsed parsed = parse("\xEF\xBB\xBF{a: 1}\n");
+  REQUIRE(parsed.findings.empty());
+  REQUIRE(parsed.documents.size() == 1);
+  CHECK(parsed.documents[0].find("a") != nullptr);
+}
+
 TEST_CASE("columns count bytes, as compilers do") {
   const Parsed parsed = parse("{ä: §, b: 1, b: 2}");
   CHECK(parsed.findings == Texts{"f:1:16: key 'b' is given twice"});

@@ -33,6 +33,12 @@ enum class Frames : std::uint8_t { hidden, shown };
 /// Whether the user named a tool, or the default one is meant: what changes it is asked about then.
 enum class TargetChoice : std::uint8_t { typed, by_default };
 
+/// A word that is the name of a tool, and may be that of a parameter or action, too.
+struct DoubtfulWord {
+  std::string word;
+  std::string profile = {};  ///< whose parameter it may be; empty: of the tools that are meant
+};
+
 /// The options that every command takes about what is said and asked.
 struct UserOptions {
   Consent consent = Consent::ask;
@@ -42,8 +48,7 @@ struct UserOptions {
   /// Not on a terminal that cannot draw over a line, and not where there is one for all tools.
   report::Showing progress = report::Showing::wanted;
   TargetChoice choice = TargetChoice::typed;
-  /// Tools by their names that may be those of parameters or actions, too.
-  std::vector<std::string> doubtful = {};
+  std::vector<DoubtfulWord> doubtful = {};
 };
 
 /// The part of a context that is the same for all tools, beside what work on them needs.

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "spindle/work/target.hpp"
 
@@ -17,6 +19,14 @@ struct OpenTool {
   Target target;
   std::unique_ptr<const catalogue::Profile> profile;  ///< what the device refers to
   device::Device device;
+  std::vector<std::string> remarks = {};  ///< what people should know of how it was opened
+};
+
+/// What a tool is opened for. It decides how sure it has to be that it is the tool that is meant.
+enum class Purpose : std::uint8_t {
+  read,    ///< nothing is written: it may be where a tool was seen last
+  listen,  ///< read, but a tool may have to be told to send its events
+  change,  ///< it is changed, moved or stopped: it is where the user says, and no other one
 };
 
 /// What a command has to know of the registers.
@@ -54,11 +64,16 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 /// cannot be proven, a tool that says that it is of another one, which allows only listed writes,
 /// is refused (`mismatch`). For raw secrets a tool that says over TCP what it is goes on with the
 /// profile that fits, where that has secrets. A torque unit that the profile says where to read is
-/// read; error `mismatch` where the tools file says another one. A tool whose port and profile are
-/// not named is asked where it was last seen, and goes on there if it says the serial number that
-/// it had.
+/// read; error `mismatch` where the tools file says another one. A tool that is only read, and
+/// whose port and profile are not named, is asked where one was seen, if that is one port, and goes
+/// on there if it says the serial number that it had. Error `mismatch` where a tool is to be changed
+/// that has another serial number than the tools file says; otherwise that is a remark, and so it is
+/// of a stop.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
-                           const Environment& environment);
+                           Purpose purpose, const Environment& environment);
+
+/// What differs where a tool says another serial number than the tools file; empty: nothing does.
+std::string other_serial(const Target& target, const std::string& serial);
 
 /// Keeps in the user's cache where a tool over TCP was that said this of itself, unless its profile
 /// is from the tools file. What cannot be kept is told to those who ask for every decision only.
@@ -91,7 +106,8 @@ struct Opened {
 /// Opens a tool and calls `prepare(profile)` as early as possible: before connecting where the
 /// profile is known, so that a misspelt name is told without asking a tool.
 template <typename Prepare>
-auto open_prepared(const Target& target, Need need, const Environment& environment, Prepare prepare)
+auto open_prepared(const Target& target, Need need, Purpose purpose, const Environment& environment,
+                   Prepare prepare)
     -> Result<
         Opened<typename std::invoke_result_t<Prepare, const catalogue::Profile&>::value_type>> {
   using Attempt = std::invoke_result_t<Prepare, const catalogue::Profile&>;
@@ -102,7 +118,7 @@ auto open_prepared(const Target& target, Need need, const Environment& environme
   std::optional<Attempt> prepared;
   if (known) prepared = prepare(*profile);
   if (prepared && !*prepared) return tl::unexpected(std::move(prepared->error()));
-  auto tool = open_tool(target, std::move(*profile), need, environment);
+  auto tool = open_tool(target, std::move(*profile), need, purpose, environment);
   if (!tool) return tl::unexpected(std::move(tool.error()));
   if (!prepared) prepared = prepare(*tool->profile);
   if (!*prepared) return tl::unexpected(std::move(prepared->error()));

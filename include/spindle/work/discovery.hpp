@@ -28,7 +28,6 @@ struct Heard {
 
 /// What a scan came to.
 struct ScanResult {
-  std::size_t found = 0;
   std::size_t strange = 0;         ///< datagrams that are no answer
   std::size_t left_out = 0;        ///< answers of more tools than are told
   std::vector<Error> faults = {};  ///< of single interfaces

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "spindle/device/run_model.hpp"
 #include "spindle/work/connect.hpp"
@@ -36,6 +37,9 @@ class StopPursuit {
   /// Null where it never became known.
   [[nodiscard]] const catalogue::Profile* profile() const { return profile_; }
 
+  /// The serial number that the tool said before it was stopped; empty: it was not known in time.
+  [[nodiscard]] const std::string& serial() const { return serial_; }
+
  private:
   device::GuardedMotion motion();
   Result<device::Device> open(Duration patience);
@@ -58,6 +62,7 @@ class StopPursuit {
   std::unique_ptr<device::Stopper> stopper_ = nullptr;
   bool was_observed_ = false;
   bool generation_is_checked_ = false;
+  std::string serial_ = {};
   unsigned questions_ = 0;
   std::optional<Error> last_ = std::nullopt;
   device::RunGuard guard_;  ///< its device needs the profile

@@ -19,6 +19,7 @@ struct Target {
   std::string profile = {};      ///< option, tools file or sim:PROFILE; empty: not known
   std::string torque_unit = {};  ///< of the tools file; empty: unknown
   std::vector<std::string> verified = {};
+  std::string serial = {};  ///< whose it is by the tools file; empty: it says nothing
   Addressing addressing = Addressing::unicast;
   link::Reopening reopening = link::Reopening::never;
   /// What is wrong with its entry of the tools file: it must not be used, see fault_of(). Empty:

@@ -22,10 +22,13 @@ struct SeenTool {
   friend bool operator==(const SeenTool&, const SeenTool&) = default;
 };
 
+/// Whether all of these were behind the same port.
+bool has_one_port(const std::vector<SeenTool>& seen);
+
 /// Which tools were behind which hosts, kept in a file of the user's cache from one run to the
-/// next. It is a hint and never a proof: what it says is used to find the port of a tool whose URL
-/// has none, and to complete names, and the tool is asked who it is all the same. A file that is
-/// broken, or of another user, is as one that is not there.
+/// next. It is a hint and never a proof: what it says is used to find the port of a tool that is
+/// only read and whose URL has none, and to complete names, and the tool is asked who it is all the
+/// same. A file that is broken, or of another user, is as one that is not there.
 class ToolMemory {
  public:
   /// `disk` must outlive it. `folder` is spindle's own; empty: nothing is remembered.
@@ -38,8 +41,12 @@ class ToolMemory {
   /// nothing. Error `bad_file` where the file cannot be used.
   [[nodiscard]] Result<std::optional<SeenTool>> recall(const link::Endpoint& endpoint) const;
 
-  /// Keeps this one in place of what was seen there before, and the newest 500 of all. Writes only
-  /// where that changes something. Errors are those of the disk.
+  /// All that were seen behind the endpoint's host, whatever its port and unit; the one that was
+  /// seen last comes last. Error `bad_file` as above.
+  [[nodiscard]] Result<std::vector<SeenTool>> seen_behind(const link::Endpoint& endpoint) const;
+
+  /// Keeps this one, as the last one seen, in place of what was seen there before, and the newest
+  /// 500 of all. Writes only where that changes something. Errors are those of the disk.
   [[nodiscard]] Result<void> remember(const SeenTool& tool) const;
   [[nodiscard]] Result<void> forget(const SeenTool& tool) const;
 
