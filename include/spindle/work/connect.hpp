@@ -66,9 +66,9 @@ Result<OpenTool> connect(const Target& target, catalogue::Profile profile,
 /// profile that fits, where that has secrets. A torque unit that the profile says where to read is
 /// read; error `mismatch` where the tools file says another one. A tool that is only read, and
 /// whose port and profile are not named, is asked where one was seen, if that is one port, and goes
-/// on there if it says the serial number that it had. Error `mismatch` where a tool is to be changed
-/// that has another serial number than the tools file says; otherwise that is a remark, and so it is
-/// of a stop.
+/// on there if it says the serial number that it had. Error `mismatch` where a tool is to be
+/// changed that has another serial number than the tools file says; otherwise that is a remark, and
+/// so it is of a stop.
 Result<OpenTool> open_tool(const Target& target, catalogue::Profile profile, Need need,
                            Purpose purpose, const Environment& environment);
 
