@@ -2,7 +2,7 @@
 // port is opened and set as libmodbus 3.1.6 does it; src/posix/serial.cpp then checks by itself
 // what the port has become.
 #include <fcntl.h>
-#include <modbus/modbus.h>
+#include <modbus.h>
 #include <termios.h>
 #include <unistd.h>
 

@@ -3,6 +3,7 @@
 
 Read from the build itself: which shared libraries the programs load (ldd), which archives and headers went into them
 (ninja), which Debian packages these belong to (dpkg), and what is kept in third_party/. Needs Debian.
+Of a program for another architecture, the packages are those that packaging/static has unpacked.
 """
 
 import datetime
@@ -14,6 +15,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tarfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PROGRAMS = ("spindle", "spindle-forward", "spindle-serve")
@@ -42,6 +44,9 @@ def shared_libraries(program):
 class Build:
     def __init__(self, folder):
         self.folder = folder
+        told = re.search(r"--sysroot=(\S+)", self._ninja("commands", "-s", "spindle"))
+        self.sysroot = pathlib.Path(told[1]) if told else None
+        self._system = ("/usr/", f"{self.sysroot}/usr/")
         self._headers = self._headers_by_object()
 
     def _ninja(self, *words):
@@ -52,7 +57,7 @@ class Build:
         for line in self._ninja("deps").splitlines():
             if line and not line.startswith(" "):
                 headers = found.setdefault(line.partition(":")[0], set())
-            elif line.startswith("    /usr/"):
+            elif line.strip().startswith(self._system):
                 headers.add(line.strip())
         return found
 
@@ -64,20 +69,25 @@ class Build:
     def archives(self, program):
         """Archives of the system that were linked into it."""
         link = self._ninja("commands", "-s", program)
-        found = {pathlib.Path(word) for word in link.split() if word.endswith(".a") and word.startswith("/usr/")}
+        found = {pathlib.Path(word) for word in link.split() if word.endswith(".a") and word.startswith(self._system)}
         flags = link.split()
-        compiler = re.search(r"(\S*\+\+\S*) ", link)[1]
+        compiler = [re.search(r"(\S*\+\+\S*) ", link)[1],
+                    *(flag for flag in flags if flag.startswith(("--sysroot=", "-B")))]
         names = [name for flag, name in (("-static-libstdc++", "libstdc++.a"), ("-static-libgcc", "libgcc.a"),
                                          ("-static", "libstdc++.a"), ("-static", "libgcc.a"), ("-static", "libc.a"))
                  if flag in flags]
-        return found | {pathlib.Path(said_by(compiler, f"-print-file-name={name}").strip()).resolve() for name in names}
+        return found | {pathlib.Path(said_by(*compiler, f"-print-file-name={name}").strip()).resolve() for name in names}
 
 
 class Packages:
     """Debian packages, by their files."""
 
-    def __init__(self):
+    def __init__(self, sysroot):
         self._owners = {}
+        for package in sorted((sysroot / "packages").glob("*.deb")) if sysroot else ():
+            with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE) as unpacking, \
+                    tarfile.open(fileobj=unpacking.stdout, mode="r|") as files:
+                self._owners.update({sysroot / pathlib.PurePath(file.name): str(package) for file in files})
 
     def learn(self, paths):
         """Asks for all of them at once: every question reads all that dpkg knows."""
@@ -109,7 +119,8 @@ class Packages:
     @functools.cache
     def describe(owner):
         fields = ("binary:Package", "Version", "Architecture", "source:Package", "source:Version")
-        told = said_by("dpkg-query", "-W", "-f", "\t".join("${%s}" % field for field in fields), owner).split("\t")
+        ask = ("dpkg-deb", "--show") if owner.endswith(".deb") else ("dpkg-query", "--show")
+        told = said_by(*ask, "--showformat", "\t".join("${%s}" % field for field in fields), owner).split("\t")
         return dict(zip(("name", "version", "architecture", "source", "source_version"), told))
 
 
@@ -175,7 +186,8 @@ def vendored(document, program):
 
 
 def describe(folder):
-    build, packages = Build(folder), Packages()
+    build = Build(folder)
+    packages = Packages(build.sysroot)
     programs = [folder / name for name in PROGRAMS if (folder / name).is_file()]
     document = Document(programs)
     shared, archives, headers = ({path: read(path) for path in programs} for read in (
@@ -194,7 +206,8 @@ def describe(folder):
         for owner in sorted(static | packages.owners(headers[path])):
             package = document.add_debian(owner)
             # Code of a library that is also loaded, or of the kernel's interface, is in its headers only.
-            loaded = Packages.describe(owner)["source"] in sources | {"linux"}
+            told = Packages.describe(owner)
+            loaded = told["source"] in sources or told["name"].startswith("linux-libc-dev")
             if owner in static or not loaded:
                 document.relate(program, "STATIC_LINK", package)
             else:
