@@ -388,7 +388,8 @@ TEST_CASE("what is wrong is named, with a suggestion or where to look") {
       {"get t --profile", "'--profile' needs a value; write --profile VALUE"},
       {"get t -o", "'-o' needs a value; write -o VALUE"},
       {"get t -o jsn",
-       "--output: 'jsn' is unknown; it takes table, json, csv, svg, wide, value, yaml; did you mean 'json'?"},
+       "--output: 'jsn' is unknown; it takes table, json, csv, svg, wide, value, yaml; did you "
+       "mean 'json'?"},
       {"get t --timeout 5", "--timeout: '5' is not a duration; write it like 500ms, 2.5s or 5min"},
       {"get t --timeout -1s",
        "--timeout: '-1s' is not a duration; write it like 500ms, 2.5s or 5min"},

@@ -57,7 +57,8 @@ struct Disk {
   std::function<Result<std::string>(const std::string& path)> read_secret = {};
   /// Writes a text in place of another one: false, and nothing is written, where the file does not
   /// hold `expected` (any more). Of programs that replace a file so at the same time, one comes
-  /// after the other. As write(), it stores all of the text or nothing, and keeps the file's rights.
+  /// after the other. As write(), it stores all of the text or nothing, and keeps the file's
+  /// rights.
   std::function<Result<bool>(const std::string& path, std::string_view expected,
                              std::string_view text)>
       replace = {};

@@ -57,7 +57,7 @@ struct Undoing {
 };
 
 struct SetOptions {
-  std::vector<std::string> targets;  ///< or groups
+  std::vector<std::string> targets;      ///< or groups
   std::vector<std::string> assignments;  ///< NAME=VALUE, NAME+=STEP; NAME may be a pattern
   std::string file = {};                 ///< with more of them, a line each; "-": standard input
   Execution execution = Execution::real;
@@ -366,7 +366,7 @@ enum class OnFailure : std::uint8_t { roll_back, leave };
 
 struct RestoreOptions {
   std::vector<std::string> targets;  ///< with a folder several, and groups
-  std::string file;    ///< not with a folder
+  std::string file;                  ///< not with a folder
   std::string folder;  ///< each tool is restored from its backup in it; empty: from `file`
   std::vector<std::string> patterns;
   Execution execution = Execution::real;

@@ -43,8 +43,8 @@ struct LinkChange {
   std::string message;
 };
 
-using WatchEvent = std::variant<ToolEvent, PolledValue, EventGap, PollLag, LinkChange,
-                                MotorTransition, ToolCurve>;
+using WatchEvent =
+    std::variant<ToolEvent, PolledValue, EventGap, PollLag, LinkChange, MotorTransition, ToolCurve>;
 
 enum class Samples : std::uint8_t { changes, changes_and_first, all };
 /// What is done when a link is lost.

@@ -120,8 +120,8 @@ std::string wrapped(std::string_view text, std::size_t columns = 100);
 /// How wide a line on stderr may be: 100 columns, or those of a narrower terminal.
 std::size_t columns_of(const Streams& streams);
 
-/// The text as one sentence on stderr, on as many lines as it takes, marked with its severity (sd-daemon(3)) where the system's
-/// journal reads that.
+/// The text as one sentence on stderr, on as many lines as it takes, marked with its severity
+/// (sd-daemon(3)) where the system's journal reads that.
 void say_line(const Streams& streams, Severity severity, std::string_view text);
 
 /// The same as one line, however wide: a frame is looked for by programs, too.

@@ -155,8 +155,8 @@ struct EventView {
 /// The curves of one stored event.
 struct Curve {
   RowId event = 0;
-  std::int64_t epoch = 0;  ///< of the event, as it is read
-  WallTime at = {};        ///< likewise
+  std::int64_t epoch = 0;        ///< of the event, as it is read
+  WallTime at = {};              ///< likewise
   std::int64_t interval_us = 0;  ///< from one sample to the next; 0: not known
   std::string channels = {};     ///< what the channels are, as JSON of who stored it
   Bytes samples = {};  ///< of all channels, one behind the other: binary32, the high byte first

@@ -58,9 +58,9 @@ struct Environment {
   const files::Tools& tools;
   const ShowFrames& show_frames;  ///< may be empty
   CommonOptions common = {};
-  link::MakeDoors make_doors = {};  ///< lets other programs ask; empty: none can
-  std::string cache_folder = {};    ///< spindle's own; empty: nothing is remembered there
-  link::Network network = {};       ///< where tools are looked for; may be empty
+  link::MakeDoors make_doors = {};   ///< lets other programs ask; empty: none can
+  std::string cache_folder = {};     ///< spindle's own; empty: nothing is remembered there
+  link::Network network = {};        ///< where tools are looked for; may be empty
   std::string target_variable = {};  ///< $SPINDLE_TARGET; empty: it is not set
 };
 
