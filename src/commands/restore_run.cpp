@@ -7,6 +7,7 @@
 
 #include "records.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/snapshot_unit.hpp"
 #include "spindle/files/backup_file.hpp"
 #include "storing.hpp"
 
@@ -55,6 +56,9 @@ Snapshot expected_after(const RestoreTask& task, const std::vector<PlannedWrite>
     entry->raw = catalogue::encode(write.parameter, write.after, entry->raw).value_or(entry->raw);
     entry->parameter = write.parameter;
     entry->value = write.after;
+  }
+  for (const PlannedWrite& write : writes) {
+    for (auto& entry : expected.entries) entry = with_unit_of(std::move(entry), profile, write);
   }
   for (const Parameter& parameter : profile.parameters) {
     if (parameter.scale_by.empty()) continue;
@@ -156,10 +160,16 @@ void RestoreRun::write(const std::vector<PlannedWrite>& writes) {
       [&](const PlannedWrite& one) { give_up(one); });
 }
 
+/// Everything, with the unit of torques, which may be another one by now.
+Result<ToolSnapshot> RestoreRun::read_again(std::string_view what) {
+  TRY(work::read_torque_unit(*tool_));
+  return take_snapshot(*tool_, Secrets::include, *context_,
+                       progress_.counter(fmt::format("{}: {}", tool_->target.shown, what)));
+}
+
 /// By what the tool holds now.
 void RestoreRun::plan_rest() {
-  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
-                                 progress_.counter(tool_->target.shown + ": reading again"));
+  const auto now = read_again("reading again");
   if (!now) return fail(now.error());
   for (const Error& error : now->unreadable) fail(error);
   auto plan = catalogue::plan_restore(task_->backup, now->snapshot, tool_->device.profile(),
@@ -229,8 +239,7 @@ void RestoreRun::verify() {
 
 /// A tool may change one parameter when another one is written, so everything is read once more.
 void RestoreRun::compare_everything() {
-  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
-                                 progress_.counter(tool_->target.shown + ": verifying"));
+  const auto now = read_again("verifying");
   if (!now) {
     fail(now.error());
     return roll_back();

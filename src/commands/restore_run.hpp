@@ -36,6 +36,7 @@ class RestoreRun {
   Result<void> save_present();
   void write_all();
   void write(const std::vector<catalogue::PlannedWrite>& writes);
+  Result<ToolSnapshot> read_again(std::string_view what);
   void plan_rest();
   work::Step write_one(const catalogue::PlannedWrite& write);
   [[nodiscard]] bool is_missing(const std::string& name) const;
