@@ -20,7 +20,11 @@ struct PastChange {
   report::Cell register_address;
   report::Cell before;
   report::Cell after;
-  std::string result;  ///< `begun`: the program ended before it was known
+  std::string result;     ///< `begun`: the program ended before it was known
+  std::string unit = {};  ///< empty: none, or not recorded
+  std::string label_before = {};
+  std::string label_after = {};
+  std::string undoes = {};  ///< id of the change that it took back; empty: none
 };
 
 struct ChangeHistory {

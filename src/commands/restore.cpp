@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "backup_paths.hpp"
@@ -17,8 +18,9 @@ using catalogue::Profile;
 /// What it refers to does not change while it runs.
 class Restore final : public Verb<RestoreTask, RestoreResult> {
  public:
-  Restore(const RestoreOptions& options, const Backups& backups, bool is_group)
-      : options_(&options), backups_(&backups), is_group_(is_group) {}
+  Restore(const RestoreOptions& options, const Backups& backups, const CommonRun& run,
+          bool is_group)
+      : options_(&options), backups_(&backups), run_(&run), is_group_(is_group) {}
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
@@ -89,7 +91,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    return RestoreRun(*options_, plan, tool, context).run();
+    return RestoreRun(*options_, plan, tool, run_->of(tool.target), context).run();
   }
 
   /// Nothing was written to this tool; its summary says so, too.
@@ -121,7 +123,10 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;
-    return summary;
+    const bool is_changed = std::any_of(all.done.begin(), all.done.end(), [](const auto& done) {
+      return done && !done->change.empty();
+    });
+    return is_changed ? with_change(std::move(summary), run_->id()) : summary;
   }
 
  private:
@@ -153,6 +158,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
 
   const RestoreOptions* options_;
   const Backups* backups_;
+  const CommonRun* run_;
   bool is_group_;
 };
 
@@ -190,7 +196,9 @@ Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   return resolve(options, context).and_then([&](const Targets& targets) {
     return find_backups(targets.tools, options, context).and_then([&](const Backups& backups) {
-      return run_verb(Restore(options, backups, targets.is_group), targets, options.jobs, context);
+      const CommonRun run("restore", targets.tools, context);
+      return run_verb(Restore(options, backups, run, targets.is_group), targets, options.jobs,
+                      context);
     });
   });
 }

@@ -98,14 +98,14 @@ std::string without_colons(std::string time) {
 }  // namespace
 
 RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
-                       Context& context)
+                       const std::string& run, Context& context)
     : options_(&options),
       task_(&task),
       tool_(&tool),
       context_(&context),
       uninterruptible_line_(tool, context),
-      log_(change_log("restore", tool, context)),
-      changer_(tool.device, log_),
+      log_(change_log("restore", tool, context, run)),
+      changer_(tool.device, log_, tool.target),
       progress_(context),
       counts_(counts_of(task.plan)) {}
 
@@ -382,7 +382,7 @@ Result<RestoreResult> RestoreRun::end() {
   }
   if (errors_.empty() && outcome_.failed() == 0) outcome_.succeed();
   if (!told && errors_.empty()) return tl::unexpected(std::move(told.error()));
-  const RestoreResult result{outcome_, counts_};
+  const RestoreResult result{outcome_, counts_, log_.run()};
   if (!told) return result;
   Summary summary = with_change(restore_summary(counts_, saved_, tool_->target.shown), log_);
   if (!errors_.empty()) summary.sentence += fmt::format(", {} rolled back", counts_.rolled_back);

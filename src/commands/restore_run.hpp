@@ -17,6 +17,7 @@ namespace spindle::commands {
 struct RestoreResult {
   Outcome outcome = {};
   RestoreCounts counts = {};
+  std::string change = {};  ///< id of what was changed; empty: nothing was
 };
 
 /// Carries out a plan: writes in its order, reads each back, compares everything at the end. On
@@ -24,9 +25,9 @@ struct RestoreResult {
 /// where that fails too.
 class RestoreRun {
  public:
-  /// All must outlive it.
+  /// All must outlive it. `run` as in work::LogOptions.
   RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
-             Context& context);
+             const std::string& run, Context& context);
   RestoreRun(const RestoreRun&) = delete;
   RestoreRun& operator=(const RestoreRun&) = delete;
 

@@ -424,6 +424,25 @@ class Backups(Gen2Test):
             self.assertIn("control.torque-unit", self.restore(*arguments, status=8).err)
         self.assertEqual(self.written(), [])
 
+    def test_a_restore_with_the_unit_is_taken_back(self):
+        for rescales in (False, True):
+            with self.subTest(rescales=rescales):
+                self.start()
+                self.backup("--force")
+                self.device.rescales = rescales
+                self.device.put(UNIT, 3)
+                self.device.put(TARGET_1, *f32(10.0))
+                self.device.put(3663, 77)
+                change = self.restore().of_type("summary")[0]["change_id"]
+                self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1)), (2, 2.5))
+                first = len(self.written())
+                outcome = support.run(support.SPINDLE, "--json", "undo", change, "--yes",
+                                      folder=support.scratch_folder())
+                self.assert_ends(outcome, 0)
+                self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1), self.device.number(3663)),
+                                 (3, 10.0, 77))
+                self.assertEqual(self.written()[first:][-1], (UNIT, [3]))
+
     def test_only_the_unit(self):
         self.backup()
         self.device.put(UNIT, 3)
