@@ -16,7 +16,7 @@ parameters:
   - {name: a, register: 0, encoding: u16, access: rw, evidence: manual, source: "x", title: "A"}
   - {name: b, register: 1, encoding: u16, access: rw, evidence: manual, source: "x", title: "B"}
   - {name: t, register: 2, encoding: u16, scale: 0.1, unit: torque, access: rw, evidence: manual, source: "x", title: "T"}
-  - {name: m, register: 3, labels: {0: slow, 1: fast}, access: rw, evidence: manual, source: "x", title: "M"}
+  - {name: m, register: 3, encoding: u16, labels: {0: slow, 1: fast}, access: rw, evidence: manual, source: "x", title: "M"}
 """
 
 
@@ -61,7 +61,7 @@ class UndoTest(unittest.TestCase):
                     "command": "set", "target": "bench1", "serial": None, "name": "a", "register": 0, "old": 9,
                     "new": 10, "result": "written", "id": "aaaa0001-1", "unit": None,
                 } | record
-                file.write(json.dumps(line) + "\n")
+                file.write(json.dumps(line, separators=(",", ":")) + "\n")
 
     def test_step_by_step(self):
         for value in (11, 12, 13):

@@ -433,11 +433,12 @@ class Backups(Gen2Test):
                 self.device.put(UNIT, 3)
                 self.device.put(TARGET_1, *f32(10.0))
                 self.device.put(3663, 77)
-                change = self.restore().of_type("summary")[0]["change_id"]
+                folder = support.scratch_folder()
+                outcome = support.run(support.SPINDLE, "--json", "restore", self.url, self.file, "--yes", folder=folder)
+                change = outcome.of_type("summary")[0]["change_id"]
                 self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1)), (2, 2.5))
                 first = len(self.written())
-                outcome = support.run(support.SPINDLE, "--json", "undo", change, "--yes",
-                                      folder=support.scratch_folder())
+                outcome = support.run(support.SPINDLE, "--json", "undo", change, "--yes", folder=folder)
                 self.assert_ends(outcome, 0)
                 self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1), self.device.number(3663)),
                                  (3, 10.0, 77))

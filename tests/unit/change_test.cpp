@@ -153,7 +153,7 @@ struct Bench : test::Rig<Bank> {
   Device device = open();
   work::ChangeLog log = work::ChangeLog({.command = "set", .target = "bank", .folder = "/state"},
                                         disk, clock, [](const std::string&) {});
-  Target target = {};
+  work::Target target = {};
   work::Changer changer = work::Changer(device, log, target);
 };
 
