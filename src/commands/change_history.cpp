@@ -1,6 +1,10 @@
 #include "change_history.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <map>
 #include <utility>
 
@@ -46,6 +50,11 @@ bool is_end_of(const PastChange& change, const PastChange& begun) {
          change.name == begun.name;
 }
 
+template <std::size_t count>
+bool is_one_of(const std::array<std::string_view, count>& results, const PastChange& change) {
+  return std::find(results.begin(), results.end(), change.result) != results.end();
+}
+
 }  // namespace
 
 Result<ChangeHistory> read_changes(const Context& context) {
@@ -77,6 +86,47 @@ Result<ChangeHistory> read_changes(const Context& context) {
     entry = std::move(*change);
   }
   return history;
+}
+
+std::string run_of(const std::string& id) {
+  constexpr std::size_t digits = 8;
+  const std::size_t first = id.find('-');
+  const bool is_short = first == digits && std::all_of(id.begin(), id.begin() + digits, [](char c) {
+                          return std::isxdigit(static_cast<unsigned char>(c)) != 0;
+                        });
+  return id.substr(0, is_short ? first : id.rfind('-'));
+}
+
+bool has_changed(const PastChange& change) {
+  return is_one_of<3>({"written", "coerced", "changed-along"}, change);
+}
+
+bool may_have_changed(const PastChange& change) {
+  if (has_changed(change)) return true;
+  return change.before != report::Cell() &&
+         is_one_of<4>({"mismatch", "unknown", files::begun, "not-rolled-back"}, change);
+}
+
+std::string value_of(const PastChange& change) {
+  return fmt::format("{}\n{}\n{}\n{}", run_of(change.id), change.target, change.serial,
+                     change.name);
+}
+
+std::set<std::string> taken_back(const ChangeHistory& history) {
+  std::map<std::string, const PastChange*> earlier;
+  std::set<std::string> taken;
+  for (const PastChange& change : history.changes) {
+    bool is_taken = true;
+    auto other = has_changed(change) ? earlier.find(change.undoes) : earlier.end();
+    for (std::size_t steps = 0; other != earlier.end() && steps < earlier.size(); ++steps) {
+      const std::string value = value_of(*other->second);
+      is_taken ? static_cast<void>(taken.insert(value)) : static_cast<void>(taken.erase(value));
+      is_taken = !is_taken;
+      other = earlier.find(other->second->undoes);
+    }
+    if (!change.id.empty()) earlier.emplace(change.id, &change);
+  }
+  return taken;
 }
 
 }  // namespace spindle::commands

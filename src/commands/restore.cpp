@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "backup_paths.hpp"
@@ -18,9 +17,8 @@ using catalogue::Profile;
 /// What it refers to does not change while it runs.
 class Restore final : public Verb<RestoreTask, RestoreResult> {
  public:
-  Restore(const RestoreOptions& options, const Backups& backups, const CommonRun& run,
-          bool is_group)
-      : options_(&options), backups_(&backups), run_(&run), is_group_(is_group) {}
+  Restore(const RestoreOptions& options, const Backups& backups, const CommonRun& run, bool group)
+      : options_(&options), backups_(&backups), run_(&run), is_group_(group) {}
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
@@ -123,10 +121,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;
-    const bool is_changed = std::any_of(all.done.begin(), all.done.end(), [](const auto& done) {
-      return done && !done->change.empty();
-    });
-    return is_changed ? with_change(std::move(summary), run_->id()) : summary;
+    return with_change_of(std::move(summary), all.done, *run_);
   }
 
  private:
@@ -195,10 +190,9 @@ Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
 /// and each is opened again to be written if it is still as it was shown.
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   return resolve(options, context).and_then([&](const Targets& targets) {
-    return find_backups(targets.tools, options, context).and_then([&](const Backups& backups) {
+    return find_backups(targets.tools, options, context).and_then([&](const Backups& all) {
       const CommonRun run("restore", targets.tools, context);
-      return run_verb(Restore(options, backups, run, targets.is_group), targets, options.jobs,
-                      context);
+      return run_verb(Restore(options, all, run, targets.is_group), targets, options.jobs, context);
     });
   });
 }

@@ -97,6 +97,13 @@ std::string without_colons(std::string time) {
 
 }  // namespace
 
+Summary with_change_of(Summary summary, const std::vector<Result<RestoreResult>>& done,
+                       const CommonRun& run) {
+  const bool is_changed = std::any_of(done.begin(), done.end(),
+                                      [](const auto& one) { return one && !one->change.empty(); });
+  return is_changed ? with_change(std::move(summary), run.id()) : summary;
+}
+
 RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
                        const std::string& run, Context& context)
     : options_(&options),

@@ -20,6 +20,10 @@ struct RestoreResult {
   std::string change = {};  ///< id of what was changed; empty: nothing was
 };
 
+/// The summary of several tools with the id of all that was changed on them.
+Summary with_change_of(Summary summary, const std::vector<Result<RestoreResult>>& done,
+                       const CommonRun& run);
+
 /// Carries out a plan: writes in its order, reads each back, compares everything at the end. On
 /// failure, an interrupt or a lost link it puts back what it wrote, and tells what the tool holds
 /// where that fails too.

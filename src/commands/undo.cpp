@@ -2,50 +2,20 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <map>
 #include <set>
 #include <utility>
 
 #include "change_history.hpp"
 #include "spindle/commands/commands.hpp"
-#include "spindle/files/change_log.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using Changes = std::vector<const PastChange*>;
 
-/// What the ids of the changes of one command have in common.
-std::string run_of(const std::string& id) {
-  constexpr std::size_t digits = 8;
-  const std::size_t first = id.find('-');
-  const bool is_short = first == digits && std::all_of(id.begin(), id.begin() + digits, [](char c) {
-                          return std::isxdigit(static_cast<unsigned char>(c)) != 0;
-                        });
-  return id.substr(0, is_short ? first : id.rfind('-'));
-}
-
 bool is_meant(const PastChange& change, const std::string& text) {
   return change.id == text || change.id.starts_with(text + "-");
-}
-
-template <std::size_t count>
-bool is_one_of(const std::array<std::string_view, count>& results, const PastChange& change) {
-  return std::find(results.begin(), results.end(), change.result) != results.end();
-}
-
-/// Whether it left a value that is no longer the one before.
-bool has_changed(const PastChange& change) {
-  return is_one_of<3>({"written", "coerced", "changed-along"}, change);
-}
-
-/// Whether it may have. What an action found is never recorded.
-bool may_have_changed(const PastChange& change) {
-  if (has_changed(change)) return true;
-  return change.before != report::Cell() &&
-         is_one_of<4>({"mismatch", "unknown", files::begun, "not-rolled-back"}, change);
 }
 
 Error nothing_to_undo(const std::string& id) {
@@ -63,30 +33,6 @@ Error nothing_left(const std::string& id, const Changes& changes) {
           .message = fmt::format("change '{}' has nothing that can be taken back: {}", id,
                                  fmt::join(results, ", ")),
           .hint = "only values that were written can"};
-}
-
-/// A value of a tool, whichever change of the command it was.
-std::string value_of(const PastChange& change) {
-  return fmt::format("{}\n{}\n{}\n{}", run_of(change.id), change.target, change.serial,
-                     change.name);
-}
-
-/// The values that an undo took back already. One that takes back an undo makes its change again.
-std::set<std::string> taken_back(const ChangeHistory& history) {
-  std::map<std::string, const PastChange*> earlier;
-  std::set<std::string> taken;
-  for (const PastChange& change : history.changes) {
-    bool is_taken = true;
-    auto other = has_changed(change) ? earlier.find(change.undoes) : earlier.end();
-    for (std::size_t steps = 0; other != earlier.end() && steps < earlier.size(); ++steps) {
-      const std::string value = value_of(*other->second);
-      is_taken ? static_cast<void>(taken.insert(value)) : static_cast<void>(taken.erase(value));
-      is_taken = !is_taken;
-      other = earlier.find(other->second->undoes);
-    }
-    if (!change.id.empty()) earlier.emplace(change.id, &change);
-  }
-  return taken;
 }
 
 /// The part of the changes that still counts: what was put back at once is none.
