@@ -203,8 +203,9 @@ class UnitFindings {
   void add(const SnapshotEntry& wanted, const SnapshotEntry& present) {
     if (count_++ == 0) first_ = other_unit(wanted, present);
   }
-  void tell(std::vector<Error>& findings) {
+  void tell(std::vector<Error>& findings, std::string hint) {
     if (count_ == 0) return;
+    first_.hint = std::move(hint);
     if (count_ > 1) first_.message += fmt::format(" (and so on for {} more)", count_ - 1);
     findings.insert(findings.begin(), std::move(first_));
   }
@@ -215,9 +216,6 @@ class UnitFindings {
             .message = fmt::format("the backup has {}, and this tool holds {}",
                                    with_unit(wanted.value, wanted.unit),
                                    with_unit(present.value, present.unit)),
-            .hint =
-                "'torque-unit' in the tools file says the unit of a tool; --force writes the "
-                "number as it is",
             .name = wanted.parameter.name,
             .register_address = wanted.parameter.address.value};
   }
@@ -244,15 +242,19 @@ Result<void> refuse_beyond(const Parameter& parameter, const Decimal& number, st
       .register_address = parameter.address.value});
 }
 
+/// Whether the tool's own limits count for a value, or are in a unit that it will not have then.
+enum class OwnLimits : std::uint8_t { known, told_later };
+
 /// A value that has to be written must fit the encoding, the profile and the tool.
 Result<void> check_write(const SnapshotEntry& wanted, const SnapshotEntry& present,
-                         const Profile& profile) {
+                         const Profile& profile, OwnLimits own_limits) {
   const Parameter& parameter = wanted.parameter;
   const Decimal& number = wanted.value.number;
   const auto registers = encode(parameter, wanted.value, wanted.raw);
   if (!registers) return tl::unexpected(registers.error());
   TRY(check_pair(parameter.encoding, profile.link));
   TRY(check_range(parameter, wanted.value));
+  if (own_limits == OwnLimits::told_later) return {};
   const bool has_limits = profile.limit_registers(parameter).has_value();
   if (has_limits && (!present.minimum || !present.maximum)) {
     return tl::unexpected(Error{.code = Errc::out_of_range,
@@ -320,7 +322,7 @@ class Planner {
         take_scaled(parameter, *wanted, *now);
       }
     }
-    unit_findings_.tell(plan_.findings);
+    unit_findings_.tell(plan_.findings, hint_of_units());
     plan_.writes = in_order(std::move(plan_.writes));
     return std::move(plan_);
   }
@@ -330,10 +332,36 @@ class Planner {
     return destination_ == Destination::same_tool ? Sides::one_tool : Sides::two_tools;
   }
 
+  /// What may be done about a number of another unit.
+  [[nodiscard]] std::string hint_of_units() const {
+    const Text& decider = profile_->torque_unit_from;
+    if (!decider.empty()) {
+      const bool is_there = backup_->find(decider.view()) != nullptr;
+      return is_there ? fmt::format("name {}, too: it is restored before the torques", decider)
+                      : fmt::format("set {} to the unit of the backup first", decider);
+    }
+    std::string hint = "'torque-unit' in the tools file says the unit of a tool";
+    if (!profile_->has_guarded()) hint += "; --force writes the number as it is";
+    return hint;
+  }
+
+  /// Whether the plan itself writes the unit in which this is counted, which goes first.
+  [[nodiscard]] bool changes_unit_of(const Parameter& parameter) const {
+    const Text& decider = profile_->torque_unit_from;
+    return !decider.empty() && parameter.unit == torque_unit && changes(decider.view());
+  }
+
+  /// The unit when that is written.
+  [[nodiscard]] std::string unit_after(const Parameter& parameter, const SnapshotEntry& now) const {
+    if (!changes_unit_of(parameter)) return now.unit;
+    return backup_->find(profile_->torque_unit_from.view())->value.label;
+  }
+
   void take(const Parameter& parameter, const SnapshotEntry& wanted, const SnapshotEntry* now,
             std::string_view needs) {
+    const std::string unit = now == nullptr ? std::string() : unit_after(parameter, *now);
     const bool comparable = units_ == UnitRule::ignored || now == nullptr ||
-                            units_of(parameter, wanted.unit, now->unit, sides()) == Units::same;
+                            units_of(parameter, wanted.unit, unit, sides()) == Units::same;
     if (const auto skip = skip_of(wanted, now, destination_, comparable)) {
       plan_.skipped.push_back({parameter, *skip});
       return;
@@ -342,12 +370,13 @@ class Planner {
       unit_findings_.add(wanted, *now);
       return;
     }
-    if (auto allowed = check_write(wanted, *now, *profile_); !allowed) {
+    const auto limits = changes_unit_of(parameter) ? OwnLimits::told_later : OwnLimits::known;
+    if (auto allowed = check_write(wanted, *now, *profile_, limits); !allowed) {
       refuse(parameter, std::move(allowed.error()));
     }
     Parameter written = needs.empty() ? parameter : wanted.parameter;
     plan_.writes.push_back(
-        {std::move(written), now->value, wanted.value, now->unit, std::string(needs)});
+        {std::move(written), now->value, wanted.value, unit, std::string(needs)});
   }
 
   void refuse(const Parameter& parameter, Error finding) {

@@ -1,5 +1,6 @@
 #include "bystanders.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "progress.hpp"
@@ -19,13 +20,18 @@ Result<void> Bystanders::read_before() {
   return {};
 }
 
-Result<Bystanders::Changes> Bystanders::read_behind(const catalogue::Parameter& written) {
+Result<Bystanders::Changes> Bystanders::read_behind(
+    const std::vector<catalogue::Parameter>& written) {
   Changes changes{.unit_before = tool_->target.torque_unit};
   TRY(work::read_torque_unit(*tool_));
   changes.unit_now = tool_->target.torque_unit;
   TRY_LET(const auto now, read());
   for (auto& difference : catalogue::compare(before_, now, {}).differences) {
-    if (catalogue::share_registers(difference.parameter, written)) continue;
+    const bool is_written =
+        std::any_of(written.begin(), written.end(), [&](const catalogue::Parameter& one) {
+          return catalogue::share_registers(difference.parameter, one);
+        });
+    if (is_written) continue;
     if (difference.a == difference.b) {
       ++changes.torques;
     } else {

@@ -26,7 +26,7 @@ class Bystanders {
   };
   /// Reads everything again, and the unit of torques, which the target has from then on. Requires
   /// read_before().
-  Result<Changes> read_behind(const catalogue::Parameter& written);
+  Result<Changes> read_behind(const std::vector<catalogue::Parameter>& written);
 
  private:
   Result<catalogue::Snapshot> read();

@@ -17,13 +17,14 @@ namespace {
 
 using report::Align;
 
-const std::array<report::Column, 9> columns = {
+const std::array<report::Column, 10> columns = {
     {{"ID", "id"},
      {"TIME", "changed", Align::left, 0, report::wrapped(10)},
      {"TARGET", "target"},
      {"NAME", "name"},
      {"OLD", "old", Align::right},
      {"NEW", "new", Align::right},
+     {"UNIT", "unit"},
      {"RESULT", "result"},
      {"COMMAND", "command", Align::left, 0, report::left_out(2)},
      {"USER", "user", Align::left, 0, report::left_out(1)}}};
@@ -83,9 +84,13 @@ report::Record change_record(const PastChange& change, const Context& context) {
               {"serial", text_or_null(change.serial)},
               {"name", change.name},
               {"register", change.register_address},
-              {"old", change.before},
-              {"new", change.after},
-              {"result", change.result, is_open ? "unknown: spindle was ended" : ""}}};
+              {"old", change.before, change.label_before},
+              {"new", change.after, change.label_after},
+              {"unit", text_or_null(change.unit)},
+              {"result", change.result, is_open ? "unknown: spindle was ended" : ""},
+              {"old_label", text_or_null(change.label_before)},
+              {"new_label", text_or_null(change.label_after)},
+              {"undoes", text_or_null(change.undoes)}}};
 }
 
 }  // namespace

@@ -18,8 +18,8 @@ using catalogue::Profile;
 /// What it refers to does not change while it runs.
 class Restore final : public Verb<RestoreTask, RestoreResult> {
  public:
-  Restore(const RestoreOptions& options, const Backups& backups, bool is_group)
-      : options_(&options), backups_(&backups), is_group_(is_group) {}
+  Restore(const RestoreOptions& options, const Backups& backups, const CommonRun& run, bool group)
+      : options_(&options), backups_(&backups), run_(&run), is_group_(group) {}
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
@@ -91,7 +91,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
   }
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
-    return RestoreRun(*options_, plan, tool, context).run();
+    return RestoreRun(*options_, plan, tool, run_->of(tool.target), context).run();
   }
 
   /// Nothing was written to this tool; its summary says so, too.
@@ -122,7 +122,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;
-    return summary;
+    return with_change_of(std::move(summary), all.done, *run_);
   }
 
  private:
@@ -154,6 +154,7 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
 
   const RestoreOptions* options_;
   const Backups* backups_;
+  const CommonRun* run_;
   bool is_group_;
 };
 
@@ -190,8 +191,9 @@ Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
 /// and each is opened again to be written if it is still as it was shown.
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   return resolve(options, context).and_then([&](const Targets& targets) {
-    return find_backups(targets.tools, options, context).and_then([&](const Backups& backups) {
-      return run_verb(Restore(options, backups, targets.is_group), targets, options.jobs, context);
+    return find_backups(targets.tools, options, context).and_then([&](const Backups& all) {
+      const CommonRun run("restore", targets.tools, context);
+      return run_verb(Restore(options, all, run, targets.is_group), targets, options.jobs, context);
     });
   });
 }

@@ -6,6 +6,7 @@
 
 #include "progress.hpp"
 #include "restore_warnings.hpp"
+#include "spindle/catalogue/snapshot_unit.hpp"
 #include "spindle/work/change.hpp"
 #include "storing.hpp"
 
@@ -49,6 +50,7 @@ Result<RestoreTask> plan_by_profile(const files::BackupFile& file, const Restore
   TRY(check_storing(options.storing, profile));
   TRY_LET(auto backup, files::resolve_backup(file, profile));
   TRY_LET(auto selection, catalogue::Selection::make(options.patterns, {}, profile));
+  TRY(catalogue::check_own_unit(backup, profile, selection));
   return RestoreTask{
       .file = file.path, .backup = std::move(backup), .selection = std::move(selection)};
 }

@@ -37,10 +37,29 @@ std::span<const Column> restore_columns() {
   return columns;
 }
 
+namespace {
+
+/// What is written behind another unit of torques is shown in that.
+report::Record plan_record(const catalogue::PlannedWrite& write, Target target,
+                           const Clock& clock) {
+  const auto& [parameter, before, after, unit, needs] = write;
+  const std::string unit_before = unit_of(parameter, target);
+  const bool is_torque = parameter.unit == catalogue::torque_unit;
+  if (is_torque) target.torque_unit = unit;
+  report::Record record = change_record(parameter, before, Ending::planned, after, target, clock);
+  if (!is_torque || unit == unit_before) return record;
+  for (report::Field& field : record.fields) {
+    if (field.key == "old") field.shown = fmt::format("{} {}", before.to_string(), unit_before);
+  }
+  record.fields.push_back({"old_unit", text_or_null(unit_before)});
+  return record;
+}
+
+}  // namespace
+
 void add_plan(const RestoreTask& task, const Target& target, Listing& listing, const Clock& clock) {
   for (const catalogue::PlannedWrite& write : task.plan.writes) {
-    listing.add(
-        change_record(write.parameter, write.before, Ending::planned, write.after, target, clock));
+    listing.add(plan_record(write, target, clock));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "records.hpp"
 #include "spindle/base/text.hpp"
+#include "spindle/catalogue/snapshot_unit.hpp"
 #include "spindle/files/backup_file.hpp"
 #include "storing.hpp"
 
@@ -56,6 +57,9 @@ Snapshot expected_after(const RestoreTask& task, const std::vector<PlannedWrite>
     entry->parameter = write.parameter;
     entry->value = write.after;
   }
+  for (const PlannedWrite& write : writes) {
+    for (auto& entry : expected.entries) entry = with_unit_of(std::move(entry), profile, write);
+  }
   for (const Parameter& parameter : profile.parameters) {
     if (parameter.scale_by.empty()) continue;
     const auto entry = entry_of(parameter.name);
@@ -93,15 +97,22 @@ std::string without_colons(std::string time) {
 
 }  // namespace
 
+Summary with_change_of(Summary summary, const std::vector<Result<RestoreResult>>& done,
+                       const CommonRun& run) {
+  const bool is_changed = std::any_of(done.begin(), done.end(),
+                                      [](const auto& one) { return one && !one->change.empty(); });
+  return is_changed ? with_change(std::move(summary), run.id()) : summary;
+}
+
 RestoreRun::RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
-                       Context& context)
+                       const std::string& run, Context& context)
     : options_(&options),
       task_(&task),
       tool_(&tool),
       context_(&context),
       uninterruptible_line_(tool, context),
-      log_(change_log("restore", tool, context)),
-      changer_(tool.device, log_),
+      log_(change_log("restore", tool, context, run)),
+      changer_(tool.device, log_, tool.target),
       progress_(context),
       counts_(counts_of(task.plan)) {}
 
@@ -156,10 +167,16 @@ void RestoreRun::write(const std::vector<PlannedWrite>& writes) {
       [&](const PlannedWrite& one) { give_up(one); });
 }
 
+/// Everything, with the unit of torques, which may be another one by now.
+Result<ToolSnapshot> RestoreRun::read_again(std::string_view what) {
+  TRY(work::read_torque_unit(*tool_));
+  return take_snapshot(*tool_, Secrets::include, *context_,
+                       progress_.counter(fmt::format("{}: {}", tool_->target.shown, what)));
+}
+
 /// By what the tool holds now.
 void RestoreRun::plan_rest() {
-  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
-                                 progress_.counter(tool_->target.shown + ": reading again"));
+  const auto now = read_again("reading again");
   if (!now) return fail(now.error());
   for (const Error& error : now->unreadable) fail(error);
   auto plan = catalogue::plan_restore(task_->backup, now->snapshot, tool_->device.profile(),
@@ -229,8 +246,7 @@ void RestoreRun::verify() {
 
 /// A tool may change one parameter when another one is written, so everything is read once more.
 void RestoreRun::compare_everything() {
-  const auto now = take_snapshot(*tool_, Secrets::include, *context_,
-                                 progress_.counter(tool_->target.shown + ": verifying"));
+  const auto now = read_again("verifying");
   if (!now) {
     fail(now.error());
     return roll_back();
@@ -373,7 +389,7 @@ Result<RestoreResult> RestoreRun::end() {
   }
   if (errors_.empty() && outcome_.failed() == 0) outcome_.succeed();
   if (!told && errors_.empty()) return tl::unexpected(std::move(told.error()));
-  const RestoreResult result{outcome_, counts_};
+  const RestoreResult result{outcome_, counts_, log_.run()};
   if (!told) return result;
   Summary summary = with_change(restore_summary(counts_, saved_, tool_->target.shown), log_);
   if (!errors_.empty()) summary.sentence += fmt::format(", {} rolled back", counts_.rolled_back);

@@ -17,16 +17,21 @@ namespace spindle::commands {
 struct RestoreResult {
   Outcome outcome = {};
   RestoreCounts counts = {};
+  std::string change = {};  ///< id of what was changed; empty: nothing was
 };
+
+/// The summary of several tools with the id of all that was changed on them.
+Summary with_change_of(Summary summary, const std::vector<Result<RestoreResult>>& done,
+                       const CommonRun& run);
 
 /// Carries out a plan: writes in its order, reads each back, compares everything at the end. On
 /// failure, an interrupt or a lost link it puts back what it wrote, and tells what the tool holds
 /// where that fails too.
 class RestoreRun {
  public:
-  /// All must outlive it.
+  /// All must outlive it. `run` as in work::LogOptions.
   RestoreRun(const RestoreOptions& options, const RestoreTask& task, OpenTool& tool,
-             Context& context);
+             const std::string& run, Context& context);
   RestoreRun(const RestoreRun&) = delete;
   RestoreRun& operator=(const RestoreRun&) = delete;
 
@@ -36,6 +41,7 @@ class RestoreRun {
   Result<void> save_present();
   void write_all();
   void write(const std::vector<catalogue::PlannedWrite>& writes);
+  Result<ToolSnapshot> read_again(std::string_view what);
   void plan_rest();
   work::Step write_one(const catalogue::PlannedWrite& write);
   [[nodiscard]] bool is_missing(const std::string& name) const;

@@ -8,10 +8,12 @@
 #include "run_verb.hpp"
 #include "set_plan.hpp"
 #include "set_records.hpp"
+#include "set_request.hpp"
 #include "set_writer.hpp"
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "storing.hpp"
+#include "undo_plan.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -20,25 +22,19 @@ using catalogue::Profile;
 
 class Set final : public Verb<SetPlan, SetResult> {
  public:
-  Set(const SetOptions& options, const std::vector<PlacedText>& texts, bool is_group)
-      : options_(&options), texts_(&texts), is_group_(is_group) {}
+  Set(const SetOptions& options, const SetRequest& request, bool is_group)
+      : options_(&options), request_(&request), is_group_(is_group) {}
 
   [[nodiscard]] Fit fit() const override { return Fit::all; }
   [[nodiscard]] bool changes_tools() const override { return true; }
   /// Where no names are used nothing has to be known of the registers.
-  [[nodiscard]] Need need() const override {
-    const auto raw = std::count_if(texts_->begin(), texts_->end(),
-                                   [](const PlacedText& text) { return is_raw(text.text); });
-    if (options_->raw != RawWrites::ask || raw == 0) return Need::named_registers;
-    const bool is_all = raw == std::ssize(*texts_);
-    return is_all ? Need::raw_writes : Need::mixed_writes;
-  }
+  [[nodiscard]] Need need() const override { return request_->need(); }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
 
   Result<Plan> plan(const Profile& profile, const Target& target) const override {
     const auto torque =
         profile.torque_unit_from.empty() ? TorqueUnit::known : TorqueUnit::told_by_tool;
-    TRY_LET(auto assignments, parse(profile, target, torque));
+    TRY_LET(auto assignments, request_->parse(profile, target, torque));
     return check_storing(options_->storing, profile).map([&] {
       return SetPlan{.assignments = std::move(assignments)};
     });
@@ -46,7 +42,7 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   Result<Plan> examine(OpenTool& tool, Plan plan, Context& context) const override {
     if (!tool.profile->torque_unit_from.empty()) {
-      TRY_LET(auto told, parse(*tool.profile, tool.target, TorqueUnit::known));
+      TRY_LET(auto told, request_->parse(*tool.profile, tool.target, TorqueUnit::known));
       plan.assignments = std::move(told);
     }
     TRY_LET(auto steps, options_->addressing == Addressing::broadcast
@@ -55,7 +51,8 @@ class Set final : public Verb<SetPlan, SetResult> {
     plan.steps = std::move(steps);
     plan.serial = serial_of(tool.device);
     if (options_->undoing) {
-      TRY(check_undo(plan, *options_->undoing));
+      TRY(check_undo(plan, *options_->undoing, tool));
+      tell_doubts(plan, *options_->undoing, tool.target, context);
     }
     tell_other_steps(plan.steps, tool.device.profile(), tool.target, context);
     tell_roundings(plan.steps, tool.target, context);
@@ -68,7 +65,8 @@ class Set final : public Verb<SetPlan, SetResult> {
     std::vector<std::string_view> what;
     if (options_->addressing == Addressing::broadcast) what.emplace_back("set");
     if (stores()) what.emplace_back(store_action);
-    const std::string raw = options_->raw == RawWrites::ask ? raw_in_words(*texts_) : std::string();
+    const std::string raw =
+        options_->raw == RawWrites::ask ? raw_in_words(request_->texts()) : std::string();
     if (!raw.empty()) what.emplace_back(raw);
     if (what.empty()) return {};
     return ask_consent(fmt::format("{} on {}", fmt::join(what, ", "), planned.front().target.shown),
@@ -104,7 +102,7 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   Result<Done> perform(OpenTool& tool, const Plan& plan, Context& context) const override {
     TRY(ask_of_guarded(tool, plan, context));
-    SetWriter writer(options_->undoing ? "undo" : "set", tool, options_->storing, context);
+    SetWriter writer(request_->log_for(tool, context), tool, options_->storing, context);
     if (!is_group_) tell_risks(plan.steps, tool.target, context);
     return options_->addressing == Addressing::broadcast ? writer.send(plan.steps)
                                                          : writer.write(plan.steps);
@@ -114,7 +112,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   Result<Done> give_up(const Target& target, const Plan* plan, const Error& error,
                        Context& context) const override {
     SetResult result;
-    result.counts.left = plan != nullptr ? plan->steps.size() : texts_->size();
+    result.counts.left = plan != nullptr ? plan->steps.size() : request_->texts_for(target).size();
     result.outcome.fail(error);
     Listing listing(context, set_columns());
     listing.add(error);
@@ -126,7 +124,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     SetCounts counts;
     std::size_t failed = all.tools - all.planned.size();
     const bool planned = is_dry_run() && !all.is_rejected;
-    if (!planned) counts.left = failed * texts_->size();
+    if (!planned) counts.left = request_->left_of_others(all);
     for (std::size_t index = 0; index < all.done.size(); ++index) {
       const Result<SetResult>& done = all.done[index];
       done ? counts.add(done->counts) : counts.add({.left = all.planned[index].plan.steps.size()});
@@ -136,7 +134,7 @@ class Set final : public Verb<SetPlan, SetResult> {
     summary.sentence +=
         fmt::format(" on {}{}", counted(all.tools, "tool"), failed_in_words(failed, all.tools));
     if (planned) summary.sentence += nothing_written;
-    return summary;
+    return request_->with_change_of(std::move(summary), all.done);
   }
 
  private:
@@ -144,11 +142,6 @@ class Set final : public Verb<SetPlan, SetResult> {
 
   [[nodiscard]] bool is_dry_run() const { return options_->execution == Execution::dry_run; }
   [[nodiscard]] bool stores() const { return options_->storing == Storing::yes; }
-
-  [[nodiscard]] Result<std::vector<Assignment>> parse(const Profile& profile, const Target& target,
-                                                      TorqueUnit torque) const {
-    return parse_assignments(*texts_, profile, target, options_->raw, torque);
-  }
 
   /// What is guarded is known only once the tool has said what it holds. Several tools were asked
   /// about together.
@@ -178,7 +171,7 @@ class Set final : public Verb<SetPlan, SetResult> {
   }
 
   const SetOptions* options_;
-  const std::vector<PlacedText>* texts_;
+  const SetRequest* request_;
   bool is_group_;
 };
 
@@ -192,7 +185,8 @@ Result<Outcome> set(const SetOptions& options, Context& context) {
   return resolve_one_or_group(options.targets, options.addressing, context)
       .and_then([&](Targets targets) {
         targets.is_group = targets.is_group || options.undoing;  // it is shown, and asked about
-        const Set verb(options, texts, targets.is_group);
+        const SetRequest request(options, texts, targets.tools, context);
+        const Set verb(options, request, targets.is_group);
         return run_verb(verb, reopening(std::move(targets)), options.jobs, context);
       });
 }

@@ -66,22 +66,6 @@ Result<void> check_listed(const Parameter& parameter, const Profile& profile) {
       });
 }
 
-/// What is guarded is written alone: it may change what the others mean.
-Result<void> check_guarded(const std::vector<Assignment>& assignments) {
-  if (assignments.size() < 2) return {};
-  for (const Assignment& assignment : assignments) {
-    const Parameter& parameter = assignment.parameter;
-    if (parameter.guarding == catalogue::Guarding::none) continue;
-    return tl::unexpected(
-        Error{.code = Errc::usage,
-              .message = "it may change what other values mean, so it is written alone",
-              .hint = "give it in a command of its own, and look at the others behind it",
-              .name = parameter.name,
-              .register_address = parameter.address.value});
-  }
-  return {};
-}
-
 /// Whether the user may write it. What may move or lock a tool is no setting in any case.
 Result<void> check_access(const Parameter& parameter, const Profile& profile, RawWrites raw) {
   if (auto allowed = check_listed(parameter, profile); !allowed) return allowed;
@@ -312,7 +296,8 @@ Result<void> check_once(const std::vector<SetStep>& steps) {
   return {};
 }
 
-/// As the profile says what has to be written before what.
+/// As the profile says what has to be written before what; what is guarded behind all others, which
+/// may mean something else then.
 std::vector<SetStep> in_order(std::vector<SetStep> steps) {
   std::vector<Parameter> parameters;
   for (const SetStep& step : steps) parameters.push_back(step.assignment.parameter);
@@ -320,6 +305,9 @@ std::vector<SetStep> in_order(std::vector<SetStep> steps) {
   for (const std::size_t index : catalogue::write_order(parameters)) {
     ordered.push_back(std::move(steps[index]));
   }
+  std::stable_partition(ordered.begin(), ordered.end(), [](const SetStep& step) {
+    return step.assignment.parameter.guarding == catalogue::Guarding::none;
+  });
   return ordered;
 }
 
@@ -391,7 +379,6 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<PlacedText>&
     if (!added) faults.push_back(at_place(std::move(added.error()), place));
   }
   if (!faults.empty()) return tl::unexpected(all_of(std::move(faults)));
-  TRY(check_guarded(assignments));
   return assignments;
 }
 
@@ -421,27 +408,17 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
   return in_order(std::move(steps));
 }
 
-Result<void> check_undo(const SetPlan& plan, const Undoing& undoing) {
-  const bool is_other = !plan.serial.empty() && !undoing.serial.empty();
-  if (is_other && plan.serial != undoing.serial) {
+Result<void> check_guarded(const std::vector<Assignment>& assignments) {
+  if (assignments.size() < 2) return {};
+  for (const Assignment& assignment : assignments) {
+    const Parameter& parameter = assignment.parameter;
+    if (parameter.guarding == catalogue::Guarding::none) continue;
     return tl::unexpected(
-        Error{.code = Errc::mismatch,
-              .message = fmt::format("the change was made on serial {}, and this tool is serial {}",
-                                     undoing.serial, plan.serial)});
-  }
-  for (const SetStep& step : plan.steps) {
-    const std::string& name = step.assignment.parameter.name;
-    const auto left = undoing.left.find(name);
-    if (!step.changes() || !step.before || left == undoing.left.end()) continue;
-    const Value& before = *step.before;
-    const std::string present = before.is_number() ? before.number.to_string() : before.exact();
-    if (present == left->second) continue;
-    return tl::unexpected(
-        Error{.code = Errc::mismatch,
-              .message = fmt::format("it was changed again: the tool holds {}, the change left {}",
-                                     present, left->second),
-              .hint = fmt::format("'spindle log {}' shows the changes of this value", name),
-              .name = name});
+        Error{.code = Errc::usage,
+              .message = "it may change what other values mean, so it is written alone",
+              .hint = "give it in a command of its own, and look at the others behind it",
+              .name = parameter.name,
+              .register_address = parameter.address.value});
   }
   return {};
 }

@@ -51,9 +51,8 @@ std::string raw_in_words(const std::vector<PlacedText>& assignments);
 enum class TorqueUnit : std::uint8_t { known, told_by_tool };
 
 /// What can be known from the profile and the target's torque unit: names, access, types, units,
-/// ranges, that none starts a motor, and that what is guarded stands alone. A torque that was typed
-/// with a unit has no value yet where the tool will tell its own. Of those that stand in a file
-/// every fault is told, as one error.
+/// ranges, and that none starts a motor. A torque that was typed with a unit has no value yet where
+/// the tool will tell its own. Of those that stand in a file every fault is told, as one error.
 Result<std::vector<Assignment>> parse_assignments(const std::vector<PlacedText>& texts,
                                                   const catalogue::Profile& profile,
                                                   const Target& target,
@@ -61,7 +60,7 @@ Result<std::vector<Assignment>> parse_assignments(const std::vector<PlacedText>&
                                                   TorqueUnit torque = TorqueUnit::known);
 
 /// What only the tool can say: its present values, its own limits, and which bits have names. Reads
-/// only.
+/// only. What is guarded stands behind all others.
 Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignments,
                                                 device::Device& device);
 
@@ -69,9 +68,8 @@ Result<std::vector<SetStep>> check_against_tool(std::vector<Assignment> assignme
 /// one that was planned for, or does not hold what it held then.
 Result<SetPlan> confirm_plan(const SetPlan& plan, device::Device& device);
 
-/// Whether a change can be taken back: the tool is the one that it was made on, and holds what it
-/// left. Error `mismatch`.
-Result<void> check_undo(const SetPlan& plan, const Undoing& undoing);
+/// What is guarded is written alone: it may change what the others mean. Error `usage`.
+Result<void> check_guarded(const std::vector<Assignment>& assignments);
 
 /// For everybody on a line. Everybody may have another setting, so only names of bits that always
 /// count can be sent.

@@ -1,7 +1,9 @@
 #include "set_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "records.hpp"
@@ -24,18 +26,15 @@ Result<SetResult> SetWriter::send(const std::vector<SetStep>& steps) {
               .target = tool_->target.shown});
 }
 
-/// What is guarded may change the others, so they are read before and behind it.
-Result<void> SetWriter::look_before(const std::vector<SetStep>& steps) {
-  for (const SetStep& step : steps) {
-    const bool is_guarded = step.assignment.parameter.guarding == catalogue::Guarding::alone;
-    if (is_guarded && step.changes()) guarded_ = &step;
+void SetWriter::look_behind(std::span<const SetStep> guarded) {
+  if (context_->interrupt.signalled()) return;
+  std::vector<catalogue::Parameter> written;
+  std::vector<std::string> names;
+  for (const SetStep& step : guarded) {
+    written.push_back(step.assignment.parameter);
+    if (step.changes()) names.push_back(step.assignment.parameter.name);
   }
-  return guarded_ == nullptr ? Result<void>() : bystanders_.read_before();
-}
-
-void SetWriter::look_behind() {
-  if (guarded_ == nullptr || context_->interrupt.signalled()) return;
-  auto changes = bystanders_.read_behind(guarded_->assignment.parameter);
+  auto changes = bystanders_.read_behind(written);
   if (!changes) {
     Error error = std::move(changes.error());
     error.hint = "what else the tool changed is not known: compare it with a backup";
@@ -53,7 +52,7 @@ void SetWriter::look_behind() {
   if (!changes->values.empty()) {
     context_->renderer.note(
         fmt::format("{}: the tool changed {} along with {}", tool_->target.shown,
-                    counted(changes->values.size(), "value"), guarded_->assignment.parameter.name));
+                    counted(changes->values.size(), "value"), fmt::join(names, ", ")));
   }
   if (changes->torques > 0) {
     context_->renderer.note(fmt::format("{}: {} kept their numbers, and are now in {}, not in {}",
@@ -62,14 +61,33 @@ void SetWriter::look_behind() {
   }
 }
 
-Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
-  TRY(look_before(steps));
-  SetCounts& counts = result_.counts;
+void SetWriter::write_all(std::span<const SetStep> steps) {
   work::write_in_passes(
       steps, [&](const SetStep& step) { return write_one(step); },
       [&](const SetStep& step) { give_up(step); });
+}
+
+/// What is guarded may change the others, so they are read before and behind it.
+Result<SetResult> SetWriter::write(const std::vector<SetStep>& steps) {
+  const auto first_guarded = std::find_if(steps.begin(), steps.end(), [](const SetStep& step) {
+    return step.assignment.parameter.guarding == catalogue::Guarding::alone;
+  });
+  const std::span<const SetStep> others(steps.begin(), first_guarded);
+  const std::span<const SetStep> guarded(first_guarded, steps.end());
+  const bool looks = std::any_of(guarded.begin(), guarded.end(),
+                                 [](const SetStep& step) { return step.changes(); });
+  SetCounts& counts = result_.counts;
+  write_all(others);
+  if (looks && result_.outcome.failed() == 0) {
+    auto read = bystanders_.read_before();
+    if (!read && others.empty()) return tl::unexpected(std::move(read.error()));
+    if (!read) fail(read.error());
+  }
+  if (result_.outcome.failed() == 0) {
+    write_all(guarded);
+    if (looks) look_behind(guarded);
+  }
   counts.left = steps.size() - counts.changed - counts.unchanged - counts.failed;
-  look_behind();
   tell_effects(steps, tool_->target, *context_);
   return end(set_summary(counts, tool_->target.shown));
 }
@@ -92,8 +110,9 @@ void SetWriter::fail(const Error& error) {
 void SetWriter::send_one(const SetStep& step) {
   const auto& [parameter, value, text, converted, relative] = step.assignment;
   work::LoggedChange change =
-      work::logged(parameter, value, value, ending_words.text(Ending::sent));
+      work::logged(parameter, value, value, ending_words.text(Ending::sent), tool_->target);
   change.old_value.reset();
+  change.old_label.clear();
   const std::string id = log_.begin(change);
   const auto sent = tool_->device.broadcast(parameter, value);
   if (!sent) {
@@ -143,6 +162,7 @@ Result<SetResult> SetWriter::end(Summary summary) {
   const bool stores = storing_ == Storing::yes && result_.outcome.failed() == 0;
   if (drawn && stores) drawn = store(*tool_, log_, result_.outcome, *context_);
   if (drawn) {
+    result_.change = log_.run();
     drawn = tell(with_change(std::move(summary), log_), result_.outcome, *context_);
   }
   return drawn.map([&] { return result_; });

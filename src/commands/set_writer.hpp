@@ -1,7 +1,9 @@
 #pragma once
 
 #include <map>
-#include <string_view>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "bystanders.hpp"
@@ -15,25 +17,27 @@ namespace spindle::commands {
 struct SetResult {
   Outcome outcome = {};
   SetCounts counts = {};
+  std::string change = {};  ///< id of what was changed; empty: nothing was
 };
 
 /// Carries out the steps of one tool, records every change, and stops at the first that fails or
 /// when a signal asks for it. What the tool refuses is tried once more behind the others.
 class SetWriter {
  public:
-  /// All must outlive it. `command` is who makes the changes.
-  SetWriter(std::string_view command, OpenTool& tool, Storing storing, Context& context)
+  /// The tool and the context must outlive it.
+  SetWriter(work::ChangeLog log, OpenTool& tool, Storing storing, Context& context)
       : tool_(&tool),
         storing_(storing),
         context_(&context),
         listing_(context, set_columns()),
-        log_(change_log(command, tool, context)),
-        changer_(tool.device, log_),
+        log_(std::move(log)),
+        changer_(tool.device, log_, tool.target),
         bystanders_(tool, context) {}
   SetWriter(const SetWriter&) = delete;
   SetWriter& operator=(const SetWriter&) = delete;
 
-  /// Writes what differs, reads each back, and ends with a summary.
+  /// Writes what differs, reads each back, and ends with a summary. What is guarded stands behind
+  /// all others, and is written only where those succeeded.
   Result<SetResult> write(const std::vector<SetStep>& steps);
 
   /// To all units on the line. None says what it holds now.
@@ -47,8 +51,8 @@ class SetWriter {
   work::Step write_one(const SetStep& step);
   /// Of a write that did not succeed.
   void give_up(const SetStep& step);
-  Result<void> look_before(const std::vector<SetStep>& steps);
-  void look_behind();
+  void write_all(std::span<const SetStep> steps);
+  void look_behind(std::span<const SetStep> guarded);
   Result<SetResult> end(Summary summary);
 
   OpenTool* tool_;
@@ -60,7 +64,6 @@ class SetWriter {
   std::map<const SetStep*, device::Written> refused_ = {};
   SetResult result_ = {};
   Bystanders bystanders_;
-  const SetStep* guarded_ = nullptr;  ///< the one step that is written alone; null: none is
 };
 
 }  // namespace spindle::commands

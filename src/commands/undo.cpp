@@ -1,8 +1,9 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "change_history.hpp"
@@ -11,18 +12,10 @@
 namespace spindle::commands {
 namespace {
 
-/// What the changes of one command with an id that is meant by this text have in common: the part
-/// in front of the last '-'.
-std::string run_of(const std::string& id) { return id.substr(0, id.rfind('-')); }
+using Changes = std::vector<const PastChange*>;
 
 bool is_meant(const PastChange& change, const std::string& text) {
-  return change.id == text || run_of(change.id) == text;
-}
-
-/// Whether it left a value that is no longer the one before.
-bool has_changed(const PastChange& change) {
-  constexpr std::array<std::string_view, 3> results = {"written", "coerced", "changed-along"};
-  return std::find(results.begin(), results.end(), change.result) != results.end();
+  return change.id == text || change.id.starts_with(text + "-");
 }
 
 Error nothing_to_undo(const std::string& id) {
@@ -33,60 +26,129 @@ Error nothing_to_undo(const std::string& id) {
           .remedy = {.right = "spindle log"}};
 }
 
-/// The changes that are meant, in the order in which they were made.
-Result<std::vector<const PastChange*>> choose(const std::string& id, const ChangeHistory& history) {
-  std::string wanted = id;
-  if (wanted.empty()) {
-    const auto last = std::find_if(history.changes.rbegin(), history.changes.rend(), has_changed);
-    if (last == history.changes.rend()) return tl::unexpected(nothing_to_undo(id));
-    wanted = run_of(last->id);
-  }
-  std::vector<const PastChange*> chosen;
-  for (const PastChange& change : history.changes) {
-    if (is_meant(change, wanted)) chosen.push_back(&change);
-  }
-  if (chosen.empty()) return tl::unexpected(nothing_to_undo(id));
-  return chosen;
+Error nothing_left(const std::string& id, const Changes& changes) {
+  std::set<std::string> results;
+  for (const PastChange* change : changes) results.insert(change->result);
+  return {.code = Errc::usage,
+          .message = fmt::format("change '{}' has nothing that can be taken back: {}", id,
+                                 fmt::join(results, ", ")),
+          .hint = "only values that were written can"};
 }
 
-Error not_recorded(const PastChange& change) {
-  return {.code = Errc::usage,
-          .message = change.register_address == report::Cell()
-                         ? "an action cannot be taken back"
-                         : "what it was before is not recorded",
-          .target = change.target,
-          .name = change.name};
+/// The part of the changes that still counts: what was put back at once is none.
+Undoing effects_of(const Changes& changes) {
+  Undoing undoing;
+  for (const PastChange* change : changes) {
+    UndoneTool& tool = undoing[change->target];
+    tool.serial = change->serial;
+    const auto known =
+        std::find_if(tool.values.begin(), tool.values.end(),
+                     [&](const UndoneValue& value) { return value.name == change->name; });
+    if (change->result == "rolled-back" && known != tool.values.end()) tool.values.erase(known);
+    if (!may_have_changed(*change)) continue;
+    const std::string before = report::to_text(change->before);
+    UndoneValue value{.name = change->name, .before = before};
+    if (known != tool.values.end()) {
+      value = *known;
+      tool.values.erase(known);
+    }
+    value.id = change->id;
+    value.unit = change->unit;
+    if (has_changed(*change)) value.left.clear();
+    value.doubt = has_changed(*change) ? std::string() : change->result;
+    value.left.push_back(report::to_text(change->after));
+    if (!value.doubt.empty()) value.left.push_back(before);
+    tool.values.push_back(std::move(value));
+  }
+  std::erase_if(undoing, [](const auto& one) { return one.second.values.empty(); });
+  for (auto& [target, tool] : undoing) std::reverse(tool.values.begin(), tool.values.end());
+  return undoing;
+}
+
+/// Of the last command that left something, other than undo: what was not taken back yet.
+Changes last_changes(const ChangeHistory& history) {
+  const std::set<std::string> taken = taken_back(history);
+  const auto counts = [&](const PastChange& change) {
+    return !change.id.empty() && change.command != "undo" && !taken.contains(value_of(change));
+  };
+  std::set<std::string> seen;
+  for (auto last = history.changes.rbegin(); last != history.changes.rend(); ++last) {
+    if (!counts(*last) || !may_have_changed(*last)) continue;
+    const std::string run = run_of(last->id);
+    if (!seen.insert(run).second) continue;
+    Changes changes;
+    for (const PastChange& change : history.changes) {
+      if (counts(change) && run_of(change.id) == run) changes.push_back(&change);
+    }
+    if (!effects_of(changes).empty()) return changes;
+  }
+  return {};
+}
+
+Changes meant_by(const std::string& id, const ChangeHistory& history) {
+  Changes changes;
+  for (const PastChange& change : history.changes) {
+    if (is_meant(change, id)) changes.push_back(&change);
+  }
+  return changes;
+}
+
+/// Two commands may have the same id, by chance.
+Result<void> check_one_command(const Changes& changes) {
+  std::map<std::string, const PastChange*> known;
+  const auto in_words = [](const PastChange& change) {
+    return fmt::format("{} of {} on {} at {}", change.command, change.name, change.target,
+                       change.time);
+  };
+  for (const PastChange* change : changes) {
+    const auto [other, is_new] = known.emplace(change->id, change);
+    const PastChange& first = *changes.front();
+    const bool is_same = is_new && change->command == first.command &&
+                         (change->target != first.target || change->serial == first.serial);
+    if (is_same) continue;
+    const PastChange& one = is_new ? first : *other->second;
+    return tl::unexpected(Error{
+        .code = Errc::usage,
+        .message =
+            fmt::format("two commands have the id '{}': {}, and {}",
+                        is_new ? run_of(change->id) : change->id, in_words(one), in_words(*change)),
+        .hint = "set the values by hand; 'spindle log' shows what they were",
+        .remedy = {.right = "spindle log"}});
+  }
+  return {};
+}
+
+/// A secret is not recorded.
+Result<void> check_recorded(const Changes& changes) {
+  for (const PastChange* change : changes) {
+    if (!has_changed(*change) || change->before != report::Cell()) continue;
+    return tl::unexpected(Error{.code = Errc::usage,
+                                .message = "what it was before is not recorded",
+                                .target = change->target,
+                                .name = change->name});
+  }
+  return {};
 }
 
 }  // namespace
 
 Result<Outcome> undo(const UndoOptions& options, Context& context) {
   TRY_LET(const auto history, read_changes(context));
-  TRY_LET(const auto chosen, choose(options.id, history));
-  const std::string& target = chosen.front()->target;
-  SetOptions wanted{.targets = {target},
-                    .assignments = {},
-                    .execution = options.execution,
-                    .undoing = Undoing{.serial = chosen.front()->serial}};
-  std::map<std::string, std::string> before;
-  for (const PastChange* change : chosen) {
-    if (change->target != target || change->serial != wanted.undoing->serial) {
-      return tl::unexpected(Error{.code = Errc::usage,
-                                  .message = "changes of several tools have this id",
-                                  .hint = fmt::format("name one, such as {}", change->id)});
+  const Changes chosen = options.id.empty() ? last_changes(history) : meant_by(options.id, history);
+  if (chosen.empty()) return tl::unexpected(nothing_to_undo(options.id));
+  TRY(check_one_command(chosen));
+  TRY(check_recorded(chosen));
+  Undoing undoing = effects_of(chosen);
+  if (undoing.empty()) return tl::unexpected(nothing_left(options.id, chosen));
+  SetOptions wanted{.targets = {}, .assignments = {}, .execution = options.execution};
+  for (const auto& [target, tool] : undoing) {
+    wanted.targets.push_back(target);
+    for (const UndoneValue& value : tool.values) {
+      wanted.assignments.push_back(fmt::format("{}={}", value.name, value.before));
+      if (value.name.starts_with('@')) wanted.raw = RawWrites::ask;
     }
-    if (!has_changed(*change)) continue;
-    if (change->before == report::Cell()) return tl::unexpected(not_recorded(*change));
-    const bool is_first = before.emplace(change->name, report::to_text(change->before)).second;
-    wanted.undoing->left.insert_or_assign(change->name, report::to_text(change->after));
-    if (is_first) wanted.assignments.push_back(change->name);
-    if (change->name.starts_with('@')) wanted.raw = RawWrites::ask;
   }
-  if (wanted.assignments.empty()) return tl::unexpected(nothing_to_undo(options.id));
-  std::reverse(wanted.assignments.begin(), wanted.assignments.end());
-  for (std::string& assignment : wanted.assignments) {
-    assignment = fmt::format("{}={}", assignment, before.at(assignment));
-  }
+  wanted.undoing = std::move(undoing);
   return set(wanted, context);
 }
 

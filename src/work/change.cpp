@@ -36,9 +36,10 @@ std::string_view result_of_failure(const Error& error) {
 
 /// Where it is not known what the tool holds, the record names both candidates.
 Written Changer::make(const Parameter& parameter, const Value& before, const Value& value) {
-  const std::string id = log_->begin(logged(parameter, before, value, {}));
+  const std::string id = log_->begin(logged(parameter, before, value, {}, *target_));
   Written written = device_->write(parameter, before, value);
-  log_->end(id, logged(parameter, before, written.now.value_or(value), to_text(written.result)));
+  log_->end(id, logged(parameter, before, written.now.value_or(value), to_text(written.result),
+                       *target_));
   if (written.may_have_changed()) sent_.push_back({parameter, before, value, written.doubt});
   return written;
 }
@@ -47,18 +48,19 @@ std::vector<PutBackReport> Changer::put_back(device::Rollback& rollback) {
   std::string id;
   device::RollbackObserver observer;
   observer.begin = [&](const JournalEntry& write) {
-    id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
+    id = log_->begin(logged(write.parameter, write.tried, write.before, {}, *target_));
   };
   observer.end = [&](const PutBackReport& report) {
     const auto& write = report.write;
     if (report.result == RollbackResult::kept) return;
-    if (id.empty()) id = log_->begin(logged(write.parameter, write.tried, write.before, {}));
+    if (id.empty())
+      id = log_->begin(logged(write.parameter, write.tried, write.before, {}, *target_));
     const bool done = report.result == RollbackResult::done;
     log_->end(std::exchange(id, {}),
               done ? logged(write.parameter, report.found.value_or(write.tried), write.before,
-                            "rolled-back")
+                            "rolled-back", *target_)
                    : logged(write.parameter, write.before, report.now.value_or(write.tried),
-                            "not-rolled-back"));
+                            "not-rolled-back", *target_));
   };
   auto reports = rollback.run(sent_, observer);
   sent_.clear();

@@ -2,6 +2,7 @@
 
 import math
 import random
+import re
 import socket
 import struct
 import unittest
@@ -427,10 +428,67 @@ class Backups(Gen2Test):
     def test_never_another_unit(self):
         self.backup()
         self.device.put(UNIT, 0)
-        for arguments in ((), ("--force",)):
+        for arguments in (("preset.*",), ("preset.*", "--force")):
             outcome = self.restore(*arguments, status=8)
             self.assertIn("kgf.cm", outcome.err + outcome.out)
+            self.assertNotIn("--force", outcome.err)
+            self.assertIn("control.torque-unit", outcome.err)
         self.assertEqual(self.written(), [])
+
+    def test_the_unit_is_restored_before_the_torques(self):
+        for rescales in (False, True):
+            with self.subTest(rescales=rescales):
+                self.start()
+                self.backup("--force")
+                self.device.rescales = rescales
+                self.device.put(UNIT, 3)
+                self.device.put(TARGET_1, *f32(10.0))
+                plan = {one["name"]: one for one in self.ask("restore", self.file, "--dry-run").of_type("plan")}
+                self.assertEqual([plan["preset.1.target-torque"][key] for key in ("old", "old_unit", "new", "unit")],
+                                 [10, "cN.m", 2.5, "N.m"])
+                outcome = self.restore()
+                self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1)), (2, 2.5))
+                self.assertEqual(self.written()[0][0], UNIT)
+                told = {one["name"]: one for one in outcome.of_type("write")}
+                self.assertEqual(told["preset.1.target-torque"]["unit"], "N.m")
+                self.assertEqual(self.ask("diff", self.file).of_type("diff"), [])
+
+    def test_a_backup_in_two_units_is_not_restored(self):
+        text = self.backup()
+        [line] = [line for line in text.splitlines() if "name: control.torque-unit," in line]
+        edited = text.replace(line, re.sub(r"raw: 2\b", "raw: 3", line.replace("N.m", "cN.m")))
+        self.assertNotEqual(edited, text)
+        self.file.write_text(edited, encoding="utf-8")
+        self.device.put(TARGET_1, *f32(1.0))
+        for arguments in ((), ("--force",), ("control.torque-unit",)):
+            self.assertIn("control.torque-unit", self.restore(*arguments, status=8).err)
+        self.assertEqual(self.written(), [])
+
+    def test_a_restore_with_the_unit_is_taken_back(self):
+        for rescales in (False, True):
+            with self.subTest(rescales=rescales):
+                self.start()
+                self.backup("--force")
+                self.device.rescales = rescales
+                self.device.put(UNIT, 3)
+                self.device.put(TARGET_1, *f32(10.0))
+                self.device.put(3663, 77)
+                folder = support.scratch_folder()
+                outcome = support.run(support.SPINDLE, "--json", "restore", self.url, self.file, "--yes", folder=folder)
+                change = outcome.of_type("summary")[0]["change_id"]
+                self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1)), (2, 2.5))
+                first = len(self.written())
+                outcome = support.run(support.SPINDLE, "--json", "undo", change, "--yes", folder=folder)
+                self.assert_ends(outcome, 0)
+                self.assertEqual((self.device.number(UNIT), self.device.value(TARGET_1), self.device.number(3663)),
+                                 (3, 10.0, 77))
+                self.assertEqual(self.written()[first:][-1], (UNIT, [3]))
+
+    def test_only_the_unit(self):
+        self.backup()
+        self.device.put(UNIT, 3)
+        self.restore("control.torque-unit")
+        self.assertEqual(self.written(), [(UNIT, [2])])
 
     def test_never_another_model(self):
         self.backup()

@@ -19,12 +19,14 @@ TEST_CASE("a change is one JSON line with exact numbers") {
                       .old_value = Decimal(271, -2),
                       .new_value = Decimal(310, -2),
                       .result = "written",
-                      .id = "1-a-1"};
+                      .id = "1-a-1",
+                      .unit = "N.m",
+                      .undoes = "1-a-0"};
   CHECK(render_change(change) ==
         "{\"schema\":\"spindle/1\",\"type\":\"changed\",\"time\":\"2026-11-22T10:15:30.123Z\","
         "\"user\":\"anna\",\"command\":\"set\",\"target\":\"station3\",\"serial\":\"1021100042\","
         "\"name\":\"preset.1.target-torque\",\"register\":2,\"old\":2.71,\"new\":3.10,"
-        "\"result\":\"written\",\"id\":\"1-a-1\"}\n");
+        "\"result\":\"written\",\"id\":\"1-a-1\",\"unit\":\"N.m\",\"undoes\":\"1-a-0\"}\n");
 }
 
 TEST_CASE("what is not known is null, and no text breaks the line") {
@@ -39,7 +41,7 @@ TEST_CASE("what is not known is null, and no text breaks the line") {
         "{\"schema\":\"spindle/1\",\"type\":\"changed\",\"time\":\"t\",\"user\":\"a\\\"b\\\\c\\n"
         "\\u0001\xef\xbf\xbd\",\"command\":\"do\",\"target\":\"caf\xc3\xa9\",\"serial\":null,"
         "\"name\":\"start\",\"register\":null,\"old\":null,\"new\":null,\"result\":\"sent\",\"id\":"
-        "null}\n");
+        "null,\"unit\":null}\n");
 }
 
 TEST_CASE("another reader of JSON finds the texts as they were") {

@@ -153,7 +153,8 @@ struct Bench : test::Rig<Bank> {
   Device device = open();
   work::ChangeLog log = work::ChangeLog({.command = "set", .target = "bank", .folder = "/state"},
                                         disk, clock, [](const std::string&) {});
-  work::Changer changer = work::Changer(device, log);
+  work::Target target = {};
+  work::Changer changer = work::Changer(device, log, target);
 };
 
 using Lines = std::vector<std::string>;

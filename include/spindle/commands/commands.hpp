@@ -50,11 +50,25 @@ enum class Storing : std::uint8_t { no, yes };
 /// Whether registers may be written that the profile does not say can be.
 enum class RawWrites : std::uint8_t { refuse, ask };
 
-/// What is taken back: which tool it was, and what it has to hold still.
-struct Undoing {
-  std::string serial = {};                       ///< empty: not known
-  std::map<std::string, std::string> left = {};  ///< by name: what the change left, as recorded
+/// One value that is taken back, as it was recorded.
+struct UndoneValue {
+  std::string name = {};
+  std::string before = {};             ///< what is written
+  std::vector<std::string> left = {};  ///< what the tool may hold now
+  std::string unit = {};               ///< empty: none, or not recorded
+  std::string id = {};                 ///< of the change
+  std::string doubt =
+      {};  ///< the result of a change of which it is not known what it left; or empty
 };
+
+/// What is taken back on one tool, in the order in which it is written.
+struct UndoneTool {
+  std::string serial = {};  ///< empty: not known
+  std::vector<UndoneValue> values = {};
+};
+
+/// What is taken back, by target.
+using Undoing = std::map<std::string, UndoneTool>;
 
 struct SetOptions {
   std::vector<std::string> targets;      ///< or groups

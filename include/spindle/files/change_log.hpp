@@ -26,6 +26,10 @@ struct Change {
   std::optional<LoggedValue> new_value = std::nullopt;
   std::string result;
   std::string id = {};  ///< the same in the records of what is begun and how it ended; empty: none
+  std::string unit = {};       ///< of both values; empty: none, or not known
+  std::string old_label = {};  ///< of an enumeration; empty: none
+  std::string new_label = {};
+  std::string undoes = {};  ///< id of the change that is taken back; empty: none is
 };
 
 /// One line of the change log, a JSON object with its line end. What is not known is null.

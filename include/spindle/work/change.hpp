@@ -63,8 +63,9 @@ void write_in_passes(const Items& items, Write write, Refuse refuse) {
 /// value is written, what became of it is read back and recorded, and all of it can be put back.
 class Changer {
  public:
-  /// Both must outlive it.
-  Changer(device::Device& device, ChangeLog& log) : device_(&device), log_(&log) {}
+  /// All must outlive it. `target` says the unit of torques, whenever one is written.
+  Changer(device::Device& device, ChangeLog& log, const Target& target)
+      : device_(&device), log_(&log), target_(&target) {}
 
   /// Writes one value; see Device::write. `before` is the value read before.
   device::Written make(const catalogue::Parameter& parameter, const catalogue::Value& before,
@@ -81,6 +82,7 @@ class Changer {
  private:
   device::Device* device_;
   ChangeLog* log_;
+  const Target* target_;
   std::vector<device::JournalEntry> sent_ = {};
 };
 

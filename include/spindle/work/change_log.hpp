@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,11 +24,15 @@ struct LoggedChange {
   std::optional<files::LoggedValue> old_value = std::nullopt;
   std::optional<files::LoggedValue> new_value = std::nullopt;
   std::string result = {};
+  std::string unit = {};  ///< empty: none, or not known
+  std::string old_label = {};
+  std::string new_label = {};
 };
 
-/// A change of a parameter. The values of a secret are not recorded.
+/// A change of a parameter of this target, which says the unit of torques. The values of a secret
+/// are not recorded.
 LoggedChange logged(const catalogue::Parameter& parameter, const catalogue::Value& before,
-                    const catalogue::Value& after, std::string_view result);
+                    const catalogue::Value& after, std::string_view result, const Target& target);
 
 /// Whose changes are recorded, and where.
 struct LogOptions {
@@ -35,6 +40,8 @@ struct LogOptions {
   std::string target;       ///< as the user named it
   std::string serial = {};  ///< empty: not known
   std::string folder = {};  ///< of the file `changes.jsonl`; empty: nowhere is known
+  std::string run = {};     ///< what its ids begin with; empty: something of its own
+  std::map<std::string, std::string> undoes = {};  ///< by parameter: the change that is taken back
 };
 
 /// The record of changes of one command on one tool: what is about to be sent, and how it ended. A
@@ -70,8 +77,14 @@ class ChangeLog {
   bool warned_ = false;
 };
 
-/// The record of changes of a command on this tool. `environment` must outlive it.
+/// What the ids of all changes of a command begin with: eight hexadecimal digits.
+std::string new_run(std::string_view command, const std::string& target,
+                    const Environment& environment);
+
+/// The record of changes of a command on this tool. `environment` must outlive it. `run` and
+/// `undoes` as in LogOptions.
 ChangeLog change_log(std::string_view command, const OpenTool& tool, const Environment& environment,
-                     ChangeLog::Warn warn);
+                     ChangeLog::Warn warn, std::string run = {},
+                     std::map<std::string, std::string> undoes = {});
 
 }  // namespace spindle::work

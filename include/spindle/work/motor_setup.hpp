@@ -51,7 +51,7 @@ class MotorSetup {
       : monitor_(monitor),
         tool_(&tool),
         environment_(&environment),
-        changer_(tool.device, log),
+        changer_(tool.device, log, tool.target),
         uninterruptible_line_(tool, environment) {}
   MotorSetup(const MotorSetup&) = delete;
   MotorSetup& operator=(const MotorSetup&) = delete;
