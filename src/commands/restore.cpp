@@ -13,8 +13,6 @@
 namespace spindle::commands {
 namespace {
 
-using catalogue::Profile;
-
 /// What it refers to does not change while it runs.
 class Restore final : public Verb<RestoreTask, RestoreResult> {
  public:
@@ -25,11 +23,12 @@ class Restore final : public Verb<RestoreTask, RestoreResult> {
   [[nodiscard]] bool changes_tools() const override { return true; }
   [[nodiscard]] Basis basis() const override { return Basis::tool; }
   [[nodiscard]] Basis question_basis() const override { return Basis::tool; }
-  std::string_view otherwise(const std::string& word, const Profile& profile) const override {
+  std::string_view otherwise(const std::string& word,
+                             const catalogue::Profile& profile) const override {
     return catalogue::is_meant(word, profile) ? "a parameter" : "";
   }
 
-  Result<Plan> plan(const Profile& profile, const Target& target) const override {
+  Result<Plan> plan(const catalogue::Profile& profile, const Target& target) const override {
     return plan_by_profile(backups_->at(target.shown), *options_, profile);
   }
 
@@ -187,8 +186,8 @@ Result<Targets> resolve(const RestoreOptions& options, const Context& context) {
 
 }  // namespace
 
-/// In a group all tools are read and checked before the first write, one question stands for all,
-/// and each is opened again to be written if it is still as it was shown.
+/// All tools of a group are checked and asked about at once; each is then opened again, and written
+/// if it is still as it was shown.
 Result<Outcome> restore(const RestoreOptions& options, Context& context) {
   return resolve(options, context).and_then([&](const Targets& targets) {
     return find_backups(targets.tools, options, context).and_then([&](const Backups& all) {

@@ -37,7 +37,8 @@
 //   $ spindle ARGUMENTS   followed by what it prints
 //   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
-// Lines on stderr begin with "! "; a status other than 0 follows as "[2]". In a Markdown file the
+// Lines on stderr begin with "! ", and those on stdout that look as if they were typed with "\";
+// a status other than 0 follows as "[2]". In a Markdown file the
 // fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status; a
 // directive stands in a comment, and the file that it names is the fenced block behind it.
 // The source folder is shown as $SOURCE. With SPINDLE_UPDATE=1 the file is rewritten with what was
@@ -179,7 +180,11 @@ class FakeGroup final : public link::Datagrams {
 bool is_too_wide(const std::string& line) {
   constexpr std::string_view mark = "! ";
   constexpr std::size_t widest = 100;
-  if (!line.starts_with(mark) || line.size() <= mark.size() + widest) return false;
+  const auto characters = std::count_if(line.begin(), line.end(), [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xC0U) != 0x80U;  // not one that goes on with UTF-8
+  });
+  if (!line.starts_with(mark) || static_cast<std::size_t>(characters) <= mark.size() + widest)
+    return false;
   const std::string_view text = std::string_view(line).substr(mark.size());
   // A frame of --verbose begins with its time, and progress is no line that stays.
   const bool is_frame = glob_match("[0-9]*T*Z *", text.substr(0, 30));
@@ -581,8 +586,15 @@ class Player {
                 lines, index);
   }
 
+  /// What is printed is told from what is typed.
+  [[nodiscard]] std::string shown(const std::string& line) const {
+    const bool looks_typed =
+        line.starts_with("#") || line.starts_with("%") || line.starts_with("$ ");
+    return looks_typed && !markdown_ ? "\\" + line : line;
+  }
+
   std::size_t show(const Lines& printed, const Lines& lines, std::size_t index) {
-    played_.insert(played_.end(), printed.begin(), printed.end());
+    for (const std::string& line : printed) played_.push_back(shown(line));
     // The old output ends where the next thing begins.
     std::size_t next = index + 1;
     const auto ends = [&](const std::string& line) {
