@@ -66,8 +66,8 @@ class BoundedTest(FilesTest):
             ):
                 with self.subTest(what=what, arguments=arguments):
                     ended = self.run_bounded(*arguments)
-                    self.assertIn(ended.returncode, (2, 3), ended.said[-500:])
-                    self.assertNotIn(b"internal", ended.said)
+                    self.assertIn(ended.returncode, (2, 3), ended.stderr[-500:])
+                    self.assertNotIn(b"internal", ended.stderr)
 
     def test_a_stop_that_has_a_url_reads_no_tools_file(self):
         os.mkfifo(self.tools)

@@ -119,7 +119,7 @@ class LocaleTest(unittest.TestCase):
                 finished = support.run("restore", url, file, "--yes")
                 with self.subTest(wrong):
                     self.assertEqual((finished.status, finished.stdout), (3, ""), finished)
-                    self.assertRegex(finished.stderr, r"comma.yaml:\d+:\d+: ")
+                    self.assertRegex(finished.said, r"comma.yaml:\d+:\d+: ")
 
 
 if __name__ == "__main__":

@@ -354,7 +354,7 @@ class EndingTest(RemoteStartTest):
             finished = [run.finish() for run in runs]
         for one in finished:
             self.assertEqual(one.status, 5, one)
-            self.assertRegex(one.stderr, r"THE TOOL MAY STILL RUN: the stop was tried for \d+ s \(\d+ times\)")
+            self.assertRegex(one.said, r"THE TOOL MAY STILL RUN: the stop was tried for \d+ s \(\d+ times\)")
             self.assertIn("stop it at the tool", one.said)
             self.assertGreater(one.seconds, PATIENCE - 1)
             self.assertLess(one.paced, PATIENCE + support.SOON)

@@ -207,7 +207,7 @@ class PortTest(unittest.TestCase):
                 support.wait_until(lambda: bus.is_open_in(holder.pid), "the port is open")
                 second = run("ping", f"{bus.url}?unit=1", "-c", "1")
                 self.assertEqual(second.status, 4, second)
-                self.assertRegex(second.stderr, rf"in use by spindle \(process {holder.pid}\)")
+                self.assertRegex(second.said, rf"in use by spindle \(process {holder.pid}\)")
                 holder.process.send_signal(signal.SIGINT)
                 self.assertEqual(support.wait_for_end(holder.process), 130)
 

@@ -182,7 +182,7 @@ class BadFileTest(unittest.TestCase):
                     with self.subTest(file.name, command=command[0]):
                         finished = support.run(*command, "--profile", file)
                         self.assertEqual((finished.status, finished.stdout), (3, ""), finished)
-                        self.assertRegex(finished.stderr, rf"{file.name}:\d+:\d+: ")
+                        self.assertRegex(finished.said, rf"{file.name}:\d+:\d+: ")
             self.assertEqual(server.requests, [])
 
     def test_missing_and_unreadable_files(self):
