@@ -291,8 +291,10 @@ Gen2Event::Date Gen2Unit::date_at(TimePoint now) {
 /// Of those only that the tool is set to keep.
 void Gen2Unit::emit(Status status, const Result& result, TimePoint now) {
   const auto bit = static_cast<unsigned>(status);
-  if (bank().find("control.event-select") && (word("control.event-select") >> bit & 1U) == 0)
-    return;
+  if (bank().find("control.event-select")) {
+    const unsigned kept = word("control.event-select");
+    if (((kept >> bit) & 1U) == 0) return;
+  }
   ++number_;
   ++events_told_;
   Gen2Event event{.number = number_,
