@@ -60,8 +60,8 @@ Result<std::string> meant_by(std::string_view typed, const Profile& profile) {
   if (is_whole(typed, profile)) return std::string(typed);
   const Candidates candidates = candidates_for(typed, profile);
   const auto& [beginning, ending] = candidates;
-  if (ending.empty() && !beginning.empty()) return fmt::format("{}.*", typed);
-  if (ending.size() == 1 && beginning.empty()) return ending.front();
+  if (!beginning.empty()) return fmt::format("{}.*", typed);
+  if (ending.size() == 1) return ending.front();
   if (ending.empty()) return std::string(typed);
   return tl::unexpected(ambiguous(typed, candidates, fmt::format("*.{}", typed)));
 }

@@ -302,6 +302,14 @@ Result<Integer> integer_for(const Parameter& parameter, const Decimal& number) {
   return *step;
 }
 
+/// What would be written as 0.
+Error too_small(const Parameter& parameter, const Decimal& typed) {
+  return fault(Errc::bad_value, parameter,
+               fmt::format("{} is less than half a step of {}, so it would be 0", typed.to_string(),
+                           step_in_words(parameter.encoding)),
+               "write 0 where that is meant; else check the unit");
+}
+
 Error between_steps(const Parameter& parameter, const Decimal& number) {
   const std::string step = step_in_words(parameter.encoding);
   return fault(Errc::bad_value, parameter,
@@ -636,6 +644,8 @@ Result<Value> parse_value(const Parameter& parameter, std::string_view text) {
   }
   TRY(check_range(parameter, *value));
   if (number == typed) return value;
+  // Most often the unit is a wrong one.
+  if (number == Decimal(0)) return tl::unexpected(too_small(parameter, typed));
   // A label, or the name of a bit, has no neighbours.
   if (closed_enumeration(parameter) || !parameter.bits.empty()) {
     return tl::unexpected(between_steps(parameter, typed));

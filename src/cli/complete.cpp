@@ -274,6 +274,7 @@ class Completer {
     if (is_side) add("defaults", "what the profile says");
     if (slot.name == "FILE" || is_side) found_.paths = Paths::files;
     if (slot.name == "PROFILE") offer_profiles();
+    if (slot.name == "COMMAND") offer_commands(description_->commands);
     if (typed_.command->name == "tools add") return;  // a name that is not there yet
     if (slot.name == "PATTERN" || slot.name.starts_with("NAME") ||
         slot.name.starts_with("ACTION") || slot.name == "WHAT") {

@@ -261,7 +261,7 @@ constexpr std::string_view target_words = "tool name, @group or URL";
 void bind_columns(Binder& bind, ParseState& draft) {
   draft.has_columns = true;
   bind.option("--columns", "LIST", draft.invocation.columns, to_columns,
-              "which columns, as in name,value,unit");
+              "only these columns, such as target,time");
 }
 
 /// The words of a command, whichever they are.
@@ -403,7 +403,7 @@ void add_get(CLI::App& app, ParseState& draft) {
       "spindle get sim:doga-bm 'preset.1.*torque*'\n"
       "spindle get station3 status.ready status.alarm\n"
       "spindle get @line1 'preset.1.*' --json\n"
-      "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:0..31"};
+      "spindle get tcp://192.168.10.23:5000 @holding:2 @input:3204/i16 @holding:1..31"};
   add_command(app, draft, words, draft.options.get,
               with_words<commands::GetOptions>("get", commands::OtherWords::names, commands::get),
               [&draft](Binder& bind, Worded<commands::GetOptions>& worded) {
@@ -423,7 +423,7 @@ constexpr std::string_view save_words =
     "store it in the tool's non-volatile memory afterwards (BLV); asks";
 
 constexpr std::string_view broadcast_words =
-    "to everybody on the serial line (unit=0): sent, not acknowledged; asks";
+    "to every unit on the serial line (unit=0): sent, not acknowledged; asks";
 
 void add_set(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"set", "[TARGET...] NAME=VALUE...",
@@ -461,8 +461,8 @@ void add_do(CLI::App& app, ParseState& draft) {
                            "run actions of the catalogue; without one, list them",
                            "spindle do sim:doga-bm\n"
                            "spindle do sim:doga-bm select-preset=3 --accept-unverified --yes\n"
-                           "spindle do station3 alarm-reset\n"
-                           "spindle do @line1 lock=unlocked"};
+                           "spindle do station3 alarm-reset --accept-unverified\n"
+                           "spindle do @line1 lock=unlocked --accept-unverified"};
   add_command(app, draft, words, draft.options.perform,
               with_words<commands::DoOptions>("do", commands::OtherWords::names, commands::perform),
               [&draft](Binder& bind, Worded<commands::DoOptions>& worded) {
@@ -554,13 +554,13 @@ void bind_scan(Binder& bind, ScanArguments& arguments) {
 
 void add_scan(CLI::App& app, ParseState& draft) {
   constexpr Words words = {"scan", "BUS [--units 1-31|--registers 0..999]",
-                           "which units answer on a serial line or behind a gateway, or which "
+                           "which units answer on a line or behind a gateway, or which "
                            "registers of a tool",
                            "spindle scan rtu:///dev/ttyUSB0 --timeout 100ms\n"
                            "spindle scan 'rtu:///dev/ttyUSB0?baud=115200' --units 1-5,9\n"
                            "spindle scan rtu+tcp://192.168.10.30:4001 --json\n"
                            "spindle scan tcp://192.168.10.31 --units 1-5\n"
-                           "spindle scan station3 --registers 0..999 --table input",
+                           "spindle scan station3 --registers 3200..3299 --table input",
                            scan_words};
   const auto run = [](const ScanArguments& arguments, Context& context) {
     commands::ScanOptions options = arguments.options;
@@ -1018,8 +1018,8 @@ void add_remote_start(CLI::App& app, ParseState& draft) {
   constexpr Words words = {
       "remote-start", "[TARGET] [--preset N] [--direction D] [--speed SPEED] [--for DURATION]",
       "start the tool under a guard that always ends in a stop; wait for the result",
-      "spindle remote-start station3 --preset 2\n"
-      "spindle remote-start station3 --for 2s --yes --json\n"
+      "spindle remote-start station3 --preset 2 --accept-unverified\n"
+      "spindle remote-start station3 --for 2s --accept-unverified --yes --json\n"
       "spindle remote-start sim:doga-bm --preset 1 --accept-unverified --yes\n"
       "spindle remote-start conveyor1 --speed 500 --for 2s --watchdog 1s"};
   add_command(app, draft, words, draft.options.remote_start,
@@ -1050,7 +1050,7 @@ void add_remote_stop(CLI::App& app, ParseState& draft) {
                 bind.option("--stop", "HOW", options.stop, one_of(stop_modes),
                             "how a motor stops: decelerate (default) or instant");
                 bind.flag("--broadcast", options.addressing, commands::Addressing::broadcast,
-                          "everybody on the serial line (unit=0): sent, not acknowledged");
+                          "every unit on the serial line (unit=0): sent, not acknowledged");
               });
 }
 
@@ -1059,7 +1059,7 @@ void add_alarms(CLI::App& app, ParseState& draft) {
                            "present alarm and last error, with meaning and remedy",
                            "spindle alarms sim:doga-bm\n"
                            "spindle alarms @line1\n"
-                           "spindle alarms station3 --reset"};
+                           "spindle alarms station3 --reset --accept-unverified"};
   add_command(
       app, draft, words, draft.options.alarms,
       with_words<commands::AlarmsOptions>("alarms", commands::OtherWords::none, commands::alarms),
@@ -1121,7 +1121,7 @@ void add_dump(CLI::App& app, ParseState& draft) {
                            "raw registers into a file that diff can compare",
                            "spindle dump station3 monday.yaml\n"
                            "spindle dump tcp://192.168.10.40 unknown.yaml --registers 0..999\n"
-                           "spindle dump station3 - --registers 0..99 --table input"};
+                           "spindle dump station3 - --registers 3200..3213 --table input"};
   const auto note_file = [&draft](const std::string& file) {
     if (file == "-") draft.only_as_text = "with - the dump itself is on standard output";
   };
@@ -1282,7 +1282,7 @@ void add_simulate(CLI::App& app, ParseState& draft) {
       "spindle simulate doga-bm --rundown-every 3s --ng-every 5\n"
       "spindle simulate doga-bm --fault late=1500ms@every:10 --fault split=3\n"
       "spindle simulate doga-bm --rundown-every 2s --outage roam=5s@every:30s\n"
-      "spindle simulate doga-bm --firmware 4001",
+      "spindle simulate doga-gen2 --rundown-every 5s",
       trouble_words};
   add_command(app, draft, words, draft.options.simulate, commands::simulate,
               [](Binder& bind, commands::SimulateOptions& options) {

@@ -94,7 +94,9 @@ Result<TypedAssignment> take_apart(const std::string& text, const Profile& profi
     Error error{.code = Errc::usage,
                 .message = fmt::format("'{}' is not of the form NAME=VALUE", text),
                 .hint = "write it like preset.1.target-torque=2.71"};
-    if (equals != 0) error.remedy.right = fmt::format("spindle get TARGET {}", shell_word(text));
+    const bool is_name = text.find_first_of(", \t") == std::string::npos;
+    if (equals != 0 && is_name)
+      error.remedy.right = fmt::format("spindle get TARGET {}", shell_word(text));
     return tl::unexpected(std::move(error));
   }
   TypedAssignment typed{.name = text.substr(0, equals), .value = text.substr(equals + 1)};

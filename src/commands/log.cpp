@@ -20,8 +20,8 @@ using report::Align;
 const std::array<report::Column, 10> columns = {
     {{"ID", "id"},
      {"TIME", "changed", Align::left, 0, report::wrapped(10)},
-     {"TARGET", "target"},
-     {"NAME", "name"},
+     {"TARGET", "target", Align::left, 0, report::wrapped(12)},
+     {"NAME", "name", Align::left, 0, report::wrapped(14)},
      {"OLD", "old", Align::right},
      {"NEW", "new", Align::right},
      {"UNIT", "unit"},

@@ -65,11 +65,13 @@ Undoing effects_of(const Changes& changes) {
   return undoing;
 }
 
-/// Of the last command that left something, other than undo: what was not taken back yet.
+/// Of the last command that left something, other than undo: what was not taken back yet. A
+/// simulated tool is gone with the command that changed it.
 Changes last_changes(const ChangeHistory& history) {
   const std::set<std::string> taken = taken_back(history);
   const auto counts = [&](const PastChange& change) {
-    return !change.id.empty() && change.command != "undo" && !taken.contains(value_of(change));
+    return !change.id.empty() && change.command != "undo" && !change.target.starts_with("sim:") &&
+           !taken.contains(value_of(change));
   };
   std::set<std::string> seen;
   for (auto last = history.changes.rbegin(); last != history.changes.rend(); ++last) {

@@ -332,11 +332,11 @@ Result<Tools> read_tools_file(const std::string& path, const Disk& disk, Diagnos
 }
 
 /// What is said of a file that has these faults.
-Error refusal_of(const Diagnostics& findings) {
+Error refusal_of(const Diagnostics& findings, const std::string& path) {
   Error error = findings.error();
   if (findings.list().size() > 1) {
     error.hint = "'spindle tools --check' lists every fault";
-    error.remedy.right = "spindle tools --check";
+    error.remedy.right = fmt::format("spindle tools --check --tools {}", shell_word(path));
   }
   return error;
 }
@@ -364,7 +364,7 @@ Result<Tools> load_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
   auto tools = read_tools_file(path, disk, findings);
   if (!tools || findings.empty()) return tools;
-  return tl::unexpected(refusal_of(findings));
+  return tl::unexpected(refusal_of(findings, path));
 }
 
 Result<Tools> usable_tools(const std::string& path, const Disk& disk) {
@@ -375,7 +375,7 @@ Result<Tools> usable_tools(const std::string& path, const Disk& disk) {
 Result<Tools> parse_tools(std::string_view text, const std::string& path) {
   Diagnostics findings;
   Tools tools = read_tools(text, path, findings);
-  if (tools.faults.contains("")) return tl::unexpected(refusal_of(findings));
+  if (tools.faults.contains("")) return tl::unexpected(refusal_of(findings, path));
   return tools;
 }
 
@@ -397,7 +397,7 @@ Tools salvage_tools(const std::string& path, const Disk& disk) {
   Diagnostics findings;
   auto tools = read_tools_file(path, disk, findings);
   if (!tools) return {.path = path, .left_out = std::move(tools.error())};
-  if (!findings.empty()) tools->left_out = refusal_of(findings);
+  if (!findings.empty()) tools->left_out = refusal_of(findings, path);
   tools->faults.clear();
   return std::move(*tools);
 }

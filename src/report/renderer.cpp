@@ -52,7 +52,9 @@ std::string wrapped(std::string_view text, std::size_t columns) {
   for (const std::string_view next : split(text.substr(begin), ' ')) {
     word += next;
     const std::size_t wide = display_width(word);
-    const bool fits = width == 0 || width + 1 + wide <= columns;
+    // "spindle:" alone says nothing.
+    const bool is_mark = lines.ends_with(':') && lines.find(' ') == std::string::npos;
+    const bool fits = width == 0 || is_mark || width + 1 + wide <= columns;
     if (width > 0) lines += fits ? " " : "\n" + indent;
     width = width == 0 ? wide : fits ? width + 1 + wide : indent.size() + wide;
     lines += std::exchange(word, {});

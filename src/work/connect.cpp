@@ -252,7 +252,7 @@ Result<device::Device> connect_device(const Target& target, const catalogue::Pro
       with_simulated_tools(environment, simulated_options(simulated_operator)), environment.clock);
   const bool guessed = target.profile.empty() && !target.endpoint.port;
   if (!device && guessed && is_wrong_port(device.error())) {
-    device.error().hint = other_port_hint(target, environment);
+    suggest_port(target, environment, device.error());
   }
   return device;
 }

@@ -43,10 +43,14 @@ inline std::string kind_of(const ordered_json& key) {
   const auto plain = [](const std::string& kind) { return kind == "string" ? "text" : kind; };
   const ordered_json type = key.value("type", ordered_json("string"));
   if (key.contains("enum") && !key.at("enum").front().is_string()) return "integer";
-  if (key.contains("items")) return "array of " + kind_of(key.at("items"));
-  if (type.is_string()) return plain(type);
+  if (key.contains("const") && key.at("const").is_boolean()) return "boolean";
+  const auto of = [&](const std::string& kind) {
+    return kind == "array" && key.contains("items") ? "array of " + kind_of(key.at("items"))
+                                                    : plain(kind);
+  };
+  if (type.is_string()) return key.contains("items") ? of("array") : plain(type);
   std::vector<std::string> kinds;
-  for (const auto& kind : type) kinds.push_back(plain(kind));
+  for (const auto& kind : type) kinds.push_back(of(kind));
   return joined(kinds, "or");
 }
 
