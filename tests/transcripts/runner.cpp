@@ -19,6 +19,10 @@
 //   %datagram HEX         what comes back for each question to a group, with the question's number
 //                         in its first two bytes
 //   %wait DURATION        time passes
+//   %second               time passes to the next full second: behind a command on several tools,
+//   which
+//                         takes longer or shorter as they happen to take turns. In a Markdown file
+//                         every command begins so.
 //   %later DURATION URL UNIT REGISTER VALUE
 //                         so long from now another master writes a register
 //   %later DURATION alarm URL UNIT CODE
@@ -254,6 +258,11 @@ class Stage {
   }
   void set_variable(const std::string& name, const std::string& value) { variables_[name] = value; }
   void hide_progress() { hides_progress_ = true; }
+  void go_to_full_second() {
+    constexpr Duration second = std::chrono::seconds(1);
+    const Duration over = clock_.now().time_since_epoch() % second;
+    if (over > Duration::zero()) clock_.advance(second - over);
+  }
 
   void add_interface(const std::vector<std::string>& words) {
     interfaces_.push_back(
@@ -537,6 +546,7 @@ class Player {
     if (words.at(0) == "profile") copy_profile(words.at(1));
     if (words.at(0) == "set") stage_.set_variable(words.at(1), words.at(2));
     if (words.at(0) == "hide") stage_.hide_progress();
+    if (words.at(0) == "second") stage_.go_to_full_second();
     if (words.at(0) == "interface") stage_.add_interface(words);
     if (words.at(0) == "datagram") stage_.add_datagram(words.at(1));
     if (words.at(0) == "fails") stage_.add_failure(words.at(1), words.at(2));
@@ -580,6 +590,7 @@ class Player {
 
   std::size_t run(const Lines& lines, std::size_t index) {
     ++commands_;
+    if (markdown_) stage_.go_to_full_second();
     const auto words = shell_words(lines[index].substr(2));
     return show(stage_.run({words.begin() + 1, words.end()},
                            markdown_ ? Marking::plain : Marking::mark_stderr),
