@@ -12,8 +12,6 @@ set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
 set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES SPINDLE_SYSROOT)
 if(SPINDLE_SYSROOT)
   set(CMAKE_SYSROOT ${SPINDLE_SYSROOT})
-  # The build runs a program of its own, which needs the libraries that are there.
-  set(CMAKE_CROSSCOMPILING_EMULATOR qemu-aarch64-static -L ${SPINDLE_SYSROOT})
   # The C library that came with the compiler would be found first, and it is older.
   set(CMAKE_EXE_LINKER_FLAGS_INIT -B${SPINDLE_SYSROOT}/usr/lib/aarch64-linux-gnu)
   set(ENV{PKG_CONFIG_SYSROOT_DIR} ${SPINDLE_SYSROOT})

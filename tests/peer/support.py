@@ -33,6 +33,11 @@ DOGA_IDENTITY = bytes.fromhex("0001 0001 0003 0837 3CDCC00A")
 _scratch = tempfile.TemporaryDirectory()
 
 
+def is_sanitized():
+    """Whether the program is the one that is built with the address sanitizer, which frees memory late."""
+    return b"__asan_init" in pathlib.Path(SPINDLE).read_bytes()
+
+
 def scratch_folder():
     """A new folder that is gone when the tests end."""
     return pathlib.Path(tempfile.mkdtemp(dir=_scratch.name))
