@@ -19,10 +19,6 @@
 //   %datagram HEX         what comes back for each question to a group, with the question's number
 //                         in its first two bytes
 //   %wait DURATION        time passes
-//   %second               time passes to the next full second: behind a command on several tools,
-//   which
-//                         takes longer or shorter as they happen to take turns. In a Markdown file
-//                         every command begins so.
 //   %later DURATION URL UNIT REGISTER VALUE
 //                         so long from now another master writes a register
 //   %later DURATION alarm URL UNIT CODE
@@ -42,7 +38,9 @@
 //   $ cat FILE, $ grep TEXT FILE, $ ls    what is on that disk
 //
 // Lines on stderr begin with "! ", and those on stdout that look as if they were typed with "\";
-// a status other than 0 follows as "[2]". In a Markdown file the
+// a status other than 0 follows as "[2]". Behind a command on several tools time goes on to the
+// next full second, as such a command takes longer or shorter, as its threads happen to take turns.
+// In a Markdown file the
 // fenced blocks marked "console" are run, stderr is not marked, and "$ echo $?" shows the status; a
 // directive stands in a comment, and the file that it names is the fenced block behind it.
 // The source folder is shown as $SOURCE. With SPINDLE_UPDATE=1 the file is rewritten with what was
@@ -57,7 +55,9 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -395,7 +395,9 @@ class Stage {
         .installation = {SPINDLE_SOURCE_DIR, "3.1.6"},
         .shipped = shipped::profiles(),
         .network = network()};
+    opened_.clear();
     status_ = cli::run(arguments, world);
+    if (opened_.size() > 1) go_to_full_second();
     Lines lines;
     std::istringstream stream(without_own_folder(without_source_folder(std::move(shown))));
     for (std::string line; std::getline(stream, line);) lines.push_back(line);
@@ -445,6 +447,10 @@ class Stage {
                                                 const catalogue::LinkSpec& facts) {
     const bool serial = endpoint.medium != link::Medium::tcp;
     const std::string key = key_of(endpoint, facts.port);
+    {
+      const std::lock_guard turn(mutex_);
+      opened_.insert(fmt::format("{} {}", key, endpoint.unit ? endpoint.unit->value : 0));
+    }
     if (const auto failure = failures_.find(key); failure != failures_.end()) {
       return tl::unexpected(Error{
           .code = failure->second, .tried = "report server id", .waited = std::chrono::seconds(3)});
@@ -467,6 +473,8 @@ class Stage {
   const Interrupt calm_;
   std::optional<Interrupt> interrupt_;  // a new one for every command, as for every process
   std::map<std::string, std::unique_ptr<Tool>> tools_;
+  std::mutex mutex_ = {};
+  std::set<std::string> opened_ = {};          ///< by the present command
   std::map<std::string, Errc> failures_ = {};  ///< of opening a URL
   std::vector<std::string> answers_;
   Lines too_wide_;
@@ -546,7 +554,6 @@ class Player {
     if (words.at(0) == "profile") copy_profile(words.at(1));
     if (words.at(0) == "set") stage_.set_variable(words.at(1), words.at(2));
     if (words.at(0) == "hide") stage_.hide_progress();
-    if (words.at(0) == "second") stage_.go_to_full_second();
     if (words.at(0) == "interface") stage_.add_interface(words);
     if (words.at(0) == "datagram") stage_.add_datagram(words.at(1));
     if (words.at(0) == "fails") stage_.add_failure(words.at(1), words.at(2));
@@ -590,7 +597,6 @@ class Player {
 
   std::size_t run(const Lines& lines, std::size_t index) {
     ++commands_;
-    if (markdown_) stage_.go_to_full_second();
     const auto words = shell_words(lines[index].substr(2));
     return show(stage_.run({words.begin() + 1, words.end()},
                            markdown_ ? Marking::plain : Marking::mark_stderr),
