@@ -67,9 +67,8 @@ class AddTest(ToolsTest):
         self.assertEqual(os.listdir(self.home / "elsewhere"), ["line1.yaml"])
         self.assertEqual(self.names(), ["a", "b"])
 
-    def test_several_that_add_at_once_lose_nothing(self):
-        self.file.write_text("tools: {}\n", "utf-8")
-        names = [f"t{number}" for number in range(8)]
+    def check_adding_at_once(self, count):
+        names = [f"t{number}" for number in range(count)]
         running = [
             self.enterContext(support.Running("tools", "add", name, f"tcp://127.0.0.1:{1000 + place}", "--offline"))
             for place, name in enumerate(names)
@@ -78,15 +77,12 @@ class AddTest(ToolsTest):
             self.assertEqual(support.wait_for_end(program.process), 0, program.arguments)
         self.assertEqual(self.names(), names)
 
+    def test_several_that_add_at_once_lose_nothing(self):
+        self.file.write_text("tools: {}\n", "utf-8")
+        self.check_adding_at_once(8)
+
     def test_several_that_make_the_file_at_once_lose_nothing(self):
-        names = [f"t{number}" for number in range(4)]
-        running = [
-            self.enterContext(support.Running("tools", "add", name, f"tcp://127.0.0.1:{1000 + place}", "--offline"))
-            for place, name in enumerate(names)
-        ]
-        for program in running:
-            self.assertEqual(support.wait_for_end(program.process), 0, program.arguments)
-        self.assertEqual(self.names(), names)
+        self.check_adding_at_once(4)
 
     def test_a_file_that_other_users_can_write_is_not_added_to(self):
         text = "tools: {}\n"

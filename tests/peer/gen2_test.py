@@ -435,14 +435,18 @@ class Backups(Gen2Test):
             self.assertIn("control.torque-unit", outcome.err)
         self.assertEqual(self.written(), [])
 
+    def start_in_another_unit(self, rescales):
+        """A tool that was set to another unit behind its backup, and may convert its torques along."""
+        self.start()
+        self.backup("--force")
+        self.device.rescales = rescales
+        self.device.put(UNIT, 3)
+        self.device.put(TARGET_1, *f32(10.0))
+
     def test_the_unit_is_restored_before_the_torques(self):
         for rescales in (False, True):
             with self.subTest(rescales=rescales):
-                self.start()
-                self.backup("--force")
-                self.device.rescales = rescales
-                self.device.put(UNIT, 3)
-                self.device.put(TARGET_1, *f32(10.0))
+                self.start_in_another_unit(rescales)
                 plan = {one["name"]: one for one in self.ask("restore", self.file, "--dry-run").of_type("plan")}
                 self.assertEqual([plan["preset.1.target-torque"][key] for key in ("old", "old_unit", "new", "unit")],
                                  [10, "cN.m", 2.5, "N.m"])
@@ -467,11 +471,7 @@ class Backups(Gen2Test):
     def test_a_restore_with_the_unit_is_taken_back(self):
         for rescales in (False, True):
             with self.subTest(rescales=rescales):
-                self.start()
-                self.backup("--force")
-                self.device.rescales = rescales
-                self.device.put(UNIT, 3)
-                self.device.put(TARGET_1, *f32(10.0))
+                self.start_in_another_unit(rescales)
                 self.device.put(3663, 77)
                 folder = support.scratch_folder()
                 outcome = support.run(support.SPINDLE, "--json", "restore", self.url, self.file, "--yes", folder=folder)
