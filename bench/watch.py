@@ -318,15 +318,7 @@ def curves(spindle, count, seconds=20):
         tools.settle()
         settled = time.monotonic() + 2  # the settings of all presets are read at first
         tools.serve_until(lambda: time.monotonic() > settled)
-        used, began = processor_seconds(process.pid), time.monotonic()
-        sent = 0
-        while (elapsed := time.monotonic() - began) < seconds:
-            while sent < elapsed * count:
-                tool = tools.tools[sent % count]
-                tool.client.sendall(tool.happen())
-                sent += 1
-            tools.serve(min(0.01, 1 / count))
-        used = processor_seconds(process.pid) - used
+        used, sent = driven_evenly(tools, process, seconds)
         settled = time.monotonic() + 2
         tools.serve_until(lambda: time.monotonic() > settled)
         peak = memory_mib(process.pid)
@@ -372,20 +364,26 @@ def memory_mib(pid):
     return int(peak.split()[1]) / 1024
 
 
+def driven_evenly(tools, process, seconds):
+    """One result a second of each tool; the processor time that the program took, and how many results."""
+    count = len(tools.tools)
+    used, began = processor_seconds(process.pid), time.monotonic()
+    sent = 0
+    while (elapsed := time.monotonic() - began) < seconds:
+        while sent < elapsed * count:  # evenly, one after another
+            tool = tools.tools[sent % count]
+            tool.client.sendall(tool.happen())
+            sent += 1
+        tools.serve(min(0.01, 1 / count))
+    return processor_seconds(process.pid) - used, sent
+
+
 def many(spindle, count, seconds=20):
     tools = Tools(count)
     with tempfile.TemporaryFile() as output:
         process = start(spindle, tools.urls(), stdout=output)
         tools.settle()
-        used, began = processor_seconds(process.pid), time.monotonic()
-        sent = 0
-        while (elapsed := time.monotonic() - began) < seconds:
-            while sent < elapsed * count:  # evenly, one after another
-                tool = tools.tools[sent % count]
-                tool.client.sendall(tool.happen())
-                sent += 1
-            tools.serve(min(0.01, 1 / count))
-        used = processor_seconds(process.pid) - used
+        used, sent = driven_evenly(tools, process, seconds)
         settled = time.monotonic() + 1
         tools.serve_until(lambda: time.monotonic() > settled)
         peak = memory_mib(process.pid)

@@ -10,12 +10,12 @@
 #include "records.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/link/endpoint.hpp"
+#include "tool_record.hpp"
 
 namespace spindle::commands {
 namespace {
 
 using report::Column;
-using report::Record;
 
 const std::array<Column, 6> tool_columns = {
     {{"NAME", "name"},
@@ -33,19 +33,6 @@ std::vector<std::string> groups_of(const files::Tool& tool, const files::Tools& 
     if (is_member) groups.push_back(group);
   }
   return groups;
-}
-
-Record tool_record(const files::Tool& tool, const files::Tools& tools, const Clock& clock) {
-  return {.type = "tool",
-          .target = tool.name,
-          .time = clock.wall(),
-          .fields = {{"name", tool.name},
-                     {"endpoint", tool.url},
-                     {"profile", text_or_null(tool.profile)},
-                     {"torque_unit", text_or_null(tool.torque_unit)},
-                     {"groups", groups_of(tool, tools)},
-                     {"verified", tool.verified},
-                     {"serial", text_or_null(tool.serial)}}};
 }
 
 /// Collects what the file's own rules cannot see: whether URLs, profiles and actions exist.
@@ -106,7 +93,7 @@ Result<Outcome> tools(Context& context) {
       listing.add(fault);
     }
     if (!meant.faults.empty()) continue;
-    listing.add(tool_record(tool, context.tools, context.clock));
+    listing.add(tool_record(tool, groups_of(tool, context.tools), context.clock));
   }
   for (const auto& [entry, fault] : context.tools.faults) {
     outcome.fail(fault);

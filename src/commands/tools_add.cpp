@@ -13,6 +13,7 @@
 #include "spindle/base/text.hpp"
 #include "spindle/commands/commands.hpp"
 #include "spindle/files/tools_edit.hpp"
+#include "tool_record.hpp"
 
 namespace spindle::commands {
 namespace {
@@ -79,19 +80,17 @@ report::Record added_record(const NewEntry& entry, const std::string& path,
                             const ToolAddOptions& options, const Clock& clock) {
   const files::NewTool& tool = entry.tool;
   const bool is_planned = options.execution == Execution::dry_run;
-  return {.type = "tool",
-          .target = tool.name,
-          .time = clock.wall(),
-          .fields = {{"name", tool.name},
-                     {"endpoint", tool.url},
-                     {"profile", text_or_null(tool.profile)},
-                     {"torque_unit", text_or_null(tool.torque_unit)},
-                     {"groups", std::vector<std::string>()},
-                     {"verified", std::vector<std::string>()},
-                     {"serial", text_or_null(tool.serial)},
-                     {"tool_model", text_or_null(entry.model)},
-                     {"file", path},
-                     {"result", std::string(is_planned ? "planned" : "added")}}};
+  report::Record record = tool_record({.name = tool.name,
+                                       .url = tool.url,
+                                       .profile = tool.profile,
+                                       .torque_unit = tool.torque_unit,
+                                       .serial = tool.serial},
+                                      {}, clock);
+  record.fields.insert(record.fields.end(),
+                       {{"tool_model", text_or_null(entry.model)},
+                        {"file", path},
+                        {"result", std::string(is_planned ? "planned" : "added")}});
+  return record;
 }
 
 /// What else has the place or the number of this tool.
