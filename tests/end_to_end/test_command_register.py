@@ -71,7 +71,7 @@ class Line(support.SimulatedLine):
         """Read as soon as the guardian has left the line."""
         def read():
             finished = support.run("get", self.url, "--profile", str(self.profile), *names, "--json")
-            return None if "in use by guardian" in finished.stderr else finished
+            return None if "in use by guardian" in finished.said else finished
 
         finished = support.wait_until(read, "the guardian leaves the line")
         if finished.status != 0:

@@ -214,7 +214,7 @@ class OtherMasters(unittest.TestCase):
                 shown += 1
             if finished.status == 0:
                 self.assertTrue(finished.records("value"), finished)
-            warned += all(sentence in finished.stderr for sentence in told)
+            warned += all(sentence in finished.said for sentence in told)
             if not told:
                 self.assertEqual((finished.status, finished.stderr), (0, ""), finished)
         self.assertGreaterEqual(shown, calls)
